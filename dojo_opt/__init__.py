@@ -1,0 +1,99 @@
+"""dojo-opt: a differentiable rigid-body simulator with exact contact, and a planner that uses its derivatives.
+
+    import dojo_opt as dojo
+
+    plan = dojo.ilqr(dojo.problems.hop(), verbose=True)
+    dojo.plots.trajectory(plan)
+
+Every public name is imported when it is first used, so `import dojo_opt` costs milliseconds and neither compiles nor
+loads a plotting library.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+__all__ = [
+    "Body",
+    "Contact",
+    "Joint",
+    "Mechanism",
+    "Problem",
+    "Simulator",
+    "Status",
+    "Trajectory",
+    "cost",
+    "ilqr",
+    "models",
+    "plots",
+    "problems",
+    "viewer",
+]
+
+# public name -> module that defines it; a name mapped to None is itself a module of dojo_opt
+_HOME: dict[str, str | None] = {
+    "Body": "sim.mechanism",
+    "Contact": "sim.mechanism",
+    "Joint": "sim.mechanism",
+    "Mechanism": "sim.mechanism",
+    "Problem": "dojo_opt.problem",
+    "Simulator": "sim.simulator",
+    "Status": "solvers.status",
+    "Trajectory": "sim.simulator",
+    "cost": None,
+    "ilqr": "dojo_opt.ilqr",
+    "models": None,
+    "plots": None,
+    "problems": None,
+    "viewer": None,
+}
+
+if TYPE_CHECKING:
+    from dojo_opt import cost, models, plots, problems, viewer
+    from dojo_opt.ilqr import ilqr
+    from dojo_opt.problem import Problem
+    from sim.mechanism import Body, Contact, Joint, Mechanism
+    from sim.simulator import Simulator, Trajectory
+    from solvers.status import Status
+
+
+def _check_own(name: str) -> None:
+    """Raise an ImportError when Python would find somebody else's top-level package `name` instead of ours."""
+    own = Path(__file__).resolve().parent.parent / name / "__init__.py"
+    try:
+        spec = find_spec(name)
+        found = spec.origin or (list(spec.submodule_search_locations or [None])[0]) if spec else None
+    except ValueError:  # a module put into sys.modules by hand has no spec
+        found = "a module made at run time"
+    if found is None or Path(found).resolve() != own:
+        raise ImportError(
+            f"dojo_opt needs its own package {name!r} in {own.parent}, but Python finds {found or 'none'} first. "
+            f"Rename or move that file, or take its folder off sys.path (the working directory comes first)."
+        )
+
+
+_check_own("sim")
+_check_own("solvers")
+
+try:
+    __version__ = version("dojo-opt")
+except PackageNotFoundError:  # run from a source tree that is not installed
+    __version__ = "0+source"
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}; it has {', '.join(__all__)}")
+    home = _HOME[name]
+    value = import_module(f"dojo_opt.{name}") if home is None else getattr(import_module(home), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
