@@ -1,4 +1,4 @@
-"""A Raibert hopper plans one hop, half a metre forward and half a metre up: iLQR through contact, from a standing guess.
+"""A Raibert hopper plans one hop, half a metre forward and half a metre up: iLQR through contact.
 
 python examples/hopper.py            prints one line per iteration, writes hopper.png
 """
