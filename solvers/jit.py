@@ -14,14 +14,15 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import prange
 
-__all__ = ["kernel", "parallel_kernel", "prange", "compiled_signatures", "cache_folder"]
+__all__ = ["kernel", "parallel_kernel", "prange", "cache_folder", "compiled_signatures", "threads"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -113,3 +114,14 @@ def compiled_signatures() -> dict[str, int]:
         for k in _REGISTRY
         if getattr(k, "signatures", None)
     }
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Run `parallel_kernel` loops on `count` threads inside the block."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(count)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
