@@ -21,7 +21,7 @@ LEGS = {"front_left": (1, 1), "front_right": (1, -1), "rear_left": (-1, 1), "rea
 
 
 def quadruped() -> Mechanism:
-    """Trunk, and four legs of hip, thigh and calf: 13 bodies, 18 degrees of freedom, 4 feet; numbers near Unitree's A1."""
+    """Trunk, and four legs of hip, thigh and calf: 13 bodies, 18 degrees of freedom, 4 feet; numbers near an A1."""
     bodies = [Body("trunk", TRUNK, shape=Box(x=0.36, y=0.2, z=0.11))]
     joints = [Joint("floating", None, "trunk")]
     contacts = []

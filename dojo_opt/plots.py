@@ -1,0 +1,119 @@
+"""Figures. Every function takes the figure or axes to draw on, returns it, and shows nothing.
+
+matplotlib is imported when the first figure is made, without pyplot: no window, no global state.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dojo_opt.motion import Motion, motion
+from sim.mechanism import Mechanism
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["contact_forces", "controls", "paths", "state", "trajectory"]
+
+
+def trajectory(result: Any, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
+    """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot."""
+    if figure is None:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(10, 7.5), layout="constrained")
+    m = motion(result)
+    axes = np.ravel(figure.subplots(2, 2))
+    state(m, axes[0])
+    controls(m, axes[1])
+    contact_forces(m, axes[2])
+    paths(m, axes[3])
+    return figure
+
+
+def state(m: Motion, ax: Axes) -> Axes:
+    """Coordinates over time; the orientation of a quaternion joint as its rotation vector."""
+    for label, values in _coordinates(m):
+        if np.ptp(values) > 1e-9 or len(m.mechanism.joints) == 1:
+            ax.plot(m.time, values, label=label)
+    return _finish(ax, "coordinates [m, rad]", "time [s]")
+
+
+def controls(m: Motion, ax: Axes) -> Axes:
+    """Inputs over time, held over each knot."""
+    for k, name in enumerate(m.mechanism.input_names):
+        ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
+    return _finish(ax, "inputs [N, N m]", "time [s]")
+
+
+def contact_forces(m: Motion, ax: Axes) -> Axes:
+    """Normal force of every contact, mean over each step, and the size of its friction force, dashed."""
+    edges = np.concatenate([[0.0], m.contact_time])
+    for k, name in enumerate(m.mechanism.contact_names):
+        line = ax.stairs(m.contact_force[:, k, 0], edges, baseline=None, label=f"{name}, normal")
+        friction = np.hypot(m.contact_force[:, k, 1], m.contact_force[:, k, 2])
+        ax.stairs(friction, edges, baseline=None, linestyle="--", color=line.get_edgecolor(), label=f"{name}, friction")
+    if not m.mechanism.contacts:
+        ax.text(0.5, 0.5, "no contacts", ha="center", va="center", transform=ax.transAxes)
+    return _finish(ax, "contact forces [N]", "time [s]")
+
+
+def paths(m: Motion, ax: Axes) -> Axes:
+    """Paths of the first body and of all points that can touch the ground, in the vertical plane of the motion."""
+    side = int(np.ptp(m.position[:, 0, 1]) > np.ptp(m.position[:, 0, 0]))
+    names = m.mechanism.body_names
+    drawn = [(names[0], m.position[:, 0])]
+    for contact in m.mechanism.contacts:
+        body = names.index(contact.body)
+        drawn.append((contact.name, m.points(body, contact.point) - contact.radius * np.asarray(contact.normal)))
+    if not m.mechanism.contacts:
+        drawn += [(name, m.position[:, k]) for k, name in enumerate(names[1:], start=1)]
+    for label, path in drawn:
+        (line,) = ax.plot(path[:, side], path[:, 2], marker=".", markersize=4, label=label)
+        ax.plot(path[-1, side], path[-1, 2], marker="o", color=line.get_color())
+    if any(np.allclose(c.normal, (0, 0, 1)) for c in m.mechanism.contacts):
+        ax.axhline(m.mechanism.contacts[0].height, color="0.6", linewidth=1)
+    ax.set_aspect("equal", adjustable="datalim")
+    return _finish(ax, "height [m]", f"{'xy'[side]} [m]")
+
+
+def _finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
+    """Labels, grid, and a legend as long as it can be read."""
+    ax.set_xlabel(xlabel)
+    ax.set_ylabel(ylabel)
+    ax.grid(alpha=0.3)
+    if 0 < len(ax.get_legend_handles_labels()[1]) <= 12:
+        ax.legend(fontsize="small")
+    return ax
+
+
+def _coordinates(m: Motion) -> list[tuple[str, Any]]:
+    """(label, values over time) of every degree of freedom."""
+    rows = []
+    for joint in m.mechanism.joints:
+        q = m.x[:, m.mechanism.q_slice(joint.name)]
+        for k in range(joint.ntrans):
+            rows.append((_label(m.mechanism, joint.name, "xyz"[k] if joint.ntrans > 1 else ""), q[:, k]))
+        if joint.nrot == 1:
+            rows.append((_label(m.mechanism, joint.name, "angle" if joint.ntrans else ""), q[:, -1]))
+        elif joint.nrot == 3:
+            vectors = _rotation_vectors(q[:, -4:])
+            rows += [(_label(m.mechanism, joint.name, f"r{a}"), vectors[:, k]) for k, a in enumerate("xyz")]
+    return rows
+
+
+def _label(mechanism: Mechanism, joint: str, coordinate: str) -> str:
+    if len(mechanism.joints) == 1 and coordinate:
+        return coordinate
+    return f"{joint} {coordinate}".strip()
+
+
+def _rotation_vectors(quaternions: Any) -> Any:
+    """Axis times angle, (T, 3), of unit quaternions (w, x, y, z)."""
+    q = quaternions * np.where(quaternions[:, :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[:, :1])
+    return q[:, 1:] * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
