@@ -92,9 +92,7 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
 
 
 @kernel
-def add_contact_matrix(
-    model: Model, work: Work, h: float, c: int, fn: float, f1: float, f2: float, out: Matrix
-) -> None:
+def add_contact_matrix(model: Model, work: Work, h: float, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= B^T W C + geometric term, about O (accumulated):
 
     C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench;

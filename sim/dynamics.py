@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from sim.kinematics import displace, tree_poses
 from sim.model import InputKind, Matrix, Model, Vector, Work
-from sim.rotation import Mat3, Vec3, quat_turn, rotate
+from sim.rotation import Mat3, Vec3, cross, quat_turn, rotate
 from solvers.jit import kernel
 
 _WORLD = int(InputKind.WORLD)
@@ -22,10 +22,8 @@ _JOINT = int(InputKind.JOINT)
 
 
 @kernel
-def spin(
-    J: Matrix, i: int, c: float, x: float, y: float, z: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """M = c J s + s x J s,  k = s.J s  and J s, for s = (x, y, z): returns (m, J s, k) as seven numbers."""
+def spin(J: Matrix, i: int, c: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float, float, float]:
+    """m = c J s + s x J s,  k = s.J s  and J s, for s = (x, y, z): returns (m, J s, k) as seven numbers."""
     jx, jy, jz = rotate(J, i, x, y, z)
     k = x * jx + y * jy + z * jz
     return c * jx + y * jz - z * jy, c * jy + z * jx - x * jz, c * jz + x * jy - y * jx, jx, jy, jz, k
@@ -180,7 +178,7 @@ def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
 
 @kernel
 def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
-    """Balance = (m (x3 - x2)/h, P(c, s)) - momentum_in, as a wrench about O, at the trial velocity work.nu.
+    """balance = (m (x3 - x2)/h, P(c, s)) - momentum_in, as a wrench about O, at the trial velocity work.nu.
 
     False when a body would turn by half a turn or more.   Fills configuration 3, turn, balance.
     """
@@ -202,11 +200,7 @@ def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
         fx = m * (work.pos3[i, 0] - work.pos2[i, 0]) - work.momentum_in[i, 0]
         fy = m * (work.pos3[i, 1] - work.pos2[i, 1]) - work.momentum_in[i, 1]
         fz = m * (work.pos3[i, 2] - work.pos2[i, 2]) - work.momentum_in[i, 2]
-        dx, dy, dz = (
-            work.pos2[i, 0] - work.origin[0],
-            work.pos2[i, 1] - work.origin[1],
-            work.pos2[i, 2] - work.origin[2],
-        )
+        dx, dy, dz = work.pos2[i, 0] - work.origin[0], work.pos2[i, 1] - work.origin[1], work.pos2[i, 2] - work.origin[2]
         work.balance[i, 0] = fx
         work.balance[i, 1] = fy
         work.balance[i, 2] = fz

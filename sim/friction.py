@@ -71,7 +71,7 @@ def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) 
 
 @kernel
 def _pyramid_slip(x: float, y: float, a: float) -> float:
-    """Psi > max(|x|, |y|) with 1/psi + sum_i 1/(psi + d_i) = 1/a: on the central path mu gamma = s_psi + sum beta.
+    """psi > max(|x|, |y|) with 1/psi + sum_i 1/(psi + d_i) = 1/a: on the central path mu gamma = s_psi + sum beta.
 
     Newton on the convex decreasing function from the left end of the bracket (m + a/5 .. m + 5 a), monotone.
     """
@@ -109,7 +109,7 @@ def contact_error(model: Model, work: Work, c: int) -> float:
 
 @kernel
 def _cap_error(model: Model, work: Work, c: int) -> float:
-    """Mu gamma - sum beta - s_psi of the pyramid."""
+    """mu gamma - sum beta - s_psi of the pyramid."""
     z = work.cone[c]
     return model.contact_friction[c] * z[1] - z[4] - z[5] - z[6] - z[7] - z[3]
 
@@ -276,7 +276,7 @@ def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: 
 
 @kernel
 def _cone_target(model: Model, work: Work, c: int, kappa: float, corrected: bool) -> tuple[float, float, float]:
-    """T = kappa J z / det z - y - W (lambda \\ ((W^-1 dy) o (W dz))),  lambda = W z."""
+    """t = kappa J z / det z - y - W (lambda \\ ((W^-1 dy) o (W dz))),  lambda = W z."""
     z = work.cone[c]
     q = work.contact_scale[c]
     mu = model.contact_friction[c]

@@ -38,7 +38,7 @@ def start_inequalities(model: Model, work: Work, kappa: float, floor: float) -> 
 
 @kernel
 def apply_inequalities(model: Model, work: Work) -> float:
-    """Wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
+    """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
     for c in range(model.contact_body.shape[0]):
         fn, f1, f2 = contact_impulse(model, work, c)
@@ -51,7 +51,7 @@ def apply_inequalities(model: Model, work: Work) -> float:
 
 @kernel
 def apply_limits(model: Model, work: Work) -> None:
-    """Residual -= sign gamma."""
+    """residual -= sign gamma."""
     for k in range(model.limit_dof.shape[0]):
         work.residual[model.limit_dof[k]] -= model.limit_sign[k] * work.bound[k, 1]
 
@@ -69,7 +69,7 @@ def condense_inequalities(model: Model, work: Work, h: float) -> None:
 
 @kernel
 def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool) -> None:
-    """Dnu += S2^T B^T w + limits, for the target kappa."""
+    """dnu += S2^T B^T w + limits, for the target kappa."""
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
@@ -154,7 +154,7 @@ def keep_inequalities(model: Model, work: Work) -> None:
 
 @kernel
 def move_inequalities(model: Model, work: Work, alpha: float) -> None:
-    """Cone = kept + alpha step."""
+    """cone = kept + alpha step."""
     for c in range(model.contact_body.shape[0]):
         for k in range(12):
             work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]

@@ -16,7 +16,7 @@ _JOINT = int(InputKind.JOINT)
 
 @kernel
 def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> None:
-    """Residual += h d nu + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints."""
+    """residual += h d nu + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints."""
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         end = model.body_vadr[i + 1]

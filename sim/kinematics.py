@@ -15,7 +15,7 @@ from solvers.jit import kernel
 
 @kernel
 def displace(model: Model, q: Vector, v: Vector, h: float, out: Vector) -> None:
-    """Out = q (+) h v: the exponential map of the joint coordinates.
+    """out = q (+) h v: the exponential map of the joint coordinates.
 
     scalar coordinates    out = q + h v
     quaternions           out = q exp(h w), normalised
@@ -130,7 +130,7 @@ def tree_poses(
 
 @kernel
 def velocity_columns(model: Model, S: Matrix, v: Vector, h: float, out: Matrix) -> None:
-    """Out = d(pose)/d(v) at the end of a step: h S, and h S J(h w) for quaternion joints.  S, out: (nv, 6)."""
+    """out = d(pose)/d(v) at the end of a step: h S, and h S J(h w) for quaternion joints.  S, out: (nv, 6)."""
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d

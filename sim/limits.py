@@ -39,7 +39,7 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
 
 @kernel
 def limit_constants(model: Model, work: Work, kappa: float, corrected: bool) -> None:
-    """Dnu += sign w, with d gamma = w - (gamma/s) sign h d nu; kept in bound_w."""
+    """dnu += sign w, with d gamma = w - (gamma/s) sign h d nu; kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
         g = work.bound[k, 1]

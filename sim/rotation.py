@@ -19,7 +19,7 @@ _SERIES = 1e-2  # below this squared angle the Taylor series is exact to roundin
 
 @kernel
 def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> Vec3:
-    """A x b"""
+    """a x b"""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
@@ -46,7 +46,7 @@ def quat_mul(a0: float, a1: float, a2: float, a3: float, b0: float, b1: float, b
 
 @kernel
 def quat_turn(a0: float, a1: float, a2: float, a3: float, b0: float, b1: float, b2: float, b3: float) -> Quat:
-    """B a^*, the rotation from a to b in world axes, with nonnegative scalar part."""
+    """b a^*, the rotation from a to b in world axes, with nonnegative scalar part."""
     w = b0 * a0 + b1 * a1 + b2 * a2 + b3 * a3
     x = -b0 * a1 + b1 * a0 - b2 * a3 + b3 * a2
     y = -b0 * a2 + b1 * a3 + b2 * a0 - b3 * a1

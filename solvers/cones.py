@@ -23,7 +23,7 @@ def orthant_step(x: float, d: float) -> float:
 
 @kernel
 def cone_det(x0: float, x1: float, x2: float) -> float:
-    """Det x, in the form that cancels least."""
+    """det x, in the form that cancels least."""
     r = sqrt(x1 * x1 + x2 * x2)
     return (x0 - r) * (x0 + r)
 
@@ -57,7 +57,9 @@ def cone_spread(z0: float, z1: float, z2: float, y0: float, y1: float, y2: float
 
 
 @kernel
-def cone_scaling(z0: float, z1: float, z2: float, y0: float, y1: float, y2: float) -> tuple[float, float, float, float]:
+def cone_scaling(
+    z0: float, z1: float, z2: float, y0: float, y1: float, y2: float
+) -> tuple[float, float, float, float]:
     """Nesterov-Todd point of z and y: (w0, w1, w2, e) with y = Q z,  Q = e (2 w w^T - J),  w in Q, det w = 1."""
     dz = sqrt(cone_det(z0, z1, z2))
     dy = sqrt(cone_det(y0, y1, y2))
@@ -77,6 +79,6 @@ def scale(w0: float, w1: float, w2: float, r: float, x0: float, x1: float, x2: f
 
 @kernel
 def jordan_divide(l0: float, l1: float, l2: float, r0: float, r1: float, r2: float) -> Vec3:
-    """X with l o x = r."""
+    """x with l o x = r."""
     x0 = (l0 * r0 - l1 * r1 - l2 * r2) / cone_det(l0, l1, l2)
     return x0, (r1 - x0 * l1) / l0, (r2 - x0 * l2) / l0
