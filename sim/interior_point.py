@@ -2,162 +2,175 @@
 
 from __future__ import annotations
 
-from sim.contact import add_contact_matrix, add_contact_wrench, contact_jacobian, contact_kinematics
-from sim.elimination import subtree_sums
-from sim.friction import (
-    condense_contact,
-    contact_boundary,
-    contact_constant,
-    contact_error,
-    contact_impulse,
-    contact_products,
-    contact_products_ahead,
-    recover_contact,
-    start_contact,
+from typing import NamedTuple
+
+from sim.dynamics import momentum_balance, momentum_balance_jacobian
+from sim.elimination import factor, project, solve, subtree_sums
+from sim.inequalities import (
+    apply_inequalities,
+    apply_limits,
+    boundary_step,
+    condense_inequalities,
+    inequality_kinematics,
+    inequality_rhs,
+    keep_inequalities,
+    move_inequalities,
+    products,
+    products_ahead,
+    recover_inequalities,
+    start_inequalities,
 )
-from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits, start_limits
-from sim.model import Model, Work
-from solvers.cones import orthant_step
+from sim.joints import joint_blocks, joint_impulses
+from sim.kinematics import velocity_columns
+from sim.model import Model, Vector, Work
 from solvers.jit import kernel
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
+_NOT_FINITE = int(Status.NOT_FINITE)
+_SINGULAR = int(Status.SINGULAR)
+_ANGULAR_STEP = int(Status.ANGULAR_STEP)
+
+
+class Options(NamedTuple):
+    """Settings of a step."""
+
+    h: float  # time step [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
+    max_iterations: int
+
+
+class Outcome(NamedTuple):
+    """How a step ended."""
+
+    status: int
+    iterations: int
+    residual: float  # largest equality residual
+    violation: float  # largest |product - kappa| of complementary pairs
 
 
 @kernel
-def inequality_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gaps and slips of contacts and limits at configuration 3."""
-    contact_kinematics(model, work, h)
-    limit_gaps(model, work)
-
-
-@kernel
-def start_inequalities(model: Model, work: Work, kappa: float, floor: float) -> None:
-    """All cone variables on the central path of kappa at the present gaps and slips."""
-    for c in range(model.contact_body.shape[0]):
-        start_contact(model, work, c, kappa, floor)
-    start_limits(model, work, kappa, floor)
-
-
-@kernel
-def apply_inequalities(model: Model, work: Work) -> float:
-    """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
-    r = 0.0
-    for c in range(model.contact_body.shape[0]):
-        fn, f1, f2 = contact_impulse(model, work, c)
-        add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
-        r = max(r, contact_error(model, work, c))
-    for k in range(model.limit_dof.shape[0]):
-        r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
-    return r
-
-
-@kernel
-def apply_limits(model: Model, work: Work) -> None:
-    """residual -= sign gamma."""
-    for k in range(model.limit_dof.shape[0]):
-        work.residual[model.limit_dof[k]] -= model.limit_sign[k] * work.bound[k, 1]
-
-
-@kernel
-def condense_inequalities(model: Model, work: Work, h: float) -> None:
-    """A += contacts, joint_block += limits: their slacks and impulses eliminated."""
-    for c in range(model.contact_body.shape[0]):
-        contact_jacobian(model, work, h, c)
-        condense_contact(model, work, c)
-        fn, f1, f2 = contact_impulse(model, work, c)
-        add_contact_matrix(model, work, h, c, fn, f1, f2, work.A)
-    add_limit_blocks(model, work, h)
-
-
-@kernel
-def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool) -> None:
-    """dnu += S2^T B^T w + limits, for the target kappa."""
-    for i in range(work.wrench.shape[0]):
+def residual_scale(work: Work) -> float:
+    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
+    s = 1.0
+    for i in range(work.momentum_in.shape[0]):
         for k in range(6):
-            work.wrench[i, k] = 0.0
-    for c in range(model.contact_body.shape[0]):
-        contact_constant(model, work, c, kappa, corrected)
-        w = work.contact_w[c]
-        add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+            s = max(s, 1.0 + abs(work.momentum_in[i, k]))
+    return s
+
+
+@kernel
+def evaluate(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> bool:
+    """Configuration 3 and balances of the bodies at work.nu; False outside the domain."""
+    inside = momentum_balance(model, work, h, q)
+    inequality_kinematics(model, work, h)
+    return inside
+
+
+@kernel
+def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
+    """Largest generalized residual and largest equality residual of the cones."""
+    for i in range(work.balance.shape[0]):
+        for k in range(6):
+            work.wrench[i, k] = work.balance[i, k]
+    e = apply_inequalities(model, work)
     subtree_sums(model, work.wrench, work.subtree)
-    for d in range(work.dnu.shape[0]):
-        a = work.S2[d]
-        f = work.subtree[model.dof_body[d]]
-        work.dnu[d] -= a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
-    limit_constants(model, work, kappa, corrected)
+    project(model, work.S2, work.subtree, work.residual)
+    joint_impulses(model, work, h, q, v, u)
+    apply_limits(model, work)
+    r = 0.0
+    for d in range(work.residual.shape[0]):
+        r = max(r, abs(work.residual[d]))
+    return r, e
 
 
 @kernel
-def recover_inequalities(model: Model, work: Work, h: float) -> None:
-    """Steps of all cone variables from the twists and rates of the last solve."""
-    for c in range(model.contact_body.shape[0]):
-        recover_contact(model, work, h, c)
-    recover_limits(model, work, h)
-
-
-@kernel
-def products(model: Model, work: Work) -> tuple[float, float, float]:
-    """(mean, low, high) of all complementarity products."""
-    total = 0.0
-    count = 0.0
-    low = 1e300
-    high = 0.0
-    for c in range(model.contact_body.shape[0]):
-        t, n, lo, hi = contact_products(model, work, c)
-        total += t
-        count += n
-        low = min(low, lo)
-        high = max(high, hi)
-    for k in range(model.limit_dof.shape[0]):
-        t = work.bound[k, 0] * work.bound[k, 1]
-        total += t
-        count += 1.0
-        low = min(low, t)
-        high = max(high, t)
-    return total / count, low, high
-
-
-@kernel
-def products_ahead(model: Model, work: Work, alpha: float) -> float:
-    """Sum of the complementarity products after a step of length alpha."""
-    total = 0.0
-    for c in range(model.contact_body.shape[0]):
-        total += contact_products_ahead(model, work, c, alpha)
-    for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
-        total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
-    return total
-
-
-@kernel
-def boundary_step(model: Model, work: Work) -> float:
-    """Largest step that keeps every cone variable in its cone, or 1e30."""
-    a = 1e30
-    for c in range(model.contact_body.shape[0]):
-        a = min(a, contact_boundary(model, work, c))
-    for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
-        a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
-    return a
-
-
-@kernel
-def keep_inequalities(model: Model, work: Work) -> None:
-    """Remember the cone variables from which the line search starts."""
-    for c in range(model.contact_body.shape[0]):
-        for k in range(12):
-            work.cone_trial[c, k] = work.cone[c, k]
-    for k in range(model.limit_dof.shape[0]):
-        work.bound_trial[k, 0] = work.bound[k, 0]
-        work.bound_trial[k, 1] = work.bound[k, 1]
-
-
-@kernel
-def move_inequalities(model: Model, work: Work, alpha: float) -> None:
-    """cone = kept + alpha step."""
-    for c in range(model.contact_body.shape[0]):
-        for k in range(12):
-            work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
-    for k in range(model.limit_dof.shape[0]):
-        work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
-        work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, par: Vector) -> Outcome:
+    h = options.h
+    kappa = options.kappa
+    tolerance = options.tolerance
+    spread = kappa * min(1e-2, 1e6 * tolerance)
+    scale = residual_scale(work)
+    nv = v.shape[0]
+    degree = 0.0
+    for d in range(nv):
+        work.nu_trial[d] = v[d]
+        work.dnu[d] = 0.0
+    alpha = 0.0
+    iterations = 0
+    backtracks = 0
+    r0 = 0.0
+    c0 = 0.0
+    status = _MAX_ITERATIONS
+    r = 0.0
+    violation = 0.0
+    while True:
+        for d in range(nv):
+            work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
+        inside = evaluate(model, work, h, q, v, u)
+        if iterations == 0:
+            if not inside:
+                for d in range(nv):
+                    work.nu_trial[d] *= 0.7
+                backtracks += 1
+                if backtracks > 30:
+                    status = _ANGULAR_STEP
+                    break
+                continue
+            k0 = max(kappa, par[0])
+            start_inequalities(model, work, k0, par[1] * k0**0.5)
+        else:
+            move_inequalities(model, work, alpha)
+        rd, re = residuals(model, work, h, q, v, u)
+        r = max(rd / scale, re)
+        mean, low, high = products(model, work)
+        violation = max(high - kappa, kappa - low)
+        if iterations > 0 and not (inside and ((r <= r0 or violation <= c0))):
+            backtracks += 1
+            if backtracks < 12:
+                alpha *= 0.5
+                continue
+        backtracks = 0
+        if r < tolerance and violation < spread:
+            status = _SOLVED
+            break
+        if iterations >= options.max_iterations:
+            break
+        r0 = r
+        c0 = violation
+        iterations += 1
+        velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+        momentum_balance_jacobian(model, work, h, work.A)
+        joint_blocks(model, work, h, q, v)
+        condense_inequalities(model, work, h)
+        if not factor(model, work):
+            status = _SINGULAR
+            break
+        target = kappa
+        for phase in range(2):
+            for d in range(nv):
+                work.dnu[d] = -work.residual[d]
+            inequality_rhs(model, work, target, phase == 1)
+            solve(model, work, work.dnu, work.dnu)
+            recover_inequalities(model, work, h)
+            alpha = boundary_step(model, work)
+            if phase == 0:
+                a = min(1.0, 0.95 * alpha)
+                total = products_ahead(model, work, 0.0)
+                ahead = products_ahead(model, work, a)
+                sigma = min(max(ahead / total, 0.0), 1.0) ** 3
+                target = max(kappa, sigma * mean)
+                if par[2] > 0.0:
+                    target = max(target, min(par[2] * r, mean))
+        tau = 0.95 if max(r, violation) > 1e-3 else 0.99
+        alpha = min(1.0, tau * alpha)
+        for d in range(nv):
+            work.nu_trial[d] = work.nu[d]
+        keep_inequalities(model, work)
+        if not (alpha > 1e-12):
+            status = _NO_PROGRESS
+            break
+    return Outcome(status, iterations, r, violation)
