@@ -6,6 +6,7 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 from __future__ import annotations
 
 import base64
+import warnings
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,9 @@ for (const text of [{commands}])
 
 def save_html(result: Any, path: str | Path) -> Path:
     """Write the animation of a Trajectory or a plan; returns the path."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
+        import meshcat  # noqa: F401
     from umsgpack import packb
 
     m = motion(result)
