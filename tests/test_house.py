@@ -128,7 +128,8 @@ def test_an_edited_callee_reaches_its_caller(copy: Path) -> None:
     body = "from solvers.jit import kernel\n\n@kernel\ndef one(x):\n    return x + {}\n"
     callee.write_text(body.format("1.0"))
     caller.write_text(
-        "from solvers.callee import one\nfrom solvers.jit import kernel\n\n@kernel\ndef two(x):\n    return 2.0 * one(x)\n"
+        "from solvers.callee import one\nfrom solvers.jit import kernel\n\n"
+        "@kernel\ndef two(x):\n    return 2.0 * one(x)\n"
     )
     program = "from solvers.caller import two; print(two(0.0))"
     cache = str(copy / "cache")
