@@ -66,12 +66,14 @@ def _check_own(name: str) -> None:
     own = Path(__file__).resolve().parent.parent / name / "__init__.py"
     try:
         spec = find_spec(name)
-        found = spec.origin or (list(spec.submodule_search_locations or [None])[0]) if spec else None
     except ValueError:  # a module put into sys.modules by hand has no spec
-        found = "a module made at run time"
+        spec = None
+    found = spec.origin if spec else None
+    if spec and found is None:  # a folder without __init__.py
+        found = next(iter(spec.submodule_search_locations or []), None)
     if found is None or Path(found).resolve() != own:
         raise ImportError(
-            f"dojo_opt needs its own package {name!r} in {own.parent}, but Python finds {found or 'none'} first. "
+            f"dojo_opt needs its own package {name!r} in {own.parent}, but Python finds {found or 'nothing or a module made by hand'}. "
             f"Rename or move that file, or take its folder off sys.path (the working directory comes first)."
         )
 

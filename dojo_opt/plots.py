@@ -5,7 +5,7 @@ matplotlib is imported when the first figure is made, without pyplot: no window,
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 __all__ = ["contact_forces", "controls", "paths", "state", "trajectory"]
+
+
+@overload
+def trajectory(result: Any, figure: None = None) -> Figure: ...
+
+
+@overload
+def trajectory(result: Any, figure: SubFigure) -> SubFigure: ...
 
 
 def trajectory(result: Any, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
@@ -62,14 +70,15 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
 
 
 def paths(m: Motion, ax: Axes) -> Axes:
-    """Paths of the first body and of all points that can touch the ground, in the vertical plane of the motion."""
-    side = int(np.ptp(m.position[:, 0, 1]) > np.ptp(m.position[:, 0, 0]))
+    """Paths, in the vertical plane of the motion, of the first body and of the feet; without feet, of all bodies."""
+    side = int(np.ptp(m.position[:, :, 1], axis=0).max() > np.ptp(m.position[:, :, 0], axis=0).max())
     names = m.mechanism.body_names
+    feet = [c for c in m.mechanism.contacts if c.body != names[0]]
     drawn = [(names[0], m.position[:, 0])]
-    for contact in m.mechanism.contacts:
-        body = names.index(contact.body)
-        drawn.append((contact.name, m.points(body, contact.point) - contact.radius * np.asarray(contact.normal)))
-    if not m.mechanism.contacts:
+    for foot in feet:
+        path = m.points(names.index(foot.body), foot.point)
+        drawn.append((f"{foot.name}, underside", path - foot.radius * np.asarray(foot.normal)))
+    if not feet:
         drawn += [(name, m.position[:, k]) for k, name in enumerate(names[1:], start=1)]
     for label, path in drawn:
         (line,) = ax.plot(path[:, side], path[:, 2], marker=".", markersize=4, label=label)

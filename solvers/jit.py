@@ -90,7 +90,7 @@ def _compile(func: F, **flags: Any) -> F:
     finally:
         numba.config.CACHE_DIR = users_folder
     _REGISTRY.append(compiled)
-    return compiled  # type: ignore[no-any-return]
+    return compiled
 
 
 def kernel(func: F) -> F:
