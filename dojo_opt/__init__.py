@@ -72,9 +72,10 @@ def _check_own(name: str) -> None:
     if spec and found is None:  # a folder without __init__.py
         found = next(iter(spec.submodule_search_locations or []), None)
     if found is None or Path(found).resolve() != own:
+        found = found or "nothing (or a module made by hand)"
         raise ImportError(
-            f"dojo_opt needs its own package {name!r} in {own.parent}, but Python finds {found or 'nothing or a module made by hand'}. "
-            f"Rename or move that file, or take its folder off sys.path (the working directory comes first)."
+            f"dojo_opt needs its own package {name!r} in {own.parent}, but Python finds {found}. Rename or move "
+            f"that file, or take its folder off sys.path (the working directory comes first)."
         )
 
 
