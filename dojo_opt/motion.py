@@ -10,6 +10,7 @@ import numpy as np
 from sim.mechanism import Mechanism
 from sim.model import Vector
 from sim.shapes import rotation_matrix
+from sim.simulator import Simulator
 
 Array = Vector
 
@@ -33,33 +34,37 @@ class Motion:
         return np.asarray(self.position[:, body] + R @ np.asarray(point, dtype=np.float64))
 
 
-def motion(result: Any) -> Motion:
-    """Motion of a Trajectory, or of a plan; the contact forces of a plan are those of its steps, solved once more."""
-    sim = result.simulator
-    x = np.asarray(result.x, dtype=np.float64)
+def motion(result: Any, simulator: Simulator | None = None) -> Motion:
+    """Motion of a Trajectory, or of a plan; the contact forces of a plan are those of its steps, solved once more.
+
+    simulator: the one the result was made with; only needed for a result that was read from a file.
+    """
+    sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
+    if sim is None:
+        raise ValueError(f"motion(simulator=...): this {type(result).__name__} does not know its simulator; give it")
+    x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
+    substeps = getattr(result, "substeps", 1)
     z = np.array([sim.maximal(row) for row in x])
-    contact_time, force = _contact_forces(result)
+    force = _contact_forces(sim, x, u, substeps)
     return Motion(
         mechanism=sim.mechanism,
-        time=np.asarray(result.time),
+        time=sim.time_step * substeps * np.arange(len(x)),
         x=x,
-        u=np.asarray(result.u, dtype=np.float64),
+        u=u,
         position=z[:, :, 0:3],
         quaternion=z[:, :, 6:10],
-        contact_time=contact_time,
+        contact_time=sim.time_step * np.arange(1, len(force) + 1),
         contact_force=force,
     )
 
 
-def _contact_forces(result: Any) -> tuple[Array, Array]:
-    """End of every simulation step, and its mean contact forces; a knot of a plan may span several steps."""
-    sim = result.simulator
-    steps = getattr(result, "substeps", 1)
-    forces = np.zeros((len(result.u) * steps, sim.ncontact, 3))
-    for knot, u in enumerate(result.u):
-        x = result.x[knot]
-        for k in range(steps):
-            step = sim.step(x, u)
-            x = step.x
-            forces[knot * steps + k] = step.contacts.force
-    return sim.time_step * np.arange(1, len(forces) + 1), forces
+def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> Array:
+    """Mean contact forces of every simulation step; a knot spans `substeps` of them."""
+    forces = np.zeros((len(u) * substeps, sim.ncontact, 3))
+    for knot in range(len(u)):
+        now = x[knot]
+        for k in range(substeps):
+            step = sim.step(now, u[knot])
+            now = step.x
+            forces[knot * substeps + k] = step.contacts.force
+    return forces

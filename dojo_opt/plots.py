@@ -11,6 +11,7 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from sim.mechanism import Mechanism
+from sim.simulator import Simulator
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,20 +21,25 @@ __all__ = ["contact_forces", "controls", "paths", "state", "trajectory"]
 
 
 @overload
-def trajectory(result: Any, figure: None = None) -> Figure: ...
+def trajectory(result: Any, figure: None = None, *, simulator: Simulator | None = None) -> Figure: ...
 
 
 @overload
-def trajectory(result: Any, figure: SubFigure) -> SubFigure: ...
+def trajectory(result: Any, figure: SubFigure, *, simulator: Simulator | None = None) -> SubFigure: ...
 
 
-def trajectory(result: Any, figure: Figure | SubFigure | None = None) -> Figure | SubFigure:
-    """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot."""
+def trajectory(
+    result: Any, figure: Figure | SubFigure | None = None, *, simulator: Simulator | None = None
+) -> Figure | SubFigure:
+    """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot.
+
+    figure: draw on this one. simulator: needed for a result that was read from a file.
+    """
     if figure is None:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(10, 7.5), layout="constrained")
-    m = motion(result)
+    m = motion(result, simulator)
     axes = np.ravel(figure.subplots(2, 2))
     state(m, axes[0])
     controls(m, axes[1])

@@ -15,6 +15,7 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from sim import shapes
+from sim.simulator import Simulator
 
 __all__ = ["save_html"]
 
@@ -34,14 +35,14 @@ for (const text of [{commands}])
 """
 
 
-def save_html(result: Any, path: str | Path) -> Path:
-    """Write the animation of a Trajectory or a plan; returns the path."""
+def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
+    """Write the animation of a Trajectory or a plan; returns the path. simulator: for a result read from a file."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401
     from umsgpack import packb
 
-    m = motion(result)
+    m = motion(result, simulator)
     commands = [*_scene(m), _animation(m)]
     encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
     viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
