@@ -119,7 +119,7 @@ WORK_DERIVATIVE_FIELDS: dict[str, Shape] = {
     "dR_dq": ("nv", "nv"),
     "dR_dv": ("nv", "nv"),
     "columns": ("nv", "2nv+nu"),
-    "panel": ("6nbody", "2nv+nu"),
+    "panel": ("6nbody+6", "2nv+nu"),
 }
 
 MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
@@ -148,7 +148,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
-        "6nbody": 6 * sizes.nbody,
+        "6nbody+6": 6 * sizes.nbody + 6,
         "2nv+nu": 2 * sizes.nv + sizes.nu,
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])

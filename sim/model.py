@@ -146,4 +146,22 @@ class Work(NamedTuple):
     dR_dq: Matrix  # (nv, nv)
     dR_dv: Matrix  # (nv, nv)
     columns: Matrix  # (nv, 2 nv + nu) right-hand sides and solutions
-    panel: Matrix  # (nbody * 6, 2 nv + nu)
+    panel: Matrix  # (6 nbody + 6, 2 nv + nu) wrenches, then twists, of all columns; six rows of scratch
+
+
+class Options(NamedTuple):
+    """Settings of a step."""
+
+    h: float  # time step [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
+    max_iterations: int
+
+
+class Outcome(NamedTuple):
+    """How a step ended."""
+
+    status: int
+    iterations: int
+    residual: float  # largest equality residual
+    violation: float  # largest |product - kappa| of complementary pairs
