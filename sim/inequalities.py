@@ -13,6 +13,7 @@ from sim.friction import (
     contact_products,
     contact_products_ahead,
     recover_contact,
+    slip_violation,
     start_contact,
 )
 from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits, start_limits
@@ -57,11 +58,11 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float) -> None:
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated."""
     for c in range(model.contact_body.shape[0]):
         contact_jacobian(model, work, h, c)
-        condense_contact(model, work, c)
+        condense_contact(model, work, c, kappa)
         fn, f1, f2 = contact_impulse(model, work, c)
         add_contact_matrix(model, work, h, c, fn, f1, f2, work.A)
     add_limit_blocks(model, work, h)
@@ -161,3 +162,11 @@ def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     for k in range(model.limit_dof.shape[0]):
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+
+
+@kernel
+def slip_error(model: Model, work: Work, kappa: float) -> float:
+    r = 0.0
+    for c in range(model.contact_body.shape[0]):
+        r = max(r, slip_violation(model, work, c, kappa))
+    return r

@@ -18,6 +18,7 @@ from sim.inequalities import (
     products,
     products_ahead,
     recover_inequalities,
+    slip_error,
     start_inequalities,
 )
 from sim.joints import joint_blocks, joint_impulses
@@ -121,13 +122,26 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
                     break
                 continue
             k0 = max(kappa, par[0])
-            start_inequalities(model, work, k0, par[1] * k0**0.5)
+            floor = par[1] * k0**0.5
+            for c in range(model.contact_body.shape[0]):
+                depth = -work.contact_kin[c, 0]
+                if depth > 0.0:
+                    k0 = max(k0, par[3] * model.body_mass[model.contact_body[c]] * depth * depth / h)
+                    floor = max(floor, par[4] * depth)
+            for c in range(model.limit_dof.shape[0]):
+                depth = -work.bound_gap[c]
+                if depth > 0.0:
+                    k0 = max(k0, par[5] * depth * depth / h)
+                    floor = max(floor, par[4] * depth)
+            start_inequalities(model, work, k0, floor)
         else:
             move_inequalities(model, work, alpha)
         rd, re = residuals(model, work, h, q, v, u)
         r = max(rd / scale, re)
         mean, low, high = products(model, work)
-        violation = max(high - kappa, kappa - low)
+        center = max(kappa, mean)
+        slip = slip_error(model, work, kappa)
+        violation = max(high - kappa, kappa - low, slip)
         if iterations > 0 and not (inside and ((r <= r0 or violation <= c0))):
             backtracks += 1
             if backtracks < 12:
@@ -145,26 +159,37 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         velocity_columns(model, work.S3, work.nu, h, work.S3nu)
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h)
+        condense_inequalities(model, work, h, center)
         if not factor(model, work):
             status = _SINGULAR
             break
         target = kappa
+        affine = 1.0
         for phase in range(2):
             for d in range(nv):
                 work.dnu[d] = -work.residual[d]
-            inequality_rhs(model, work, target, phase == 1)
+            inequality_rhs(model, work, target, phase == 1 and affine > par[6])
             solve(model, work, work.dnu, work.dnu)
             recover_inequalities(model, work, h)
             alpha = boundary_step(model, work)
             if phase == 0:
                 a = min(1.0, 0.95 * alpha)
+                affine = a
                 total = products_ahead(model, work, 0.0)
                 ahead = products_ahead(model, work, a)
                 sigma = min(max(ahead / total, 0.0), 1.0) ** 3
                 target = max(kappa, sigma * mean)
                 if par[2] > 0.0:
                     target = max(target, min(par[2] * r, mean))
+        if par.shape[0] > 20 and iterations < 100:
+            j = 20 + 8 * iterations
+            par[j] = r
+            par[j + 1] = mean
+            par[j + 2] = low
+            par[j + 3] = high
+            par[j + 4] = target
+            par[j + 5] = alpha
+            par[j + 6] = backtracks
         tau = 0.95 if max(r, violation) > 1e-3 else 0.99
         alpha = min(1.0, tau * alpha)
         for d in range(nv):
