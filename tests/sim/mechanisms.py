@@ -59,8 +59,8 @@ CASES = [(kind, on_world) for kind in KINDS for on_world in (True, False)]
 
 
 def random_state(rng: np.random.Generator, mech: Mechanism, speed: float = 1.0) -> tuple[Floats, Floats]:
-    """(q, v): coordinates of order one, random quaternions, velocities of the given size."""
-    q = rng.normal(size=mech.nq)
+    """(q, v): angles below half a turn, random quaternions, velocities of the given size."""
+    q = rng.uniform(-1.5, 1.5, mech.nq)
     for joint in mech.joints:
         if joint.nrot == 3:
             stop = mech.q_slice(joint.name).stop
