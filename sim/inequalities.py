@@ -184,3 +184,33 @@ def slip_error(model: Model, work: Work, kappa: float) -> float:
     for c in range(model.contact_body.shape[0]):
         r = max(r, slip_violation(model, work, c, kappa))
     return r
+
+
+@kernel
+def worst_contact(model: Model, work: Work, kappa: float) -> float:
+    """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
+    worst = -1.0
+    error = 0.0
+    for k in range(model.limit_dof.shape[0]):
+        error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
+    for c in range(model.contact_body.shape[0]):
+        e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
+        if e > error:
+            error = e
+            worst = float(c)
+    return worst
+
+
+@kernel
+def report_contacts(model: Model, work: Work, out: Matrix) -> None:
+    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, after a step.  (ncontact, 8)"""
+    for c in range(model.contact_body.shape[0]):
+        i = model.contact_body[c]
+        k = work.contact_kin[c]
+        F = model.contact_frame[c]
+        fn, f1, f2 = contact_impulse(model, work, c)
+        for e in range(3):
+            out[c, e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+            out[c, 3 + e] = work.pos3[i, e] + k[3 + e]
+        out[c, 6] = k[0]
+        out[c, 7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

@@ -147,6 +147,10 @@ class Work(NamedTuple):
     dR_dv: Matrix  # (nv, nv)
     columns: Matrix  # (nv, 2 nv + nu) right-hand sides and solutions
     panel: Matrix  # (6 nbody + 6, 2 nv + nu) wrenches, then twists, of all columns; six rows of scratch
+    step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
+    step_B: Matrix  # (2 nv, nu)
+    chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
+    step_x: Matrix  # (2, nq + nv) states inside a knot
 
 
 class Options(NamedTuple):
