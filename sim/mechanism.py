@@ -149,7 +149,7 @@ def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
 def _sort_tree(
     call: str, bodies: Sequence[Body], joints: Sequence[Joint]
 ) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
-    """Joints with parents before children, otherwise in the given order, and the bodies in the order of their joints."""
+    """Joints with parents before children, otherwise in the given order; bodies in the order of their joints."""
     if not bodies:
         raise ValueError(f"{call}: expected at least one body")
     checks.distinct(f"{call}: bodies", (b.name for b in bodies))

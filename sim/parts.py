@@ -165,7 +165,11 @@ class Joint:
         given = self.limits
         if given is None:
             return (free,) * self.nv
-        if len(given) == 2 and all(np.ndim(x) == 0 and x is not None for x in given):
+        if (
+            len(given) == 2
+            and all(np.ndim(x) == 0 for x in given)
+            and (self.nv == 1 or any(x is not None for x in given))
+        ):
             given = (given,)
         if len(given) != self.nv:
             raise ValueError(f"{call}: expected {self.nv} pairs (lo, hi), one per degree of freedom, got {len(given)}")

@@ -1,4 +1,4 @@
-"""Ready-made mechanisms, under the names that Dojo uses: one builder per file, every parameter a keyword with a default."""
+"""Ready-made mechanisms, under the names that Dojo uses: one builder per file, keyword parameters with defaults."""
 
 from dojo_opt.models.acrobot import acrobot
 from dojo_opt.models.block import block

@@ -24,8 +24,8 @@ def npendulum(
     """`n` equal links; all angles zero is hanging straight down.
 
             pivot o  z = 1.1 n length         y ->   z up,  x towards the reader
-                  |  link_0                   q      (n,) angle of each link to the one before, about x [rad]
-                  |  link_1                   u      (n,) torque at each joint [N m]
+                  |  link_0                   q  (n,) angle of each link to the one before, about x [rad]
+                  |  link_1                   u  (n,) torque at each joint [N m]
 
     mass [kg] and length [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. `joint` may be any kind
     without translation, e.g. "spherical"; its coordinates are then quaternions, and u three torques per joint.

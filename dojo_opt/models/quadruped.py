@@ -47,13 +47,13 @@ def quadruped(
 ) -> Mechanism:
     """Thirteen bodies, twelve hinges; it stands on the ground with its feet under its hips.
 
-        x forward, y left, z up      q  (19,) position of the trunk's centre of mass [m], its quaternion, then for the legs
+        x forward, y left, z up      q  (19,) position of the trunk's centre of mass [m], its quaternion, then for
         legs FR FL RR RL                FR, FL, RR, RL: hip about x, thigh about y, calf about y [rad]
                                      u  (12,) torques of the hinges in the same order [N m]
 
     All angles zero is legs straight down; a positive thigh moves the knee back, the calf is bent at negative angles.
-    damper [N m s/rad] and spring [N m/rad] of every hinge; contacts: "feet" (4 balls) or "all" (12: feet, thighs, hips);
-    limits: whether hinges have stops (24); stance: thigh and calf angle of the neutral state; law: see Contact.
+    damper [N m s/rad] and spring [N m/rad] of every hinge; contacts: "feet" (4 balls) or "all" (12: feet,
+    knees, shoulders); limits: whether hinges have stops (24); stance: thigh and calf angle of the neutral state; law: see Contact.
     """
     checks.one_of("quadruped(contacts=...)", contacts, ("feet", "all"))
     thigh, calf = checks.vector("quadruped(stance=...)", stance, 2)
