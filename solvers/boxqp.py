@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.dense import cholesky, cholesky_solve_vector
+from solvers.dense import cholesky, cholesky_solve
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -47,7 +47,7 @@ def _find_free(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, gradient
 
 
 @kernel
-def _factor_free(H: Matrix, free: Integers, nfree: int, sub: Vector, out: Vector) -> bool:
+def factor_free(H: Matrix, free: Integers, nfree: int, sub: Vector, out: Vector) -> bool:
     """L L^T = H[free, free], L packed as (nfree, nfree) at the start of `out`; False when not positive definite."""
     A = sub[: nfree * nfree].reshape((nfree, nfree))
     for i in range(nfree):
@@ -77,7 +77,7 @@ def _newton_step(gradient: Vector, free: Integers, nfree: int, factor: Vector, p
     """out[free] = -H[free, free]^-1 gradient[free], zero elsewhere; returns its slope gradient . out."""
     for i in range(nfree):
         packed[i] = -gradient[free[i]]
-    cholesky_solve_vector(factor[: nfree * nfree].reshape((nfree, nfree)), packed[:nfree])
+    cholesky_solve(factor[: nfree * nfree].reshape((nfree, nfree)), packed[:nfree].reshape((nfree, 1)))
     slope = 0.0
     for i in range(out.shape[0]):
         out[i] = 0.0
@@ -106,7 +106,7 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
         x[i] = min(max(x[i], lo[i]), hi[i])
     for _ in range(_MAX_ITERATIONS):
         nfree = _find_free(H, g, lo, hi, x, gradient, free)
-        if not _factor_free(H, free, nfree, sub, work):
+        if not factor_free(H, free, nfree, sub, work):
             return Status.SINGULAR, nfree
         size = 0.0
         for i in range(nfree):

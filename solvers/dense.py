@@ -18,39 +18,12 @@ Matrix = NDArray[np.float64]
 
 
 @kernel
-def copy_vector(a: Vector, out: Vector) -> None:
-    """out = a"""
-    for i in range(out.shape[0]):
-        out[i] = a[i]
-
-
-@kernel
 def copy(A: Matrix, out: Matrix) -> None:
     """out = A"""
     n, m = out.shape
     for i in range(n):
         for j in range(m):
             out[i, j] = A[i, j]
-
-
-@kernel
-def fill(value: float, out: Matrix) -> None:
-    """out[:, :] = value"""
-    n, m = out.shape
-    for i in range(n):
-        for j in range(m):
-            out[i, j] = value
-
-
-@kernel
-def symmetrize(out: Matrix) -> None:
-    """out = (out + out^T) / 2"""
-    n = out.shape[0]
-    for i in range(n):
-        for j in range(i):
-            value = 0.5 * (out[i, j] + out[j, i])
-            out[i, j] = value
-            out[j, i] = value
 
 
 @kernel
@@ -63,33 +36,14 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @kernel
-def add_mul_vector(A: Matrix, x: Vector, out: Vector) -> None:
-    """out += A x"""
-    n, m = A.shape
-    for i in range(n):
-        total = 0.0
-        for j in range(m):
-            total += A[i, j] * x[j]
-        out[i] += total
-
-
-@kernel
-def add_mul_tn_vector(A: Matrix, x: Vector, out: Vector) -> None:
-    """out += A^T x"""
-    n, m = A.shape
-    for i in range(n):
-        xi = x[i]
-        for j in range(m):
-            out[j] += xi * A[i, j]
-
-
-@kernel
-def add_mul(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out += A B"""
+def mul(A: Matrix, B: Matrix, out: Matrix) -> None:
+    """out = A B"""
     n, p = A.shape
     m = B.shape[1]
     whole = p - p % 4
     for i in range(n):
+        for j in range(m):
+            out[i, j] = 0.0
         for k in range(0, whole, 4):
             a0, a1, a2, a3 = A[i, k], A[i, k + 1], A[i, k + 2], A[i, k + 3]
             for j in range(m):
@@ -101,27 +55,42 @@ def add_mul(A: Matrix, B: Matrix, out: Matrix) -> None:
 
 
 @kernel
-def mul(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out = A B"""
-    fill(0.0, out)
-    add_mul(A, B, out)
-
-
-@kernel
-def add_mul_tn(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out += A^T B"""
-    p, n = A.shape
-    m = B.shape[1]
+def add_mul_tn_symmetric(A: Matrix, B: Matrix, out: Matrix) -> None:
+    """out += A^T B where the sum is known to be symmetric: the upper triangle is computed and mirrored."""
+    p = A.shape[0]
+    n = out.shape[0]
     whole = p - p % 4
     for i in range(n):
         for k in range(0, whole, 4):
             a0, a1, a2, a3 = A[k, i], A[k + 1, i], A[k + 2, i], A[k + 3, i]
-            for j in range(m):
+            for j in range(i, n):
                 out[i, j] += a0 * B[k, j] + a1 * B[k + 1, j] + a2 * B[k + 2, j] + a3 * B[k + 3, j]
         for k in range(whole, p):
             a0 = A[k, i]
-            for j in range(m):
+            for j in range(i, n):
                 out[i, j] += a0 * B[k, j]
+    for i in range(n):
+        for j in range(i):
+            out[i, j] = out[j, i]
+
+
+@kernel
+def add_mul_vector(A: Matrix, x: Vector, out: Vector) -> None:
+    """out += A x"""
+    for i in range(out.shape[0]):
+        total = 0.0
+        for j in range(x.shape[0]):
+            total += A[i, j] * x[j]
+        out[i] += total
+
+
+@kernel
+def add_mul_tn_vector(A: Matrix, x: Vector, out: Vector) -> None:
+    """out += A^T x"""
+    for i in range(x.shape[0]):
+        xi = x[i]
+        for j in range(out.shape[0]):
+            out[j] += xi * A[i, j]
 
 
 @kernel
@@ -146,61 +115,16 @@ def cholesky(A: Matrix, out: Matrix) -> int:
 
 
 @kernel
-def cholesky_solve_vector(L: Matrix, x: Vector) -> None:
-    """x <- (L L^T)^-1 x"""
-    n = L.shape[0]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= L[i, k] * x[k]
-        x[i] /= L[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= L[k, i] * x[k]
-        x[i] /= L[i, i]
-
-
-@kernel
 def cholesky_solve(L: Matrix, X: Matrix) -> None:
-    """X <- (L L^T)^-1 X, row operations only"""
+    """X <- (L L^T)^-1 X, one column per right-hand side; row operations only."""
     n, m = X.shape
-    for i in range(n):
-        for k in range(i):
-            a = L[i, k]
+    for step in range(2 * n):
+        i = step if step < n else 2 * n - 1 - step
+        first, last = (0, i) if step < n else (i + 1, n)
+        for k in range(first, last):
+            a = L[i, k] if step < n else L[k, i]
             for j in range(m):
                 X[i, j] -= a * X[k, j]
         a = 1.0 / L[i, i]
         for j in range(m):
             X[i, j] *= a
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            a = L[k, i]
-            for j in range(m):
-                X[i, j] -= a * X[k, j]
-        a = 1.0 / L[i, i]
-        for j in range(m):
-            X[i, j] *= a
-
-
-@kernel
-def add_mul_tn_upper(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out += A^T B, upper triangle only: half the work where the whole sum is known to be symmetric."""
-    p, n = A.shape
-    whole = p - p % 4
-    for i in range(n):
-        for k in range(0, whole, 4):
-            a0, a1, a2, a3 = A[k, i], A[k + 1, i], A[k + 2, i], A[k + 3, i]
-            for j in range(i, n):
-                out[i, j] += a0 * B[k, j] + a1 * B[k + 1, j] + a2 * B[k + 2, j] + a3 * B[k + 3, j]
-        for k in range(whole, p):
-            a0 = A[k, i]
-            for j in range(i, n):
-                out[i, j] += a0 * B[k, j]
-
-
-@kernel
-def mirror_upper(out: Matrix) -> None:
-    """Copy the upper triangle to the lower one."""
-    n = out.shape[0]
-    for i in range(n):
-        for j in range(i):
-            out[i, j] = out[j, i]

@@ -1,9 +1,10 @@
 """Backward pass of iLQR on stacked arrays, with gaps, regularisation and control limits, and what it promises.
 
-    dx_{t+1} = A_t dx_t + B_t du_t + gap_{t+1},                              dx_0 = 0
-    min  sum_t  l_x dx + l_u du + 1/2 (dx^T l_xx dx + 2 du^T l_ux dx + du^T l_uu du)
+With z = (dx, du), F = [A B] and n, m the sizes of dx and du:
 
-gives du = k + K dx. A step size a scales k and the closed share of each gap, so dx and du scale with a and the predicted
+    dx_{t+1} = F_t z_t + gap_{t+1},   dx_0 = 0,        min  sum_t  g_t . z_t + 1/2 z_t^T H_t z_t
+
+gives du = k + K dx. A step size a scales k and the closed share of each gap, so z scales with a, and the predicted
 change of cost is a d0 + a^2/2 d1.
 """
 
@@ -14,41 +15,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.boxqp import box_qp
-from solvers.dense import (
-    add_mul,
-    add_mul_tn,
-    add_mul_tn_upper,
-    add_mul_tn_vector,
-    add_mul_vector,
-    cholesky,
-    cholesky_solve,
-    cholesky_solve_vector,
-    copy,
-    copy_vector,
-    dot,
-    fill,
-    mirror_upper,
-    mul,
-)
+from solvers.boxqp import box_qp, factor_free
+from solvers.dense import add_mul_tn_symmetric, add_mul_tn_vector, add_mul_vector, cholesky_solve, copy, dot, mul
 from solvers.jit import kernel
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class Quadratic(NamedTuple):
-    """Linear-quadratic model of a horizon of T knots, n tangent states, m controls."""
+    """Linear-quadratic model of a horizon of T knots; row T of `g` and `H` has no controls."""
 
     A: Stack  # (T, n, n)
     B: Stack  # (T, n, m)
-    lx: Matrix  # (T + 1, n)
-    lu: Matrix  # (T, m)
-    lxx: Stack  # (T + 1, n, n)
-    luu: Stack  # (T, m, m)
-    lux: Stack  # (T, m, n)
+    g: Matrix  # (T + 1, n + m) gradient of the cost
+    H: Stack  # (T + 1, n + m, n + m) its Hessian, symmetric
     gaps: Matrix  # (T + 1, n), first row unused
     lo: Matrix  # (T, m) lower limit of du, or (0, m) without limits
     hi: Matrix  # (T, m)
@@ -75,207 +59,194 @@ class Promise(NamedTuple):
 class _Work(NamedTuple):
     V: Matrix  # (n, n) Hessian of the value function at t + 1, then at t
     v: Vector  # (n,) its gradient
-    VA: Matrix  # (n, n)
-    VB: Matrix  # (n, m)
-    Qxx: Matrix  # (n, n)
-    Qx: Vector  # (n,)
-    Quu: Matrix  # (m, m)
-    Qu: Vector  # (m,)
-    Qux: Matrix  # (m, n)
-    H: Matrix  # (m, m) regularised Quu
-    G: Matrix  # (m, n) regularised Qux; packed solution on free rows
-    W: Matrix  # (m, n) Quu K + Qux
-    w: Vector  # (m,) Quu k + Qu
+    F: Matrix  # (n, n + m) [A B]
+    VF: Matrix  # (n, n + m)
+    Q: Matrix  # (n + m, n + m) Hessian of the action value
+    q: Vector  # (n + m,) its gradient
+    Huu: Matrix  # (m, m) regularised block of Q
+    Z: Matrix  # (m, n) regularised block -Q_ux, then packed rows of K
+    W: Matrix  # (m, n) Q_uu K + Q_ux
+    w: Vector  # (m,) Q_uu k + Q_u
+    z: Vector  # (n + m,) linear rollout
     dx: Vector  # (n,)
-    dx_next: Vector  # (n,)
-    du: Vector  # (m,)
-    row: Vector  # (n,)
     box: Vector  # (2 m^2 + 3 m,)
 
 
 def work_size(n: int, m: int) -> int:
     """Floats of scratch that `backward` needs."""
-    return 3 * n * n + 4 * n * m + 5 * n + 3 * m + 4 * m * m + 3 * m
+    return n * n + 2 * n * (n + m) + (n + m) * (n + m) + m * m + 2 * n * m + 4 * n + 3 * m + 2 * m * m + 3 * m
 
 
 @kernel
 def _work_view(buffer: Vector, n: int, m: int) -> _Work:
     """Named views into one flat buffer of `work_size(n, m)` floats."""
-    nn, nm, mm = n * n, n * m, m * m
-    mats = 3 * nn
-    mixed = mats + 4 * nm
-    small = mixed + 2 * mm
-    rows = small + 5 * n
-    ends = rows + 3 * m
+    p = n + m
+    a = n * n
+    b = a + 2 * n * p
+    c = b + p * p
+    d = c + m * m
+    e = d + 2 * n * m
+    f = e + 2 * n
+    g = f + 2 * p
     return _Work(
-        buffer[:nn].reshape((n, n)),
-        buffer[small : small + n],
-        buffer[nn : 2 * nn].reshape((n, n)),
-        buffer[mats : mats + nm].reshape((n, m)),
-        buffer[2 * nn : mats].reshape((n, n)),
-        buffer[small + n : small + 2 * n],
-        buffer[mixed : mixed + mm].reshape((m, m)),
-        buffer[rows : rows + m],
-        buffer[mats + nm : mats + 2 * nm].reshape((m, n)),
-        buffer[mixed + mm : small].reshape((m, m)),
-        buffer[mats + 2 * nm : mats + 3 * nm].reshape((m, n)),
-        buffer[mats + 3 * nm : mixed].reshape((m, n)),
-        buffer[rows + m : rows + 2 * m],
-        buffer[small + 2 * n : small + 3 * n],
-        buffer[small + 3 * n : small + 4 * n],
-        buffer[rows + 2 * m : ends],
-        buffer[small + 4 * n : rows],
-        buffer[ends : ends + 2 * mm + 3 * m],
+        buffer[:a].reshape((n, n)),
+        buffer[e : e + n],
+        buffer[a : a + n * p].reshape((n, p)),
+        buffer[a + n * p : b].reshape((n, p)),
+        buffer[b:c].reshape((p, p)),
+        buffer[f : f + p],
+        buffer[c:d].reshape((m, m)),
+        buffer[d : d + n * m].reshape((m, n)),
+        buffer[d + n * m : e].reshape((m, n)),
+        buffer[g : g + m],
+        buffer[f + p : g],
+        buffer[e + n : f],
+        buffer[g + m : g + 4 * m + 2 * m * m],
     )
 
 
 @kernel
 def _action_value(quad: Quadratic, t: int, work: _Work) -> None:
-    """Q = l + f^T v+ and f^T V f at knot t, with v+ = v + V gap_{t+1}."""
-    A, B = quad.A[t], quad.B[t]
-    add_mul_tn_vector(work.V, quad.gaps[t + 1], work.v)
-    mul(work.V, A, work.VA)
-    mul(work.V, B, work.VB)
-    copy_vector(quad.lx[t], work.Qx)
-    add_mul_tn_vector(A, work.v, work.Qx)
-    copy_vector(quad.lu[t], work.Qu)
-    add_mul_tn_vector(B, work.v, work.Qu)
-    copy(quad.lxx[t], work.Qxx)
-    add_mul_tn_upper(A, work.VA, work.Qxx)
-    copy(quad.luu[t], work.Quu)
-    add_mul_tn(B, work.VB, work.Quu)
-    copy(quad.lux[t], work.Qux)
-    add_mul_tn(B, work.VA, work.Qux)
-
-
-@kernel
-def _regularize(quad: Quadratic, t: int, reg: Regularization, work: _Work) -> None:
-    """H = Q_uu + control diag(damping) + value B^T B,  G = Q_ux + value B^T A."""
-    copy(work.Quu, work.H)
-    copy(work.Qux, work.G)
+    """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t."""
     n, m = quad.B[t].shape
+    v, q = work.v, work.q
+    for i in range(n):
+        for j in range(n):
+            work.F[i, j] = quad.A[t, i, j]
+            v[j] += work.V[i, j] * quad.gaps[t + 1, i]
+        for j in range(m):
+            work.F[i, n + j] = quad.B[t, i, j]
+    mul(work.V, work.F, work.VF)
+    copy(quad.H[t], work.Q)
+    add_mul_tn_symmetric(work.F, work.VF, work.Q)
+    for j in range(n + m):
+        q[j] = quad.g[t, j]
+    add_mul_tn_vector(work.F, v, q)
+
+
+@kernel
+def _regularize(reg: Regularization, work: _Work) -> None:
+    """Huu = Q_uu + control diag(damping) + value B^T B,  Z = -(Q_ux + value B^T A)."""
+    m, n = work.Z.shape
     for i in range(m):
-        work.H[i, i] += reg.control * reg.damping[i]
+        for j in range(m):
+            work.Huu[i, j] = work.Q[n + i, n + j]
+        for j in range(n):
+            work.Z[i, j] = -work.Q[n + i, j]
+        work.Huu[i, i] += reg.control * reg.damping[i]
     if reg.value > 0.0:
-        for i in range(n):
-            for j in range(m):
-                work.VB[i, j] = reg.value * quad.B[t, i, j]
-        add_mul_tn(work.VB, quad.B[t], work.H)
-        add_mul_tn(work.VB, quad.A[t], work.G)
+        for k in range(n):
+            for i in range(m):
+                b = reg.value * work.F[k, n + i]
+                for j in range(m):
+                    work.Huu[i, j] += b * work.F[k, n + j]
+                for j in range(n):
+                    work.Z[i, j] -= b * work.F[k, j]
 
 
 @kernel
-def _free_gains(work: _Work, K: Matrix, k: Vector) -> Status:
-    """k = -H^-1 Q_u, K = -H^-1 G without control limits."""
+def _gains(quad: Quadratic, t: int, K: Matrix, k: Vector, free: Integers, work: _Work) -> tuple[Status, int]:
+    """k = argmin of the regularised Q over the limits, K = -Huu_ff^-1 Z_f on free rows f and zero on the others."""
     m, n = K.shape
-    factor = work.box[: m * m].reshape((m, m))
-    if cholesky(work.H, factor) < m:
-        return Status.SINGULAR
+    q = work.q
+    nfree = m
+    if quad.lo.shape[0] > 0:
+        status, nfree = box_qp(work.Huu, q[n:], quad.lo[t], quad.hi[t], k, free, work.box)
+        if status != Status.SOLVED:
+            return status, nfree
+    else:
+        for i in range(m):
+            free[i] = i
+            k[i] = -q[n + i]
+        if not factor_free(work.Huu, free, m, work.box[m * m :], work.box):
+            return Status.SINGULAR, m
+        cholesky_solve(work.box[: m * m].reshape((m, m)), k.reshape((m, 1)))
     for i in range(m):
-        k[i] = -work.Qu[i]
         for j in range(n):
-            K[i, j] = -work.G[i, j]
-    cholesky_solve_vector(factor, k)
-    cholesky_solve(factor, K)
-    return Status.SOLVED
-
-
-@kernel
-def _limited_gains(work: _Work, lo: Vector, hi: Vector, free: NDArray[np.int64], K: Matrix, k: Vector) -> Status:
-    """k from the box QP, started at the last k; K = -H_ff^-1 G_f on free rows and zero on rows held by a limit."""
-    m, n = K.shape
-    status, nfree = box_qp(work.H, work.Qu, lo, hi, k, free, work.box)
-    if status != Status.SOLVED:
-        return status
+            K[i, j] = 0.0
     for i in range(nfree):
         for j in range(n):
-            work.W[i, j] = -work.G[free[i], j]
-    fill(0.0, K)
-    for i in range(m):
-        work.w[i] = 0.0
-    cholesky_solve(work.box[: nfree * nfree].reshape((nfree, nfree)), work.W[:nfree])
+            work.Z[i, j] = work.Z[free[i], j]  # free is sorted, so no row is overwritten before it is read
+    cholesky_solve(work.box[: nfree * nfree].reshape((nfree, nfree)), work.Z[:nfree])
     for i in range(nfree):
-        work.w[free[i]] = 1.0
         for j in range(n):
-            K[free[i], j] = work.W[i, j]
-    return Status.SOLVED
+            K[free[i], j] = work.Z[i, j]
+    return Status.SOLVED, nfree
 
 
 @kernel
-def _value(work: _Work, K: Matrix, k: Vector) -> None:
-    """V = Q_xx + K^T (Q_uu K + Q_ux) + Q_ux^T K and v = Q_x + K^T (Q_uu k + Q_u) + Q_ux^T k: exact for any gains."""
-    copy(work.Qux, work.W)
-    add_mul(work.Quu, K, work.W)
-    copy_vector(work.Qu, work.w)
-    add_mul_vector(work.Quu, k, work.w)
-    copy(work.Qxx, work.V)
-    add_mul_tn_upper(K, work.W, work.V)
-    add_mul_tn_upper(work.Qux, K, work.V)
-    mirror_upper(work.V)
-    copy_vector(work.Qx, work.v)
-    add_mul_tn_vector(K, work.w, work.v)
-    add_mul_tn_vector(work.Qux, k, work.v)
-
-
-@kernel
-def _quadratic_form(H: Matrix, x: Vector, y: Vector) -> float:
-    """y^T H x"""
-    total = 0.0
-    for i in range(y.shape[0]):
-        if y[i] != 0.0:
-            total += y[i] * dot(H[i], x)
-    return total
+def _value(K: Matrix, k: Vector, work: _Work) -> None:
+    """V = Q_xx + K^T (Q_uu K + Q_ux) + Q_xu K and v = q_x + K^T (Q_uu k + q_u) + Q_xu k: exact for any gains."""
+    m, n = K.shape
+    v, q = work.v, work.q
+    for r in range(m):
+        work.w[r] = q[n + r]
+        for j in range(m):
+            work.w[r] += work.Q[n + r, n + j] * k[j]
+        for j in range(n):
+            work.W[r, j] = work.Q[n + r, j]
+        for i in range(m):
+            a = work.Q[n + r, n + i]
+            for j in range(n):
+                work.W[r, j] += a * K[i, j]
+    for i in range(n):
+        v[i] = q[i]
+        for j in range(i, n):
+            work.V[i, j] = work.Q[i, j]
+        for r in range(m):
+            a, b = K[r, i], work.Q[n + r, i]
+            v[i] += a * work.w[r] + b * k[r]
+            for j in range(i, n):
+                work.V[i, j] += a * work.W[r, j] + b * K[r, j]
+    for i in range(n):
+        for j in range(i):
+            work.V[i, j] = work.V[j, i]
 
 
 @kernel
 def _predict(quad: Quadratic, K: Stack, k: Matrix, work: _Work) -> tuple[float, float]:
     """(d0, d1) from the linear rollout of the full step."""
-    T = k.shape[0]
+    T, m, n = K.shape
     d0, d1 = 0.0, 0.0
-    for i in range(work.dx.shape[0]):
+    for i in range(n):
         work.dx[i] = 0.0
-    for t in range(T):
-        copy_vector(k[t], work.du)
-        add_mul_vector(K[t], work.dx, work.du)
-        d0 += dot(quad.lx[t], work.dx) + dot(quad.lu[t], work.du)
-        d1 += _quadratic_form(quad.lxx[t], work.dx, work.dx) + _quadratic_form(quad.luu[t], work.du, work.du)
-        d1 += 2.0 * _quadratic_form(quad.lux[t], work.dx, work.du)
-        copy_vector(quad.gaps[t + 1], work.dx_next)
-        add_mul_vector(quad.A[t], work.dx, work.dx_next)
-        add_mul_vector(quad.B[t], work.du, work.dx_next)
-        copy_vector(work.dx_next, work.dx)
-    d0 += dot(quad.lx[T], work.dx)
-    d1 += _quadratic_form(quad.lxx[T], work.dx, work.dx)
+    for t in range(T + 1):
+        for i in range(n):
+            work.z[i] = work.dx[i]
+        for i in range(m):
+            work.z[n + i] = k[t, i] + dot(K[t, i], work.dx) if t < T else 0.0
+        d0 += dot(quad.g[t], work.z)
+        for i in range(n + m):
+            if work.z[i] != 0.0:
+                d1 += work.z[i] * dot(quad.H[t, i], work.z)
+        if t < T:
+            for i in range(n):
+                work.dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], work.z) + dot(quad.B[t, i], work.z[n:])
     return d0, d1
 
 
 @kernel
-def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: NDArray[np.int64], buffer: Vector) -> Promise:
+def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
     """Gains K (T, m, n), k (T, m) of the regularised model, and what the full step promises.
 
     With limits, k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),).
     """
-    T, m = k.shape
-    n = quad.lx.shape[1]
-    limited = quad.lo.shape[0] > 0
+    T, m, n = K.shape
     work = _work_view(buffer, n, m)
-    copy(quad.lxx[T], work.V)
-    copy_vector(quad.lx[T], work.v)
+    for i in range(n):
+        work.v[i] = quad.g[T, i]
+        for j in range(n):
+            work.V[i, j] = quad.H[T, i, j]
     gradient = 0.0
     for t in range(T - 1, -1, -1):
         _action_value(quad, t, work)
-        _regularize(quad, t, reg, work)
-        if limited:
-            status = _limited_gains(work, quad.lo[t], quad.hi[t], free, K[t], k[t])
-        else:
-            status = _free_gains(work, K[t], k[t])
+        _regularize(reg, work)
+        status, nfree = _gains(quad, t, K[t], k[t], free, work)
         if status != Status.SOLVED:
             return Promise(status, t, 0.0, 0.0, gradient)
-        for i in range(m):
-            if not limited or work.w[i] != 0.0:
-                gradient = max(gradient, abs(work.Qu[i]))
-        _value(work, K[t], k[t])
+        for i in range(nfree):
+            gradient = max(gradient, abs(work.q[n + free[i]]))
+        _value(K[t], k[t], work)
     d0, d1 = _predict(quad, K, k, work)
-    if not (abs(d0) < np.inf and abs(d1) < np.inf):
-        return Promise(Status.NOT_FINITE, 0, d0, d1, gradient)
-    return Promise(Status.SOLVED, 0, d0, d1, gradient)
+    finite = abs(d0) < np.inf and abs(d1) < np.inf
+    return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)
