@@ -82,10 +82,10 @@ def tree_poses(
         if model.joint_ntrans[i] > 0:
             r = quat_matrix(f0, f1, f2, f3)
             for k in range(model.joint_ntrans[i]):
-                t = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
-                tx = r[0] * t[0] + r[1] * t[1] + r[2] * t[2]
-                ty = r[3] * t[0] + r[4] * t[1] + r[5] * t[2]
-                tz = r[6] * t[0] + r[7] * t[1] + r[8] * t[2]
+                e = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
+                tx = r[0] * e[0] + r[1] * e[1] + r[2] * e[2]
+                ty = r[3] * e[0] + r[4] * e[1] + r[5] * e[2]
+                tz = r[6] * e[0] + r[7] * e[1] + r[8] * e[2]
                 ox += tx * q[a]
                 oy += ty * q[a]
                 oz += tz * q[a]
@@ -98,10 +98,10 @@ def tree_poses(
                 a += 1
                 d += 1
         if model.joint_nrot[i] == 1:
+            cq = cos(0.5 * q[a])
+            sq = sin(0.5 * q[a])
             t = model.joint_axis[i]
-            c = cos(0.5 * q[a])
-            s = sin(0.5 * q[a])
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, c, s * t[0], s * t[1], s * t[2])
+            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, cq, sq * t[0], sq * t[1], sq * t[2])
         elif model.joint_nrot[i] == 3:
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q[a], q[a + 1], q[a + 2], q[a + 3])
         else:
@@ -121,8 +121,8 @@ def tree_poses(
             r = quat_matrix(g0, g1, g2, g3)
             for k in range(3):
                 _column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
-        c = model.joint_child_point[i]
-        cx, cy, cz = rotate(rot, i, c[0], c[1], c[2])
+        m = model.joint_child_point[i]
+        cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])
         pos[i, 0] = ox - cx
         pos[i, 1] = oy - cy
         pos[i, 2] = oz - cz
