@@ -44,18 +44,7 @@ class Goal:
         target = table("Goal(target=...)", self.target, knots.size, sim.nx)
         mask = np.zeros((knots.size, sim.ndx))
         mask[:, _chosen("Goal(components=...)", self.components, sim.ndx)] = 1.0
-        return _GoalTerm("Goal", knots, mask, target, layout)
-
-
-class _GoalTerm(StateTerm):
-    """A goal leaves out components by zero weight; they do not count as violated either."""
-
-    def __init__(self, name: str, knots: Integers, mask: Any, target: Any, layout: Integers) -> None:
-        super().__init__(name, knots, mask, target, layout)
-        self._mask = mask.copy()
-
-    def violation(self) -> Any:
-        return np.abs(self.residual) * self._mask
+        return StateTerm("Goal", knots, mask, target, layout)
 
 
 def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: Integers) -> tuple[Any, Integers, Vector]:

@@ -27,6 +27,7 @@ class Term:
         self.name = name
         self.knots = knots
         self.weight = weight
+        self.mask = (weight > 0.0).astype(float)  # entries that take part
         self.slope = np.zeros_like(weight)
         self.one_sided = one_sided
         self.residual = np.zeros_like(weight)
@@ -52,8 +53,9 @@ class Term:
         self._add(xs, us, g, H)
 
     def violation(self) -> Matrix:
-        """|r| of equalities, max(r, 0) of inequalities, at the last `update`."""
-        return np.maximum(self.residual, 0.0) if self.one_sided else np.abs(self.residual)
+        """|r| of equalities, max(r, 0) of inequalities, at the last `update`; zero for entries that do not take part."""
+        size = np.maximum(self.residual, 0.0) if self.one_sided else np.abs(self.residual)
+        return np.multiply(size, self.mask, out=size)
 
 
 class StateTerm(Term):
