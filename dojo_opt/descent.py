@@ -36,7 +36,7 @@ class Descent:
         self._free = np.zeros(sim.nu, dtype=np.int64)
         self._buffer = np.zeros(work_size(sim.ndx, sim.nu))
         self._no_gaps = np.zeros((T + 1, sim.ndx))
-        self._no_limits = np.zeros((0, sim.nu))
+        self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
         self._linear: Any = None
 
     def reset(self) -> None:
@@ -72,7 +72,7 @@ class Descent:
 
     def gains(self, now: Iterate) -> Promise:
         """K and k at the smallest regularisation, from the present one upwards, that makes every Q_uu positive definite."""
-        lo = hi = self._no_limits
+        lo, hi = self._free_limits
         if self._problem.control_limits is not None:
             lo, hi = (bound - now.u for bound in self._problem.control_limits)
         gaps = self._no_gaps if now.gaps is None else now.gaps

@@ -18,15 +18,6 @@ Matrix = NDArray[np.float64]
 
 
 @kernel
-def copy(A: Matrix, out: Matrix) -> None:
-    """out = A"""
-    n, m = out.shape
-    for i in range(n):
-        for j in range(m):
-            out[i, j] = A[i, j]
-
-
-@kernel
 def dot(a: Vector, b: Vector) -> float:
     """a . b"""
     total = 0.0
@@ -72,25 +63,6 @@ def add_mul_tn_symmetric(A: Matrix, B: Matrix, out: Matrix) -> None:
     for i in range(n):
         for j in range(i):
             out[i, j] = out[j, i]
-
-
-@kernel
-def add_mul_vector(A: Matrix, x: Vector, out: Vector) -> None:
-    """out += A x"""
-    for i in range(out.shape[0]):
-        total = 0.0
-        for j in range(x.shape[0]):
-            total += A[i, j] * x[j]
-        out[i] += total
-
-
-@kernel
-def add_mul_tn_vector(A: Matrix, x: Vector, out: Vector) -> None:
-    """out += A^T x"""
-    for i in range(x.shape[0]):
-        xi = x[i]
-        for j in range(out.shape[0]):
-            out[j] += xi * A[i, j]
 
 
 @kernel

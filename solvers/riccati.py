@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.boxqp import box_qp, factor_free
-from solvers.dense import add_mul_tn_symmetric, add_mul_tn_vector, add_mul_vector, cholesky_solve, copy, dot, mul
+from solvers.boxqp import box_qp
+from solvers.dense import add_mul_tn_symmetric, cholesky_solve, dot, mul
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -34,8 +34,8 @@ class Quadratic(NamedTuple):
     g: Matrix  # (T + 1, n + m) gradient of the cost
     H: Stack  # (T + 1, n + m, n + m) its Hessian, symmetric
     gaps: Matrix  # (T + 1, n), first row unused
-    lo: Matrix  # (T, m) lower limit of du, or (0, m) without limits
-    hi: Matrix  # (T, m)
+    lo: Matrix  # (T, m) lower limit of du, -inf without one
+    hi: Matrix  # (T, m) upper limit of du, inf without one
 
 
 class Regularization(NamedTuple):
@@ -56,172 +56,115 @@ class Promise(NamedTuple):
     gradient: float  # largest |Q_u| over controls that no limit holds
 
 
-class _Work(NamedTuple):
-    V: Matrix  # (n, n) Hessian of the value function at t + 1, then at t
-    v: Vector  # (n,) its gradient
-    F: Matrix  # (n, n + m) [A B]
-    VF: Matrix  # (n, n + m)
-    Q: Matrix  # (n + m, n + m) Hessian of the action value
-    q: Vector  # (n + m,) its gradient
-    Huu: Matrix  # (m, m) regularised block of Q
-    Z: Matrix  # (m, n) regularised block -Q_ux, then packed rows of K
-    W: Matrix  # (m, n) Q_uu K + Q_ux
-    w: Vector  # (m,) Q_uu k + Q_u
-    z: Vector  # (n + m,) linear rollout
-    dx: Vector  # (n,)
-    box: Vector  # (2 m^2 + 3 m,)
-
-
 def work_size(n: int, m: int) -> int:
     """Floats of scratch that `backward` needs."""
-    return n * n + 2 * n * (n + m) + (n + m) * (n + m) + m * m + 2 * n * m + 4 * n + 3 * m + 2 * m * m + 3 * m
-
-
-@kernel
-def _work_view(buffer: Vector, n: int, m: int) -> _Work:
-    """Named views into one flat buffer of `work_size(n, m)` floats."""
     p = n + m
-    a = n * n
-    b = a + 2 * n * p
-    c = b + p * p
-    d = c + m * m
-    e = d + 2 * n * m
-    f = e + 2 * n
-    g = f + 2 * p
-    return _Work(
-        buffer[:a].reshape((n, n)),
-        buffer[e : e + n],
-        buffer[a : a + n * p].reshape((n, p)),
-        buffer[a + n * p : b].reshape((n, p)),
-        buffer[b:c].reshape((p, p)),
-        buffer[f : f + p],
-        buffer[c:d].reshape((m, m)),
-        buffer[d : d + n * m].reshape((m, n)),
-        buffer[d + n * m : e].reshape((m, n)),
-        buffer[g : g + m],
-        buffer[f + p : g],
-        buffer[e + n : f],
-        buffer[g + m : g + 4 * m + 2 * m * m],
-    )
+    return n * n + n + 2 * n * p + p * p + 2 * p + m * m + 2 * n * m + m + n + 2 * m * m + 3 * m
 
 
 @kernel
-def _action_value(quad: Quadratic, t: int, work: _Work) -> None:
-    """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t."""
-    n, m = quad.B[t].shape
-    v, q = work.v, work.q
+def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: Matrix, q: Vector) -> None:
+    """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t.   FV: (2, n, n + m) scratch."""
+    n = v.shape[0]
+    F, VF = FV[0], FV[1]
     for i in range(n):
         for j in range(n):
-            work.F[i, j] = quad.A[t, i, j]
-            v[j] += work.V[i, j] * quad.gaps[t + 1, i]
-        for j in range(m):
-            work.F[i, n + j] = quad.B[t, i, j]
-    mul(work.V, work.F, work.VF)
-    copy(quad.H[t], work.Q)
-    add_mul_tn_symmetric(work.F, work.VF, work.Q)
-    for j in range(n + m):
-        q[j] = quad.g[t, j]
-    add_mul_tn_vector(work.F, v, q)
+            F[i, j] = quad.A[t, i, j]
+            v[j] += V[i, j] * quad.gaps[t + 1, i]
+        for j in range(n, q.shape[0]):
+            F[i, j] = quad.B[t, i, j - n]
+    for i in range(q.shape[0]):
+        q[i] = quad.g[t, i]
+        for j in range(q.shape[0]):
+            Q[i, j] = quad.H[t, i, j]
+    mul(V, F, VF)
+    add_mul_tn_symmetric(F, VF, Q)
+    for i in range(n):
+        for j in range(q.shape[0]):
+            q[j] += v[i] * F[i, j]
 
 
 @kernel
-def _regularize(reg: Regularization, work: _Work) -> None:
+def _regularize(reg: Regularization, F: Matrix, Q: Matrix, Huu: Matrix, Z: Matrix) -> None:
     """Huu = Q_uu + control diag(damping) + value B^T B,  Z = -(Q_ux + value B^T A)."""
-    m, n = work.Z.shape
+    m, n = Z.shape
     for i in range(m):
         for j in range(m):
-            work.Huu[i, j] = work.Q[n + i, n + j]
+            Huu[i, j] = Q[n + i, n + j]
         for j in range(n):
-            work.Z[i, j] = -work.Q[n + i, j]
-        work.Huu[i, i] += reg.control * reg.damping[i]
-    if reg.value > 0.0:
-        for k in range(n):
-            for i in range(m):
-                b = reg.value * work.F[k, n + i]
+            Z[i, j] = -Q[n + i, j]
+        Huu[i, i] += reg.control * reg.damping[i]
+        if reg.value > 0.0:
+            for k in range(n):
+                b = reg.value * F[k, n + i]
                 for j in range(m):
-                    work.Huu[i, j] += b * work.F[k, n + j]
+                    Huu[i, j] += b * F[k, n + j]
                 for j in range(n):
-                    work.Z[i, j] -= b * work.F[k, j]
+                    Z[i, j] -= b * F[k, j]
 
 
 @kernel
-def _gains(quad: Quadratic, t: int, K: Matrix, k: Vector, free: Integers, work: _Work) -> tuple[Status, int]:
-    """k = argmin of the regularised Q over the limits, K = -Huu_ff^-1 Z_f on free rows f and zero on the others."""
+def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> None:
+    """K = L^-T L^-1 Z on free rows, zero on the others; L packed (nfree, nfree) in `factor`. Z is used up."""
     m, n = K.shape
-    q = work.q
-    nfree = m
-    if quad.lo.shape[0] > 0:
-        status, nfree = box_qp(work.Huu, q[n:], quad.lo[t], quad.hi[t], k, free, work.box)
-        if status != Status.SOLVED:
-            return status, nfree
-    else:
-        for i in range(m):
-            free[i] = i
-            k[i] = -q[n + i]
-        if not factor_free(work.Huu, free, m, work.box[m * m :], work.box):
-            return Status.SINGULAR, m
-        cholesky_solve(work.box[: m * m].reshape((m, m)), k.reshape((m, 1)))
+    for i in range(nfree):
+        for j in range(n):
+            Z[i, j] = Z[free[i], j]  # free is sorted, so no row is overwritten before it is read
+    cholesky_solve(factor[: nfree * nfree].reshape((nfree, nfree)), Z[:nfree])
     for i in range(m):
         for j in range(n):
             K[i, j] = 0.0
     for i in range(nfree):
         for j in range(n):
-            work.Z[i, j] = work.Z[free[i], j]  # free is sorted, so no row is overwritten before it is read
-    cholesky_solve(work.box[: nfree * nfree].reshape((nfree, nfree)), work.Z[:nfree])
-    for i in range(nfree):
-        for j in range(n):
-            K[free[i], j] = work.Z[i, j]
-    return Status.SOLVED, nfree
+            K[free[i], j] = Z[i, j]
 
 
 @kernel
-def _value(K: Matrix, k: Vector, work: _Work) -> None:
+def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, W: Matrix, w: Vector, V: Matrix, v: Vector) -> None:
     """V = Q_xx + K^T (Q_uu K + Q_ux) + Q_xu K and v = q_x + K^T (Q_uu k + q_u) + Q_xu k: exact for any gains."""
     m, n = K.shape
-    v, q = work.v, work.q
     for r in range(m):
-        work.w[r] = q[n + r]
-        for j in range(m):
-            work.w[r] += work.Q[n + r, n + j] * k[j]
+        w[r] = q[n + r]
         for j in range(n):
-            work.W[r, j] = work.Q[n + r, j]
+            W[r, j] = Q[n + r, j]
         for i in range(m):
-            a = work.Q[n + r, n + i]
+            a = Q[n + r, n + i]
+            w[r] += a * k[i]
             for j in range(n):
-                work.W[r, j] += a * K[i, j]
+                W[r, j] += a * K[i, j]
     for i in range(n):
         v[i] = q[i]
         for j in range(i, n):
-            work.V[i, j] = work.Q[i, j]
+            V[i, j] = Q[i, j]
         for r in range(m):
-            a, b = K[r, i], work.Q[n + r, i]
-            v[i] += a * work.w[r] + b * k[r]
+            a, b = K[r, i], Q[n + r, i]
+            v[i] += a * w[r] + b * k[r]
             for j in range(i, n):
-                work.V[i, j] += a * work.W[r, j] + b * K[r, j]
+                V[i, j] += a * W[r, j] + b * K[r, j]
     for i in range(n):
         for j in range(i):
-            work.V[i, j] = work.V[j, i]
+            V[i, j] = V[j, i]
 
 
 @kernel
-def _predict(quad: Quadratic, K: Stack, k: Matrix, work: _Work) -> tuple[float, float]:
+def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, dx: Vector) -> tuple[float, float]:
     """(d0, d1) from the linear rollout of the full step."""
     T, m, n = K.shape
     d0, d1 = 0.0, 0.0
     for i in range(n):
-        work.dx[i] = 0.0
+        dx[i] = 0.0
     for t in range(T + 1):
         for i in range(n):
-            work.z[i] = work.dx[i]
+            z[i] = dx[i]
         for i in range(m):
-            work.z[n + i] = k[t, i] + dot(K[t, i], work.dx) if t < T else 0.0
-        d0 += dot(quad.g[t], work.z)
+            z[n + i] = k[t, i] + dot(K[t, i], dx) if t < T else 0.0
+        d0 += dot(quad.g[t], z)
         for i in range(n + m):
-            if work.z[i] != 0.0:
-                d1 += work.z[i] * dot(quad.H[t, i], work.z)
+            if z[i] != 0.0:
+                d1 += z[i] * dot(quad.H[t, i], z)
         if t < T:
             for i in range(n):
-                work.dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], work.z) + dot(quad.B[t, i], work.z[n:])
+                dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], z) + dot(quad.B[t, i], z[n:])
     return d0, d1
 
 
@@ -229,24 +172,36 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, work: _Work) -> tuple[float, 
 def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
     """Gains K (T, m, n), k (T, m) of the regularised model, and what the full step promises.
 
-    With limits, k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),).
+    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),).
     """
     T, m, n = K.shape
-    work = _work_view(buffer, n, m)
+    p = n + m
+    a = n * n
+    b = a + 2 * n * p
+    c = b + p * p
+    d = c + 2 * m * n
+    e = d + m * m
+    f = e + 2 * n
+    h = f + 2 * p
+    V, FV, Q = buffer[:a].reshape((n, n)), buffer[a:b].reshape((2, n, p)), buffer[b:c].reshape((p, p))
+    ZW, Huu = buffer[c:d].reshape((2, m, n)), buffer[d:e].reshape((m, m))
+    v, dx, q, z = buffer[e : e + n], buffer[e + n : f], buffer[f : f + p], buffer[f + p : h]
+    w, box = buffer[h : h + m], buffer[h + m :]
     for i in range(n):
-        work.v[i] = quad.g[T, i]
+        v[i] = quad.g[T, i]
         for j in range(n):
-            work.V[i, j] = quad.H[T, i, j]
+            V[i, j] = quad.H[T, i, j]
     gradient = 0.0
     for t in range(T - 1, -1, -1):
-        _action_value(quad, t, work)
-        _regularize(reg, work)
-        status, nfree = _gains(quad, t, K[t], k[t], free, work)
+        _action_value(quad, t, V, v, FV, Q, q)
+        _regularize(reg, FV[0], Q, Huu, ZW[0])
+        status, nfree = box_qp(Huu, q[n:], quad.lo[t], quad.hi[t], k[t], free, box)
         if status != Status.SOLVED:
             return Promise(status, t, 0.0, 0.0, gradient)
         for i in range(nfree):
-            gradient = max(gradient, abs(work.q[n + free[i]]))
-        _value(K[t], k[t], work)
-    d0, d1 = _predict(quad, K, k, work)
+            gradient = max(gradient, abs(q[n + free[i]]))
+        _gains(ZW[0], free, nfree, box, K[t])
+        _value(K[t], k[t], Q, q, ZW[1], w, V, v)
+    d0, d1 = _predict(quad, K, k, z, dx)
     finite = abs(d0) < np.inf and abs(d1) < np.inf
     return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)
