@@ -129,12 +129,13 @@ class Solver:
             k=self.descent.k.copy(),
             violation=violation,
             gap=now.gap,
-            time=time.perf_counter() - continuation.begin,
+            seconds=time.perf_counter() - continuation.begin,
             time_step=float(self.problem.sim.time_step),
             substeps=self.problem.substeps,
             history=continuation.history,
             multipliers=[term.slope.copy() for term in self.objective.constraints],
             penalties=[2.0 * term.weight for term in self.objective.constraints],
+            problem=self.problem,
         )
         if options.verbose:
             print(plan.closing_line(), file=options.stream or sys.stdout)

@@ -54,12 +54,18 @@ class Plan:
     k: Matrix  # (T, nu) the step the last backward pass still proposed
     violation: float  # of the constraints, largest
     gap: float  # of the dynamics, largest
-    time: float  # [s]
+    seconds: float  # that the solve took
     time_step: float  # [s]
     substeps: int  # simulation steps per knot
     history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
     multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
     penalties: list[Matrix] = field(default_factory=list)
+    problem: Any = None  # the Problem; not saved
+
+    @property
+    def time(self) -> Matrix:
+        """(T + 1,) times of the knots [s]."""
+        return self.time_step * self.substeps * np.arange(len(self.x))
 
     def summary(self) -> str:
         """The table of iterations and a closing line."""
@@ -70,7 +76,7 @@ class Plan:
         """One line: how it ended."""
         return (
             f"{self.status.name}: {self.message} {self.nit} iterations, cost {self.fun:.6g}, violation "
-            f"{self.violation:.1e}, gap {self.gap:.1e}, {1e3 * self.time:.1f} ms"
+            f"{self.violation:.1e}, gap {self.gap:.1e}, {1e3 * self.seconds:.1f} ms"
         )
 
     def save(self, path: str | Path) -> None:
@@ -78,7 +84,7 @@ class Plan:
         arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
         arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
-        scalars = ("message", "nit", "fun", "violation", "gap", "time", "time_step", "substeps", "history")
+        scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
         meta = {name: getattr(self, name) for name in scalars} | {"status": int(self.status), "success": self.success}
         np.savez(path, meta=json.dumps(meta), **arrays)
 
