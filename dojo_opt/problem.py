@@ -18,23 +18,21 @@ Matrix = NDArray[np.float64]
 __all__ = ["Problem"]
 
 
-def _limits(limits: tuple[ArrayLike, ArrayLike] | None, horizon: int, nu: int) -> tuple[Matrix, Matrix] | None:
-    """Control limits as two (T, nu) arrays, infinite where free."""
+def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector, Vector] | None:
+    """Control limits as two (nu,) arrays, infinite where free."""
     if limits is None:
         return None
     lo, hi = (np.asarray(b, dtype=float) for b in limits)
     for side, bound in (("lower", lo), ("upper", hi)):
-        if bound.shape not in ((), (nu,), (horizon, nu)) or np.any(np.isnan(bound)):
+        if bound.shape not in ((), (nu,)) or np.any(np.isnan(bound)):
             raise ValueError(
-                f"Problem(control_limits=...): expected a number, ({nu},) or ({horizon}, {nu}) without NaN as {side} "
-                f"limit, got shape {bound.shape}: {bound}"
+                f"Problem(control_limits=...): expected a number or shape ({nu},) without NaN as {side} limit, got "
+                f"shape {bound.shape}: {bound}"
             )
-    lo, hi = (np.ascontiguousarray(np.broadcast_to(b, (horizon, nu))).copy() for b in (lo, hi))
+    lo, hi = (np.broadcast_to(b, (nu,)).copy() for b in (lo, hi))
     if np.any(lo > hi):
-        t, i = np.argwhere(lo > hi)[0]
-        raise ValueError(
-            f"Problem(control_limits=...): expected lower <= upper, got [{lo[t, i]}, {hi[t, i]}] of control {i} at knot {t}"
-        )
+        i = int(np.argmax(lo > hi))
+        raise ValueError(f"Problem(control_limits=...): expected lower <= upper, got [{lo[i]}, {hi[i]}] of control {i}")
     return lo, hi
 
 
@@ -78,7 +76,7 @@ class Problem:
                     raise TypeError(f"Problem({argument}=...): entry {i} is a {type(spec).__name__}, not a term")
         self.costs = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[0]]
         self.constraints = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[1]]
-        self.control_limits = _limits(control_limits, self.horizon, sim.nu)
+        self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
 

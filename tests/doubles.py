@@ -85,7 +85,7 @@ class System:
             if Ks is not None:
                 u[t] += Ks[t] @ self.difference(x[t], xs[t])
             if limits is not None:
-                u[t] = np.clip(u[t], limits[0][t], limits[1][t])
+                u[t] = np.clip(u[t], *limits)
             following = self.advance(x[t], u[t], substeps, kappa)
             if following is None:
                 return Shot(x, u, Status.MAX_ITERATIONS, t, np.inf)
