@@ -57,7 +57,7 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
 
 
 @kernel
-def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, par: Vector) -> Outcome:
+def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> Outcome:
     h = options.h
     kappa = options.kappa
     tolerance = options.tolerance
@@ -89,18 +89,18 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
                     status = _ANGULAR_STEP
                     break
                 continue
-            k0 = max(kappa, par[0])
-            floor = par[1] * k0**0.5
+            k0 = max(kappa, 0.01)
+            floor = 0.1 * k0**0.5
             for c in range(model.contact_body.shape[0]):
                 depth = -work.contact_kin[c, 0]
                 if depth > 0.0:
-                    k0 = max(k0, par[3] * model.body_mass[model.contact_body[c]] * depth * depth / h)
-                    floor = max(floor, par[4] * depth)
+                    k0 = max(k0, 0.3 * model.body_mass[model.contact_body[c]] * depth * depth / h)
+                    floor = max(floor, 0.5 * depth)
             for c in range(model.limit_dof.shape[0]):
                 depth = -work.bound_gap[c]
                 if depth > 0.0:
-                    k0 = max(k0, par[5] * depth * depth / h)
-                    floor = max(floor, par[4] * depth)
+                    k0 = max(k0, 0.01 * depth * depth / h)
+                    floor = max(floor, 0.5 * depth)
             start_inequalities(model, work, k0, floor)
         else:
             move_inequalities(model, work, alpha)
@@ -118,7 +118,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         center = max(kappa, mean)
         slip = slip_error(model, work, kappa)
         violation = max(high - kappa, kappa - low, slip)
-        if iterations > 0 and not (inside and (r <= max(r0, tolerance) or (violation <= c0 and r < par[11] * r0 and c0 > kappa))):
+        if iterations > 0 and not (inside and (r <= max(r0, tolerance) or (violation <= c0 and r < 2.0 * r0 and c0 > kappa))):
             backtracks += 1
             if backtracks < 12:
                 alpha *= 0.5
@@ -144,13 +144,13 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         reduce = 1.0
         for phase in range(4):
             if phase >= 2:
-                if alpha > par[9]:
+                if alpha > 0.1:
                     break
-                reduce = par[10] if phase == 2 else par[12]
+                reduce = 0.5 if phase == 2 else 0.1
                 target = max(kappa, (1.0 - reduce) * mean)
             for d in range(nv):
                 work.dnu[d] = -reduce * work.residual[d]
-            inequality_rhs(model, work, target, phase == 1 and affine > par[6], reduce)
+            inequality_rhs(model, work, target, phase == 1 and affine > 0.0, reduce)
             solve(model, work, work.dnu, work.dnu)
             recover_inequalities(model, work, h, reduce)
             alpha = boundary_step(model, work)
@@ -161,15 +161,6 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
                 ahead = products_ahead(model, work, a)
                 sigma = min(max(ahead / total, 0.0), 1.0) ** 3
                 target = max(kappa, sigma * mean)
-        if par.shape[0] > 20 and iterations < 100:
-            j = 20 + 8 * iterations
-            par[j] = r
-            par[j + 1] = mean
-            par[j + 2] = low
-            par[j + 3] = high
-            par[j + 4] = target
-            par[j + 5] = alpha
-            par[j + 6] = backtracks
         tau = 0.95 if max(r, violation) > 1e-3 else 0.99
         alpha = min(1.0, tau * alpha)
         for d in range(nv):
