@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import numba
 from numba import prange
 
-__all__ = ["kernel", "parallel_kernel", "prange", "cache_folder", "compiled_signatures", "threads"]
+__all__ = ["cache_folder", "compiled_signatures", "kernel", "local_kernel", "parallel_kernel", "prange", "threads"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -81,12 +81,12 @@ if _FOLDER is not None:
     _prune(_FOLDER.parent)
 
 
-def _compile(func: F, **flags: Any) -> F:
+def _compile(func: F, cache: bool = True, **flags: Any) -> F:
     users_folder = numba.config.CACHE_DIR
     try:
         if _FOLDER is not None:
             numba.config.CACHE_DIR = str(_FOLDER)
-        compiled = numba.njit(cache=_FOLDER is not None, **_FLAGS, **flags)(func)
+        compiled = numba.njit(cache=cache and _FOLDER is not None, **_FLAGS, **flags)(func)
     finally:
         numba.config.CACHE_DIR = users_folder
     _REGISTRY.append(compiled)
@@ -100,6 +100,13 @@ def kernel(func: F) -> F:
     every call, which costs a third of a time step (`_nrt=False`; theory: one step of a 13-body tree, 103 to 61 us).
     """
     return _compile(func, _nrt=False)
+
+
+def local_kernel(func: F) -> F:
+    """A kernel made inside a function, around another kernel: Numba never finds such a closure in its cache again, so
+    it is compiled once per process and leaves no file behind.
+    """
+    return _compile(func, cache=False, _nrt=False)
 
 
 def parallel_kernel(func: F) -> F:
