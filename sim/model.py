@@ -107,6 +107,7 @@ class Work(NamedTuple):
     S3nu: Matrix  # (nv, 6) d(pose 3)/d(v25)
     inertia_world: Matrix  # (nbody, 9) at configuration 2
     momentum_in: Matrix  # (nbody, 6) momentum of interval 1-2 at node 2 plus applied impulses, at the centre of mass
+    body_impulse: Matrix  # (nbody, 6) force and torque impulses of BODY inputs, world axes, at the centre of mass
     turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
     turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
     balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O

@@ -1,0 +1,243 @@
+"""Momentum balance of each body over a step, and its Jacobian: the discrete Euler-Lagrange equations.
+
+Discrete Lagrangian of one body over an interval with rotation (c, s), c = cos(angle/2) > 0:
+
+    L_d = m |x3 - x2|^2 / (2 h) + (2/h) s.J s psi(c) - (h/2) (V(2) + V(3)),      psi(c) = 2/3 + 1/(3 c^2)
+
+psi = 1 is Dojo's Lagrangian (Howell et al. 2022), whose angular momentum J sin(angle)/h cannot exceed J/h, so that a fast
+body may have no next state; psi = 1/c^2 is the Cayley map's. The blend cancels their leading errors (rotation about a
+fixed axis is right to fourth order) and keeps the barrier at a half turn: every momentum has a next state.
+"""
+
+from __future__ import annotations
+
+from sim.kinematics import displace, tree_poses
+from sim.model import InputKind, Matrix, Model, Vector, Work
+from sim.rotation import Mat3, Vec3, cross, quat_turn, rotate
+from solvers.jit import kernel
+
+_WORLD = int(InputKind.WORLD)
+_BODY = int(InputKind.BODY)
+_JOINT = int(InputKind.JOINT)
+
+
+@kernel
+def spin(J: Matrix, i: int, c: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float, float, float]:
+    """m = c J s + s x J s,  k = s.J s  and J s, for s = (x, y, z): returns (m, J s, k) as seven numbers."""
+    jx, jy, jz = rotate(J, i, x, y, z)
+    k = x * jx + y * jy + z * jz
+    return c * jx + y * jz - z * jy, c * jy + z * jx - x * jz, c * jz + x * jy - y * jx, jx, jy, jz, k
+
+
+@kernel
+def angular_momentum(J: Matrix, i: int, h: float, c: float, x: float, y: float, z: float) -> Vec3:
+    """P = (2/h) (psi m - k psi'/2 s): momentum at the start of an interval with rotation (c, s).
+
+    The momentum at the end of an interval, with J at the end, is -P(c, -s).   J: (n, 9) world axes.
+    """
+    psi = 2.0 / 3.0 + 1.0 / (3.0 * c * c)
+    dpsi = -2.0 / (3.0 * c * c * c)
+    mx, my, mz, _, _, _, k = spin(J, i, c, x, y, z)
+    a = 2.0 / h * psi
+    b = -k * dpsi / h
+    return a * mx + b * x, a * my + b * y, a * mz + b * z
+
+
+@kernel
+def angular_momentum_jacobian(J: Matrix, i: int, h: float, c: float, x: float, y: float, z: float) -> Mat3:
+    """dP/dphi, phi the world rotation of the end of the interval:
+
+    h dP/dphi = psi ((c J + [s] J - [J s]) (c I - [s]) - J s s^T)
+                - psi' (m s^T + s m^T + k/2 (c I - [s])) + (k/2) psi'' s s^T
+    """
+    psi = 2.0 / 3.0 + 1.0 / (3.0 * c * c)
+    dpsi = -2.0 / (3.0 * c * c * c)
+    mx, my, mz, jx, jy, jz, k = spin(J, i, c, x, y, z)
+    e = k / (c * c * c * c)  # k psi'' / 2
+    # T = c J + [s] J - [J s]
+    t00 = c * J[i, 0] - z * J[i, 3] + y * J[i, 6]
+    t01 = c * J[i, 1] - z * J[i, 4] + y * J[i, 7] + jz
+    t02 = c * J[i, 2] - z * J[i, 5] + y * J[i, 8] - jy
+    t10 = c * J[i, 3] + z * J[i, 0] - x * J[i, 6] - jz
+    t11 = c * J[i, 4] + z * J[i, 1] - x * J[i, 7]
+    t12 = c * J[i, 5] + z * J[i, 2] - x * J[i, 8] + jx
+    t20 = c * J[i, 6] - y * J[i, 0] + x * J[i, 3] + jy
+    t21 = c * J[i, 7] - y * J[i, 1] + x * J[i, 4] - jx
+    t22 = c * J[i, 8] - y * J[i, 2] + x * J[i, 5]
+    g = -0.5 * dpsi * k
+    a = psi / h
+    b = -dpsi / h
+    gc = g * c / h
+    gx, gy, gz = g * x / h, g * y / h, g * z / h
+    e /= h
+    return (
+        a * (c * t00 - t01 * z + t02 * y - jx * x) + 2.0 * b * mx * x + e * x * x + gc,
+        a * (c * t01 + t00 * z - t02 * x - jx * y) + b * (mx * y + x * my) + e * x * y + gz,
+        a * (c * t02 - t00 * y + t01 * x - jx * z) + b * (mx * z + x * mz) + e * x * z - gy,
+        a * (c * t10 - t11 * z + t12 * y - jy * x) + b * (my * x + y * mx) + e * y * x - gz,
+        a * (c * t11 + t10 * z - t12 * x - jy * y) + 2.0 * b * my * y + e * y * y + gc,
+        a * (c * t12 - t10 * y + t11 * x - jy * z) + b * (my * z + y * mz) + e * y * z + gx,
+        a * (c * t20 - t21 * z + t22 * y - jz * x) + b * (mz * x + z * mx) + e * z * x + gy,
+        a * (c * t21 + t20 * z - t22 * x - jz * y) + b * (mz * y + z * my) + e * z * y - gx,
+        a * (c * t22 - t20 * y + t21 * x - jz * z) + 2.0 * b * mz * z + e * z * z + gc,
+    )
+
+
+@kernel
+def world_inertia(model: Model, rot: Matrix, out: Matrix) -> None:
+    """out[i] = R J R^T.  rot, out: (nbody, 9)."""
+    for i in range(rot.shape[0]):
+        J = model.body_inertia
+        for a in range(3):
+            r0, r1, r2 = rot[i, 3 * a], rot[i, 3 * a + 1], rot[i, 3 * a + 2]
+            t0 = r0 * J[i, 0] + r1 * J[i, 3] + r2 * J[i, 6]
+            t1 = r0 * J[i, 1] + r1 * J[i, 4] + r2 * J[i, 7]
+            t2 = r0 * J[i, 2] + r1 * J[i, 5] + r2 * J[i, 8]
+            for b in range(3):
+                out[i, 3 * a + b] = t0 * rot[i, 3 * b] + t1 * rot[i, 3 * b + 1] + t2 * rot[i, 3 * b + 2]
+
+
+@kernel
+def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> bool:
+    """Everything of a step that does not depend on its unknown: configurations 1 and 2, incoming momenta and impulses.
+
+    momentum_in = (m (x2 - x1)/h + h m g + h f,  -P(c', -s') + h tau)      at the centre of mass
+
+    False when a body turned by half a turn or more from 1 to 2: the state is not what it seems.
+    """
+    if model.body_parent.shape[0] > 0 and model.body_parent[0] < 0 and model.joint_ntrans[0] == 3:
+        for k in range(3):
+            work.origin[k] = q[k]
+    else:
+        for k in range(3):
+            work.origin[k] = model.joint_parent_point[0, k]
+    displace(model, q, v, -h, work.theta1)
+    tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
+    tree_poses(model, work.theta1, q, work.origin, work.pos1, work.quat1, work.rot1, work.S1)
+    world_inertia(model, work.rot2, work.inertia_world)
+    representable = True
+    for i in range(model.body_parent.shape[0]):
+        c, x, y, z = quat_turn(
+            work.quat1[i, 0], work.quat1[i, 1], work.quat1[i, 2], work.quat1[i, 3],
+            work.quat2[i, 0], work.quat2[i, 1], work.quat2[i, 2], work.quat2[i, 3],
+        )  # fmt: skip
+        work.turn_in[i, 0] = c
+        work.turn_in[i, 1] = x
+        work.turn_in[i, 2] = y
+        work.turn_in[i, 3] = z
+        px, py, pz = angular_momentum(work.inertia_world, i, h, c, -x, -y, -z)
+        work.momentum_in[i, 3] = -px
+        work.momentum_in[i, 4] = -py
+        work.momentum_in[i, 5] = -pz
+        m = model.body_mass[i]
+        for k in range(3):
+            work.momentum_in[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + h * model.gravity[k])
+            work.body_impulse[i, k] = 0.0
+            work.body_impulse[i, 3 + k] = 0.0
+    representable = _turns_below_half(model, work, h, v)
+    for j in range(u.shape[0]):
+        _apply_input(model, work, h, j, u[j])
+    return representable
+
+
+@kernel
+def _turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
+    """|h omega| < pi for the angular velocity of each body, omega = sum of the ancestors' rotation rates about S2."""
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        for k in range(3):
+            w = work.subtree[p, 3 + k] if p >= 0 else 0.0
+            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                w += h * v[d] * work.S2[d, 3 + k]
+            work.subtree[i, 3 + k] = w
+        x, y, z = work.subtree[i, 3], work.subtree[i, 4], work.subtree[i, 5]
+        if not x * x + y * y + z * z < 9.8696 or not work.turn_in[i, 0] > 1e-3:  # pi^2
+            return False
+    return True
+
+
+@kernel
+def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
+    """Add the impulse h u of a WORLD or BODY input to its body (JOINT inputs enter the generalized residual)."""
+    if model.input_kind[j] == _JOINT:
+        return
+    i = model.input_index[j]
+    w = model.input_wrench[j]
+    f = (h * u * w[0], h * u * w[1], h * u * w[2])
+    t = (h * u * w[3], h * u * w[4], h * u * w[5])
+    if model.input_kind[j] == _BODY:
+        f = rotate(work.rot2, i, f[0], f[1], f[2])
+        t = rotate(work.rot2, i, t[0], t[1], t[2])
+        for k in range(3):
+            work.body_impulse[i, k] += f[k]
+            work.body_impulse[i, 3 + k] += t[k]
+    for k in range(3):
+        work.momentum_in[i, k] += f[k]
+        work.momentum_in[i, 3 + k] += t[k]
+
+
+@kernel
+def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
+    """balance = (m (x3 - x2)/h, P(c, s)) - momentum_in, as a wrench about O, at the trial velocity work.nu.
+
+    False when a body would turn by half a turn or more.   Fills configuration 3, turn, balance.
+    """
+    displace(model, q, work.nu, h, work.theta3)
+    tree_poses(model, work.theta3, q, work.origin, work.pos3, work.quat3, work.rot3, work.S3)
+    inside = True
+    for i in range(model.body_parent.shape[0]):
+        c, x, y, z = quat_turn(
+            work.quat2[i, 0], work.quat2[i, 1], work.quat2[i, 2], work.quat2[i, 3],
+            work.quat3[i, 0], work.quat3[i, 1], work.quat3[i, 2], work.quat3[i, 3],
+        )  # fmt: skip
+        work.turn[i, 0] = c
+        work.turn[i, 1] = x
+        work.turn[i, 2] = y
+        work.turn[i, 3] = z
+        inside = inside and c > 1e-3
+        tx, ty, tz = angular_momentum(work.inertia_world, i, h, c, x, y, z)
+        m = model.body_mass[i] / h
+        fx = m * (work.pos3[i, 0] - work.pos2[i, 0]) - work.momentum_in[i, 0]
+        fy = m * (work.pos3[i, 1] - work.pos2[i, 1]) - work.momentum_in[i, 1]
+        fz = m * (work.pos3[i, 2] - work.pos2[i, 2]) - work.momentum_in[i, 2]
+        dx, dy, dz = work.pos2[i, 0] - work.origin[0], work.pos2[i, 1] - work.origin[1], work.pos2[i, 2] - work.origin[2]
+        work.balance[i, 0] = fx
+        work.balance[i, 1] = fy
+        work.balance[i, 2] = fz
+        work.balance[i, 3] = tx - work.momentum_in[i, 3] + dy * fz - dz * fy
+        work.balance[i, 4] = ty - work.momentum_in[i, 4] + dz * fx - dx * fz
+        work.balance[i, 5] = tz - work.momentum_in[i, 5] + dx * fy - dy * fx
+    return inside
+
+
+@kernel
+def momentum_balance_jacobian(model: Model, work: Work, h: float, out: Matrix) -> None:
+    """out[i] = d(balance)/d(twist of configuration 3), about O, 6 x 6 row-major:
+
+    [ m/h I           -m/h [d3]             ]
+    [ m/h [d2]    dP/dphi - m/h [d2] [d3]   ]     d2, d3: from O to the centre of mass at 2 and 3
+    """
+    for i in range(model.body_parent.shape[0]):
+        J = angular_momentum_jacobian(
+            work.inertia_world, i, h, work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
+        )
+        m = model.body_mass[i] / h
+        o = work.origin
+        x2, y2, z2 = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        x3, y3, z3 = work.pos3[i, 0] - o[0], work.pos3[i, 1] - o[1], work.pos3[i, 2] - o[2]
+        A = out[i]
+        for k in range(3):
+            for j in range(3):
+                A[6 * k + j] = 0.0
+            A[7 * k] = m
+        A[3], A[4], A[5] = 0.0, m * z3, -m * y3
+        A[9], A[10], A[11] = -m * z3, 0.0, m * x3
+        A[15], A[16], A[17] = m * y3, -m * x3, 0.0
+        A[18], A[19], A[20] = 0.0, -m * z2, m * y2
+        A[24], A[25], A[26] = m * z2, 0.0, -m * x2
+        A[30], A[31], A[32] = -m * y2, m * x2, 0.0
+        # -[d2] [d3] = (d2.d3) I - d3 d2^T
+        s = x2 * x3 + y2 * y3 + z2 * z3
+        A[21], A[22], A[23] = J[0] + m * (s - x3 * x2), J[1] - m * x3 * y2, J[2] - m * x3 * z2
+        A[27], A[28], A[29] = J[3] - m * y3 * x2, J[4] + m * (s - y3 * y2), J[5] - m * y3 * z2
+        A[33], A[34], A[35] = J[6] - m * z3 * x2, J[7] - m * z3 * y2, J[8] + m * (s - z3 * z2)

@@ -1,0 +1,163 @@
+"""All contacts and limits of a step at once: what the interior point asks of them, one verb per kernel."""
+
+from __future__ import annotations
+
+from sim.contact import add_contact_matrix, add_contact_wrench, contact_jacobian, contact_kinematics
+from sim.elimination import subtree_sums
+from sim.friction import (
+    condense_contact,
+    contact_boundary,
+    contact_constant,
+    contact_error,
+    contact_impulse,
+    contact_products,
+    contact_products_ahead,
+    recover_contact,
+    start_contact,
+)
+from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits, start_limits
+from sim.model import Model, Work
+from solvers.cones import orthant_step
+from solvers.jit import kernel
+
+
+@kernel
+def inequality_kinematics(model: Model, work: Work, h: float) -> None:
+    """Gaps and slips of contacts and limits at configuration 3."""
+    contact_kinematics(model, work, h)
+    limit_gaps(model, work)
+
+
+@kernel
+def start_inequalities(model: Model, work: Work, kappa: float, floor: float) -> None:
+    """All cone variables on the central path of kappa at the present gaps and slips."""
+    for c in range(model.contact_body.shape[0]):
+        start_contact(model, work, c, kappa, floor)
+    start_limits(model, work, kappa, floor)
+
+
+@kernel
+def apply_inequalities(model: Model, work: Work) -> float:
+    """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
+    r = 0.0
+    for c in range(model.contact_body.shape[0]):
+        fn, f1, f2 = contact_impulse(model, work, c)
+        add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
+        r = max(r, contact_error(model, work, c))
+    for k in range(model.limit_dof.shape[0]):
+        r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
+    return r
+
+
+@kernel
+def apply_limits(model: Model, work: Work) -> None:
+    """residual -= sign gamma."""
+    for k in range(model.limit_dof.shape[0]):
+        work.residual[model.limit_dof[k]] -= model.limit_sign[k] * work.bound[k, 1]
+
+
+@kernel
+def condense_inequalities(model: Model, work: Work, h: float) -> None:
+    """A += contacts, joint_block += limits: their slacks and impulses eliminated."""
+    for c in range(model.contact_body.shape[0]):
+        contact_jacobian(model, work, h, c)
+        condense_contact(model, work, c)
+        fn, f1, f2 = contact_impulse(model, work, c)
+        add_contact_matrix(model, work, h, c, fn, f1, f2, work.A)
+    add_limit_blocks(model, work, h)
+
+
+@kernel
+def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool) -> None:
+    """dnu += S2^T B^T w + limits, for the target kappa."""
+    for i in range(work.wrench.shape[0]):
+        for k in range(6):
+            work.wrench[i, k] = 0.0
+    for c in range(model.contact_body.shape[0]):
+        contact_constant(model, work, c, kappa, corrected)
+        w = work.contact_w[c]
+        add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+    subtree_sums(model, work.wrench, work.subtree)
+    for d in range(work.dnu.shape[0]):
+        a = work.S2[d]
+        f = work.subtree[model.dof_body[d]]
+        work.dnu[d] -= a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
+    limit_constants(model, work, kappa, corrected)
+
+
+@kernel
+def recover_inequalities(model: Model, work: Work, h: float) -> None:
+    """Steps of all cone variables from the twists and rates of the last solve."""
+    for c in range(model.contact_body.shape[0]):
+        recover_contact(model, work, h, c)
+    recover_limits(model, work, h)
+
+
+@kernel
+def products(model: Model, work: Work) -> tuple[float, float, float]:
+    """(mean, low, high) of all complementarity products."""
+    total = 0.0
+    count = 0.0
+    low = 1e300
+    high = 0.0
+    for c in range(model.contact_body.shape[0]):
+        t, n, lo, hi = contact_products(model, work, c)
+        total += t
+        count += n
+        low = min(low, lo)
+        high = max(high, hi)
+    for k in range(model.limit_dof.shape[0]):
+        t = work.bound[k, 0] * work.bound[k, 1]
+        total += t
+        count += 1.0
+        low = min(low, t)
+        high = max(high, t)
+    return total / count, low, high
+
+
+@kernel
+def products_ahead(model: Model, work: Work, alpha: float) -> float:
+    """Sum of the complementarity products after a step of length alpha."""
+    total = 0.0
+    for c in range(model.contact_body.shape[0]):
+        total += contact_products_ahead(model, work, c, alpha)
+    for k in range(model.limit_dof.shape[0]):
+        b = work.bound[k]
+        d = work.bound_step[k]
+        total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
+    return total
+
+
+@kernel
+def boundary_step(model: Model, work: Work) -> float:
+    """Largest step that keeps every cone variable in its cone, or 1e30."""
+    a = 1e30
+    for c in range(model.contact_body.shape[0]):
+        a = min(a, contact_boundary(model, work, c))
+    for k in range(model.limit_dof.shape[0]):
+        b = work.bound[k]
+        d = work.bound_step[k]
+        a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
+    return a
+
+
+@kernel
+def keep_inequalities(model: Model, work: Work) -> None:
+    """Remember the cone variables from which the line search starts."""
+    for c in range(model.contact_body.shape[0]):
+        for k in range(12):
+            work.cone_trial[c, k] = work.cone[c, k]
+    for k in range(model.limit_dof.shape[0]):
+        work.bound_trial[k, 0] = work.bound[k, 0]
+        work.bound_trial[k, 1] = work.bound[k, 1]
+
+
+@kernel
+def move_inequalities(model: Model, work: Work, alpha: float) -> None:
+    """cone = kept + alpha step."""
+    for c in range(model.contact_body.shape[0]):
+        for k in range(12):
+            work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
+    for k in range(model.limit_dof.shape[0]):
+        work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
+        work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]

@@ -1,0 +1,40 @@
+"""Status: why a computation ended, and one sentence for each reason."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+__all__ = ["MESSAGES", "Status"]
+
+
+class Status(IntEnum):
+    """Exit of a time step (below 10) or of the planner (10 and above); `IntEnum`, so kernels return it."""
+
+    SOLVED = 0
+    MAX_ITERATIONS = 1
+    NO_PROGRESS = 2
+    NOT_FINITE = 3
+    SINGULAR = 4
+    ANGULAR_STEP = 5
+    MAX_REGULARIZATION = 10
+    LINE_SEARCH = 11
+    TIME_LIMIT = 12
+    SIMULATION_FAILED = 13
+    INFEASIBLE = 14
+    STOPPED = 15
+
+
+MESSAGES: dict[Status, str] = {
+    Status.SOLVED: "Solved to the requested tolerance.",
+    Status.MAX_ITERATIONS: "The iteration limit was reached before the tolerance.",
+    Status.NO_PROGRESS: "The line search of the time step failed before the tolerance was reached.",
+    Status.NOT_FINITE: "A number that is not finite appeared.",
+    Status.SINGULAR: "A matrix was singular, or not positive definite where it has to be.",
+    Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
+    Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
+    Status.LINE_SEARCH: "No step size of the line search improves the plan.",
+    Status.TIME_LIMIT: "The time budget is used up.",
+    Status.SIMULATION_FAILED: "The simulator could not step along the first trajectory.",
+    Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
+    Status.STOPPED: "The callback stopped the solver.",
+}
