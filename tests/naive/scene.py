@@ -134,27 +134,49 @@ def advance(scene: Scene, q: Array, v: Array, h: float) -> Array:
     return np.concatenate(out)
 
 
-def from_model(model: Any) -> Scene:
-    """The scene of a `sim.model.Model`."""
-    bodies = [Body(float(m), J.reshape(3, 3)) for m, J in zip(model.body_mass, model.body_inertia, strict=True)]
-    joints = []
-    for i in range(len(bodies)):
-        nt, dofs = int(model.joint_ntrans[i]), slice(model.body_vadr[i], model.body_vadr[i + 1])
-        joints.append(
-            Joint(
-                int(model.body_parent[i]), model.joint_trans_axes[i].reshape(3, 3)[:nt], int(model.joint_nrot[i]),
-                model.joint_axis[i], model.joint_parent_point[i], model.joint_child_point[i], model.joint_offset[i],
-                model.dof_spring[dofs], model.dof_damper[dofs], model.dof_rest[dofs],
-            )
-        )  # fmt: skip
+def translation_axes(joint: Any) -> Array:
+    """Free translations in the joint frame: along the axis, across it (x, y, z without the one nearest to it), or all."""
+    if joint.ntrans != 2:
+        return np.array([joint.axis]) if joint.ntrans == 1 else np.eye(3)[: joint.ntrans]
+    axis, rows = np.asarray(joint.axis), []
+    for e in np.delete(np.eye(3), np.argmax(np.abs(axis)), axis=0):
+        across = e - axis * (axis @ e) - sum((row * (row @ e) for row in rows), np.zeros(3))
+        rows.append(across / np.linalg.norm(across))
+    return np.array(rows)
+
+
+def contact_frame(normal: Any) -> Array:
+    """Normal, a tangent along x (along y for a normal near x), and normal cross tangent."""
+    n = np.asarray(normal)
+    along = np.eye(3)[0 if abs(n[0]) < 0.9 else 1]
+    t = along - n * (n @ along)
+    t /= np.linalg.norm(t)
+    return np.array([n, t, rot.cross(n, t)])
+
+
+def from_mechanism(mech: Any) -> Scene:
+    """The scene of a `dojo_opt.Mechanism`, from what its parts say about themselves."""
+    names = [body.name for body in mech.bodies]
+    bodies = [Body(body.mass, np.array(body.inertia)) for body in mech.bodies]
+    joints, limits, dof = [], [], {}
+    for j in mech.joints:
+        parent = names.index(j.parent) if j.parent in names else -1
+        dof[j.name] = sum(other.nv for other in joints)
+        points = (np.array(j.parent_point), np.array(j.child_point), np.array(j.orientation))
+        joints.append(Joint(parent, translation_axes(j), j.nrot, np.array(j.axis), *points,
+                            *(np.array(value) for value in (j.spring, j.damper, j.rest))))  # fmt: skip
+        for k, bounds in enumerate(j.limits):
+            limits += [Limit(dof[j.name] + k, s, b) for s, b in zip((1.0, -1.0), bounds, strict=True) if np.isfinite(b)]
+    laws = {"impact": IMPACT, "linear": LINEAR, "nonlinear": NONLINEAR}
     contacts = [
-        Contact(int(model.contact_body[c]), model.contact_point[c], float(model.contact_radius[c]),
-                float(model.contact_friction[c]), int(model.contact_law[c]), model.contact_frame[c].reshape(3, 3),
-                float(model.contact_height[c]))
-        for c in range(len(model.contact_body))
-    ]  # fmt: skip
-    limits = [Limit(int(d), float(s), float(b))
-              for d, s, b in zip(model.limit_dof, model.limit_sign, model.limit_bound, strict=True)]  # fmt: skip
-    inputs = [Input(int(k), int(i), w)
-              for k, i, w in zip(model.input_kind, model.input_index, model.input_wrench, strict=True)]  # fmt: skip
-    return Scene(bodies, joints, contacts, limits, inputs, np.array(model.gravity))
+        Contact(names.index(c.body), np.array(c.point), c.radius, c.friction, laws[c.law], contact_frame(c.normal), c.height)
+        for c in mech.contacts
+    ]
+    inputs = []
+    for part in mech.inputs:
+        if part.joint is not None:
+            inputs.append(Input(JOINT, dof[part.joint] + part.dof))
+        else:
+            wrench = np.concatenate((part.force, part.torque))
+            inputs.append(Input(WORLD if part.frame == "world" else BODY, names.index(part.body), wrench))
+    return Scene(bodies, joints, contacts, limits, inputs, np.array(mech.gravity))
