@@ -19,13 +19,22 @@ from typing import TYPE_CHECKING, Any
 
 __all__ = [
     "Body",
+    "Box",
+    "Capsule",
     "Contact",
+    "Cylinder",
+    "Input",
     "Joint",
+    "Linearization",
     "Mechanism",
+    "Plan",
     "Problem",
+    "SimulationError",
     "Simulator",
+    "Sphere",
     "Status",
     "Trajectory",
+    "constraint",
     "cost",
     "ilqr",
     "models",
@@ -36,16 +45,25 @@ __all__ = [
 
 # public name -> module that defines it; a name mapped to None is itself a module of dojo_opt
 _HOME: dict[str, str | None] = {
-    "Body": "sim.mechanism",
-    "Contact": "sim.mechanism",
-    "Joint": "sim.mechanism",
+    "Body": "sim.parts",
+    "Box": "sim.shapes",
+    "Capsule": "sim.shapes",
+    "Contact": "sim.parts",
+    "Cylinder": "sim.shapes",
+    "Input": "sim.parts",
+    "Joint": "sim.parts",
+    "Linearization": "sim.results",
     "Mechanism": "sim.mechanism",
+    "Plan": "dojo_opt.plan",
     "Problem": "dojo_opt.problem",
+    "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
+    "Sphere": "sim.shapes",
     "Status": "solvers.status",
-    "Trajectory": "sim.simulator",
+    "Trajectory": "sim.results",
+    "constraint": None,
     "cost": None,
-    "ilqr": "dojo_opt.ilqr",
+    "ilqr": "dojo_opt.planner",
     "models": None,
     "plots": None,
     "problems": None,
@@ -53,11 +71,15 @@ _HOME: dict[str, str | None] = {
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import cost, models, plots, problems, viewer
-    from dojo_opt.ilqr import ilqr
+    from dojo_opt import constraint, cost, models, plots, problems, viewer
+    from dojo_opt.plan import Plan
+    from dojo_opt.planner import ilqr
     from dojo_opt.problem import Problem
-    from sim.mechanism import Body, Contact, Joint, Mechanism
-    from sim.simulator import Simulator, Trajectory
+    from sim.mechanism import Mechanism
+    from sim.parts import Body, Contact, Input, Joint
+    from sim.results import Linearization, SimulationError, Trajectory
+    from sim.shapes import Box, Capsule, Cylinder, Sphere
+    from sim.simulator import Simulator
     from solvers.status import Status
 
 

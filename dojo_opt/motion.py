@@ -26,7 +26,8 @@ class Motion:
     position: Array  # (T + 1, nbody, 3) [m]
     quaternion: Array  # (T + 1, nbody, 4)
     contact_time: Array  # (N,) end of each simulation step [s]
-    contact_force: Array  # (N, ncontact, 3) mean over the step: normal, and two tangents [N]
+    normal_force: Array  # (N, ncontact) mean over the step [N]
+    friction_force: Array  # (N, ncontact) likewise, its size
 
     def points(self, body: int, point: Any) -> Array:
         """Path (T + 1, 3) of a point given in the axes of a body, from its centre of mass [m]."""
@@ -44,8 +45,8 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         raise ValueError(f"motion(simulator=...): this {type(result).__name__} does not know its simulator; give it")
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     substeps = getattr(result, "substeps", 1)
-    z = np.array([sim.maximal(row) for row in x])
-    force = _contact_forces(sim, x, u, substeps)
+    normal, friction = _contact_forces(sim, x, u, substeps)
+    z = sim.maximal(x)
     return Motion(
         mechanism=sim.mechanism,
         time=sim.time_step * substeps * np.arange(len(x)),
@@ -53,18 +54,13 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         u=u,
         position=z[:, :, 0:3],
         quaternion=z[:, :, 6:10],
-        contact_time=sim.time_step * np.arange(1, len(force) + 1),
-        contact_force=force,
+        contact_time=sim.time_step * np.arange(1, len(normal) + 1),
+        normal_force=normal,
+        friction_force=friction,
     )
 
 
-def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> Array:
-    """Mean contact forces of every simulation step; a knot spans `substeps` of them."""
-    forces = np.zeros((len(u) * substeps, sim.ncontact, 3))
-    for knot in range(len(u)):
-        now = x[knot]
-        for k in range(substeps):
-            step = sim.step(now, u[knot])
-            now = step.x
-            forces[knot * substeps + k] = step.contacts.force
-    return forces
+def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, Array]:
+    """Mean normal and friction force of every simulation step; a knot spans `substeps` of them."""
+    knots = [sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts for t in range(len(u))]
+    return np.concatenate([c.normal_force for c in knots]), np.concatenate([c.friction_force for c in knots])

@@ -67,9 +67,15 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
     """Normal force of every contact, mean over each step, and the size of its friction force, dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
     for k, name in enumerate(m.mechanism.contact_names):
-        line = ax.stairs(m.contact_force[:, k, 0], edges, baseline=None, label=f"{name}, normal")
-        friction = np.hypot(m.contact_force[:, k, 1], m.contact_force[:, k, 2])
-        ax.stairs(friction, edges, baseline=None, linestyle="--", color=line.get_edgecolor(), label=f"{name}, friction")
+        line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=f"{name}, normal")
+        ax.stairs(
+            m.friction_force[:, k],
+            edges,
+            baseline=None,
+            linestyle="--",
+            color=line.get_edgecolor(),
+            label=f"{name}, friction",
+        )
     if not m.mechanism.contacts:
         ax.text(0.5, 0.5, "no contacts", ha="center", va="center", transform=ax.transAxes)
     return _finish(ax, "contact forces [N]", "time [s]")
