@@ -237,7 +237,7 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float) -> None:
 
 
 @kernel
-def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: bool) -> None:
+def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: bool, reduce: float) -> None:
     """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the target kappa.
 
     `corrected` subtracts the second-order term of the affine step now in cone_step (Mehrotra).
@@ -251,7 +251,7 @@ def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: 
     r = kappa - z[0] * z[1]
     if corrected:
         r -= d[0] * d[1]
-    g0 = (r - z[1] * (k[0] - z[0])) / z[0]
+    g0 = (r - z[1] * reduce * (k[0] - z[0])) / z[0]
     w[0] = g0
     w[1] = 0.0
     w[2] = 0.0
@@ -266,19 +266,19 @@ def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: 
             r = kappa - z[4 + e] * z[8 + e]
             if corrected:
                 r -= d[4 + e] * d[8 + e]
-            q[8 + e] = (r - z[4 + e] * (direction(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
+            q[8 + e] = (r - z[4 + e] * reduce * (direction(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
             total += q[8 + e]
         r = kappa - z[2] * z[3]
         if corrected:
             r -= d[2] * d[3]
-        q[7] = (r + z[2] * (total - _cap_error(model, work, c))) * q[6]
+        q[7] = (r + z[2] * (total - reduce * _cap_error(model, work, c))) * q[6]
         p = q[7] - z[2] * q[6] * mu * g0
         w[1] = q[8] - q[9] - q[4] * p
         w[2] = q[10] - q[11] - q[5] * p
 
 
 @kernel
-def recover_contact(model: Model, work: Work, h: float, c: int) -> None:
+def recover_contact(model: Model, work: Work, h: float, c: int, reduce: float) -> None:
     """cone_step of contact c from the body twists of the last solve."""
     z = work.cone[c]
     d = work.cone_step[c]
@@ -287,7 +287,7 @@ def recover_contact(model: Model, work: Work, h: float, c: int) -> None:
     w = work.contact_w[c]
     q = work.contact_scale[c]
     a, x, y = contact_rate(model, work, h, c)
-    d[0] = a + k[0] - z[0]
+    d[0] = a + reduce * (k[0] - z[0])
     d[1] = W[0] * a + w[0]
     law = law_of(model, c)
     mu = model.contact_friction[c]
@@ -301,6 +301,6 @@ def recover_contact(model: Model, work: Work, h: float, c: int) -> None:
         for e in range(4):
             t = direction(e, x, y) + p
             d[4 + e] = q[8 + e] - q[e] * t
-            d[8 + e] = t + direction(e, k[1], k[2]) + z[2] - z[8 + e]
+            d[8 + e] = t + reduce * (direction(e, k[1], k[2]) + z[2] - z[8 + e])
             total += d[4 + e]
-        d[3] = mu * d[1] - total + _cap_error(model, work, c)
+        d[3] = mu * d[1] - total + reduce * _cap_error(model, work, c)

@@ -60,7 +60,7 @@ WORK_STEP_FIELDS = _shapes(
 WORK_DERIVATIVE_FIELDS = _shapes(
     """
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody 2nv+nu
+    panel 6nbody+6 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx
     """
 )
 
@@ -90,8 +90,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
-        "6nbody": 6 * sizes.nbody,
+        "6nbody+6": 6 * sizes.nbody + 6,
         "2nv+nu": 2 * sizes.nv + sizes.nu,
+        "2nv": 2 * sizes.nv,
+        "nx": sizes.nq + sizes.nv,
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols
@@ -265,4 +267,8 @@ def work_view(work: Vector, ints: Integers) -> Work:
         dR_dv=_matrix(work, ints, _W.dR_dv)[0],
         columns=_matrix(work, ints, _W.columns)[0],
         panel=_matrix(work, ints, _W.panel)[0],
+        step_A=_matrix(work, ints, _W.step_A)[0],
+        step_B=_matrix(work, ints, _W.step_B)[0],
+        chain=_matrix(work, ints, _W.chain)[0],
+        step_x=_matrix(work, ints, _W.step_x)[0],
     )
