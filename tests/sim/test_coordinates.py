@@ -12,7 +12,7 @@ from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
 from sim.layout import work_size
 from sim.mechanism import Mechanism
 from sim.state import integrate_states, state_differences
-from tests.sim.mechanisms import CASES, chain_with, random_state
+from mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 H = 0.05

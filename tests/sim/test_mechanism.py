@@ -14,7 +14,7 @@ from sim.mechanism import Mechanism
 from sim.model import InputKind, Law
 from sim.parts import KINDS, Body, Contact, Input, Joint
 from sim.shapes import Box, Sphere
-from tests.sim.mechanisms import CASES, chain_with
+from mechanisms import CASES, chain_with
 
 BALL = Sphere(0.1)
 INF = float("inf")
