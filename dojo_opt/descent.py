@@ -17,7 +17,7 @@ from solvers.status import Status
 Matrix = NDArray[np.float64]
 
 _FACTOR = 2.0  # of the regularisation schedule, growing geometrically with repeated use: Tassa 2012, section II.F
-_USEFUL = 1e-2  # a raise starts here: below this share of the control weight, regularisation changes nothing visible
+_USEFUL = 1e-2  # a raise starts here and a lowering below it switches off: less changes nothing visible
 
 
 class Descent:
@@ -92,8 +92,6 @@ class Descent:
         self.mu = min(max(_USEFUL, self.mu * self._growth), self._options.regularization_max)
 
     def lower_regularization(self) -> None:
-        """After a good step: faster with every good step in a row, and off below its smallest value."""
+        """After a good step: faster with every good step in a row."""
         self._growth = min(1.0 / _FACTOR, self._growth / _FACTOR)
-        self.mu = self.mu * self._growth
-        if self.mu < self._options.regularization:
-            self.mu = self._options.regularization
+        self.mu = self.mu * self._growth if self.mu * self._growth >= _USEFUL else 0.0

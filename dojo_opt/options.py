@@ -41,7 +41,7 @@ class Options:
     penalty_growth: float = 10.0
     penalty_max: float = 1e8
     sufficient: float = 0.25  # the penalty of an entry grows when its violation fell to more than this share
-    regularization: float = 1e-6  # first and smallest; in units of the mean control weight
+    regularization: float = 0.0  # first; in units of the mean control weight
     regularization_max: float = 1e6
     value_regularization: float = 0.0  # share of the regularisation that goes to V_xx, in units of 1
     armijo: float = 1e-2  # share of the predicted decrease that a step has to bring
