@@ -243,19 +243,20 @@ class Simulator:
             u_t     = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t))
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
-        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper) as wide as u.
+        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
+        of u.
         It stops at the first knot that cannot be solved.
         """
         call = "closed_loop"
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
-        name, T = f"Simulator.{call}", len(inputs)
+        name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
         knot, x_out, u_out, report = self._calls.closed_loop(
             state,
             inputs,
-            self._border.policy(name, T, xs, ks, Ks, gaps),
+            self._border.policy(name, state, len(inputs), (xs, ks, Ks, gaps)),
             factor,
-            self._border.limits(name, limits, T),
+            self._border.limits(name, limits),
             whole(f"{name}(substeps=...)", substeps),
             self._border.kappa(call, kappa),
         )

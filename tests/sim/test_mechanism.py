@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mechanisms import CASES, chain_with
 
 from sim.build import contact_frame, mechanism_sizes, pack, translation_axes
 from sim.layout import read_model
@@ -14,7 +15,6 @@ from sim.mechanism import Mechanism
 from sim.model import InputKind, Law
 from sim.parts import KINDS, Body, Contact, Input, Joint
 from sim.shapes import Box, Sphere
-from mechanisms import CASES, chain_with
 
 BALL = Sphere(0.1)
 INF = float("inf")
