@@ -131,7 +131,7 @@ class Border:
 
 def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """`value` as a finite array that ends in `shape`, with any leading axes."""
-    ndim = np.ndim(value)  # type: ignore[arg-type]
+    ndim = np.ndim(value)
     lead = (None,) * max(0, ndim - len(shape))
     try:
         return checks.array(call, value, (*lead, *shape))
@@ -139,7 +139,7 @@ def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         text = str(error)
         if ndim > len(shape) and "expected shape" in text:
             tail = ", ".join(map(str, shape))
-            text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"  # type: ignore[arg-type]
+            text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"
         raise ValueError(text) from None
 
 

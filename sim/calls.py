@@ -54,14 +54,14 @@ class Calls:
         """This thread's buffer."""
         if not hasattr(self._scratch, "one"):
             self._scratch.one = np.zeros(work_size(self.ints))
-        return self._scratch.one  # type: ignore[no-any-return]
+        return self._scratch.one
 
     def _works(self, count: int) -> Floats:
         """This thread's buffers for a parallel call, one per chunk."""
         chunks = max(1, min(count, _CHUNKS * (os.cpu_count() or 1)))
         if not hasattr(self._scratch, "many") or len(self._scratch.many) < chunks:
             self._scratch.many = np.zeros((chunks, work_size(self.ints)))
-        return self._scratch.many[:chunks]  # type: ignore[no-any-return]
+        return self._scratch.many[:chunks]
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """(number of solved steps, states, report of every step, contacts of every step)."""
@@ -72,6 +72,7 @@ class Calls:
         knot = rollout.roll(
             self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard
         )
+        np.nan_to_num(reports, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
 
     def closed_loop(
@@ -103,6 +104,7 @@ class Calls:
             report,
             self.hard,
         )
+        np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, u_out, report
 
     def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
