@@ -73,35 +73,27 @@ class Border:
         return None if kappa is None else checks.number(f"Simulator.{method}(kappa=...)", kappa, above=0.0)
 
     def policy(
-        self,
-        call: str,
-        knots: int,
-        xs: ArrayLike | None,
-        ks: ArrayLike | None,
-        Ks: ArrayLike | None,
-        gaps: ArrayLike | None,
+        self, call: str, start: Floats, knots: int, parts: tuple[ArrayLike | None, ...]
     ) -> tuple[Floats, Floats, Floats, Floats]:
-        """States, feedforward, gains and gaps of a policy; without rows where they are left out."""
-        if Ks is not None and xs is None:
-            raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
-
-        def part(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
-            return np.zeros((0, *shape[1:])) if value is None else checks.array(f"{call}({name}=...)", value, shape)
-
+        """(xs, ks, Ks, gaps) of a policy; zero where left out, and the states then `start` throughout."""
         ndx = self._calls.ndx
-        return (
-            part("xs", xs, (knots + 1, self.nx)),
-            part("ks", ks, (knots, self.nu)),
-            part("Ks", Ks, (knots, self.nu, ndx)),
-            part("gaps", gaps, (knots + 1, ndx)),
+        shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
+        xs, ks, Ks, gaps = (
+            np.zeros(shape) if part is None else checks.array(f"{call}({name}=...)", part, shape)
+            for name, part, shape in zip(("xs", "ks", "Ks", "gaps"), parts, shapes, strict=True)
         )
+        if parts[0] is None:
+            if parts[2] is not None:
+                raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
+            xs[:] = start
+        return self.states(f"{call}(xs=...)", xs), ks, Ks, gaps
 
-    def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None, knots: int) -> tuple[Floats, Floats]:
-        """(lower, upper) for every knot, (T, nu); without rows when there are none. Infinite bounds are allowed."""
+    def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
+        """(lower, upper) of every input, infinite where free."""
         if limits is None:
-            return np.zeros((0, self.nu)), np.zeros((0, self.nu))
+            return np.full(self.nu, -np.inf), np.full(self.nu, np.inf)
         try:
-            lo, hi = (np.array(np.broadcast_to(np.asarray(b, dtype=np.float64), (knots, self.nu))) for b in limits)
+            lo, hi = (np.array(np.broadcast_to(np.asarray(b, dtype=np.float64), (self.nu,))) for b in limits)
         except (TypeError, ValueError):
             raise ValueError(f"{call}(limits=...): expected (lower, upper), each as wide as u ({self.nu})") from None
         if not np.all(lo <= hi):
@@ -139,7 +131,7 @@ class Border:
 
 def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """`value` as a finite array that ends in `shape`, with any leading axes."""
-    ndim = np.ndim(value)  # type: ignore[arg-type]
+    ndim = np.ndim(value)
     lead = (None,) * max(0, ndim - len(shape))
     try:
         return checks.array(call, value, (*lead, *shape))
@@ -147,7 +139,7 @@ def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         text = str(error)
         if ndim > len(shape) and "expected shape" in text:
             tail = ", ".join(map(str, shape))
-            text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"  # type: ignore[arg-type]
+            text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"
         raise ValueError(text) from None
 
 

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
-from sim.layout import NCONTACT, NQ, NU, NV, work_size
+from sim.layout import NCONTACT, NLIMIT, NQ, NU, NV, work_size
 from sim.model import Integers, Vector
+from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
@@ -46,20 +47,21 @@ class Calls:
         self.floats, self.ints, self.settings = floats, ints, settings
         self.nx, self.ndx = int(ints[NQ] + ints[NV]), 2 * int(ints[NV])
         self.nu, self.ncontact = int(ints[NU]), int(ints[NCONTACT])
+        self.hard = 1 if ints[NCONTACT] + ints[NLIMIT] else None  # None: the interior point is not compiled
         self._scratch = threading.local()
 
     def _work(self) -> Vector:
         """This thread's buffer."""
         if not hasattr(self._scratch, "one"):
             self._scratch.one = np.zeros(work_size(self.ints))
-        return self._scratch.one  # type: ignore[no-any-return]
+        return self._scratch.one
 
     def _works(self, count: int) -> Floats:
         """This thread's buffers for a parallel call, one per chunk."""
         chunks = max(1, min(count, _CHUNKS * (os.cpu_count() or 1)))
         if not hasattr(self._scratch, "many") or len(self._scratch.many) < chunks:
             self._scratch.many = np.zeros((chunks, work_size(self.ints)))
-        return self._scratch.many[:chunks]  # type: ignore[no-any-return]
+        return self._scratch.many[:chunks]
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """(number of solved steps, states, report of every step, contacts of every step)."""
@@ -67,7 +69,10 @@ class Calls:
         xs = np.zeros((steps + 1, self.nx))
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.ncontact, CONTACT))
-        knot = rollout.roll(self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts)
+        knot = rollout.roll(
+            self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard
+        )
+        np.nan_to_num(reports, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
 
     def closed_loop(
@@ -84,8 +89,22 @@ class Calls:
         xs, u_out, report = np.zeros((len(us) + 1, self.nx)), np.zeros((len(us), self.nu)), np.zeros(REPORT)
         settings = self.settings.array(kappa)
         knot = rollout.closed_loop(
-            self.floats, self.ints, self._work(), settings, x, us, policy, alpha, limits, substeps, xs, u_out, report
+            self.floats,
+            self.ints,
+            self._work(),
+            settings,
+            x,
+            us,
+            policy,
+            alpha,
+            limits,
+            substeps,
+            xs,
+            u_out,
+            report,
+            self.hard,
         )
+        np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, u_out, report
 
     def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
@@ -94,7 +113,12 @@ class Calls:
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         settings, works = self.settings.array(kappa), self._works(n)
-        rollout.linearize_knots(self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports)
+        rollout.linearize_knots(
+            self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports, self.hard
+        )
+        unsolved = reports[:, 0] != Status.SOLVED
+        for out in (A, B, x_next):
+            out[unsolved] = 0.0
         return A, B, x_next, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
@@ -102,7 +126,7 @@ class Calls:
         A, B = np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu))
         x_next, report = np.zeros(self.nx), np.zeros(REPORT)
         settings = self.settings.array(kappa)
-        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report)
+        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard)
         return A, B, x_next, report
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
@@ -111,7 +135,7 @@ class Calls:
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         settings, works = self.settings.array(), self._works(n)
-        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots)
+        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots, self.hard)
         return xs, status, knots
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:

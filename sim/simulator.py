@@ -1,4 +1,4 @@
-"""Simulator: one mechanism with a time step; steps, derivatives, rollouts, and other views of a state."""
+"""Simulator: one mechanism with a time step; its steps, rollouts and derivatives."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.border import Border, shaped, whole
-from sim.build import mechanism_sizes, pack
-from sim.calls import Calls, Settings
+from sim.border import whole
+from sim.calls import Settings
 from sim.describe import describe
 from sim.mechanism import Mechanism, with_contacts
-from sim.results import Batch, Linearization, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
+from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
+from sim.states import States
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations")
 
 
-class Simulator:
+class Simulator(States):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
     kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
@@ -45,22 +45,15 @@ class Simulator:
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
         if not isinstance(max_iterations, int | np.integer) or max_iterations < 1:
             raise ValueError(f"Simulator(max_iterations=...): expected a whole number >= 1, got {max_iterations!r}")
-        self.mechanism = mechanism
-        self.time_step = checks.number("Simulator(time_step=...)", time_step, above=0.0)
-        self.kappa = checks.number("Simulator(kappa=...)", kappa, above=0.0)
-        self.tolerance = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
-        self.max_iterations = int(max_iterations)
-        self.model_floats, self.model_ints = pack(mechanism)
-        self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
-        self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        settings = Settings(self.time_step, self.kappa, self.tolerance, self.max_iterations)
-        self._calls = Calls(self.model_floats, self.model_ints, settings)
-        self._border = Border(mechanism, self._calls)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if hasattr(self, "_border"):
-            raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
-        super().__setattr__(name, value)
+        super().__init__(
+            mechanism,
+            Settings(
+                checks.number("Simulator(time_step=...)", time_step, above=0.0),
+                checks.number("Simulator(kappa=...)", kappa, above=0.0),
+                checks.number("Simulator(tolerance=...)", tolerance, above=0.0),
+                int(max_iterations),
+            ),
+        )
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._calls.settings)
@@ -88,87 +81,6 @@ class Simulator:
     def describe(self) -> str:
         """What the scene consists of, what a step computes, and what is left out because nothing needs it."""
         return describe(self)
-
-    # ---- states
-
-    def neutral(self) -> Floats:
-        """The standing or hanging state of the mechanism, at rest."""
-        return np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
-
-    def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """State with coordinates q (nq,) whose velocity at the node is v (nv,).
-
-        The velocity of a state is the mean one of the interval before it; this one has the momentum M(q) v at its end,
-        so that a simulation started with it is right to second order from its first step.
-        """
-        q0 = checks.array("Simulator.start(q)", q, (self.nq,))
-        v0 = checks.array("Simulator.start(v)", v, (self.nv,))
-        q0 = self._border.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
-        status, x = self._calls.start(q0, v0)
-        if status != Status.SOLVED:
-            reason = Status(status)
-            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
-        return x
-
-    def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
-        """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
-        xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
-        return self._calls.integrate(xs, dxs).reshape(*lead, self.nx)
-
-    def difference(self, x0: ArrayLike, x1: ArrayLike) -> Floats:
-        """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
-        x0s, x1s, lead = self._border.paired("difference", ("x0", x0, self.nx), ("x1", x1, self.nx))
-        return self._calls.difference(x0s, x1s).reshape(*lead, self.ndx)
-
-    def maximal(self, x: ArrayLike) -> Floats:
-        """z (nbody, 13) per body [position, velocity (world), quaternion, omega (body)]; leading axes allowed."""
-        xs, lead = self._border.stacked("maximal", "x", x)
-        return self._calls.maximal(xs, self.nbody).reshape(*lead, self.nbody, 13)
-
-    def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
-        """The state x with maximal(x) = z; leading axes allowed.
-
-        A z that is off its joints by more than `joint_tolerance` [m, rad] at either end of its interval is refused;
-        with infinity, the nearest motion along the joints is returned.
-        """
-        zs = np.array(shaped("Simulator.minimal(z)", z, (self.nbody, 13)))
-        lead = zs.shape[:-2]
-        zs = zs.reshape(-1, self.nbody, 13)
-        self._border.check_maximal(zs)
-        xs = self._calls.minimal(zs)
-        if joint_tolerance < np.inf:
-            self._border.check_joints(zs, self._calls.maximal(xs, self.nbody), joint_tolerance)
-        return xs.reshape(*lead, self.nx)
-
-    def maximal_jacobian(self, x: ArrayLike) -> Floats:
-        """dz/dx (12 nbody, ndx), per body [position, velocity, rotation, omega], in tangent coordinates."""
-        return self._calls.maximal_jacobian(self._border.state("maximal_jacobian", x), self.nbody)
-
-    def minimal_jacobian(self, z: ArrayLike) -> Floats:
-        """dx/dz (ndx, 12 nbody), the inverse of `maximal_jacobian` along the joints."""
-        zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
-        self._border.check_maximal(zs[None])
-        return self._calls.minimal_jacobian(zs)
-
-    def energy(self, x: ArrayLike) -> Any:
-        """Kinetic and potential energy at the node [J]; leading axes allowed."""
-        xs, lead = self._border.stacked("energy", "x", x)
-        total = self._calls.energies(xs).sum(axis=1).reshape(lead)
-        return total if lead else float(total)
-
-    def kinetic_energy(self, x: ArrayLike) -> Any:
-        """Kinetic energy at the node [J]; leading axes allowed."""
-        xs, lead = self._border.stacked("kinetic_energy", "x", x)
-        kinetic = self._calls.energies(xs)[:, 0].reshape(lead)
-        return kinetic if lead else float(kinetic)
-
-    def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
-        """(linear [N s], angular about the world's origin [N m s]) momentum at the node; leading axes allowed."""
-        xs, lead = self._border.stacked("momentum", "x", x)
-        p = self._calls.momenta(xs).reshape(*lead, 6)
-        return p[..., :3].copy(), p[..., 3:].copy()
-
-    # ---- motion
 
     def step(self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False) -> StepResult:
         """One time step from x under the input u (zero when left out)."""
@@ -243,19 +155,20 @@ class Simulator:
             u_t     = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t))
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
-        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper) as wide as u.
+        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
+        of u.
         It stops at the first knot that cannot be solved.
         """
         call = "closed_loop"
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
-        name, T = f"Simulator.{call}", len(inputs)
+        name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
         knot, x_out, u_out, report = self._calls.closed_loop(
             state,
             inputs,
-            self._border.policy(name, T, xs, ks, Ks, gaps),
+            self._border.policy(name, state, len(inputs), (xs, ks, Ks, gaps)),
             factor,
-            self._border.limits(name, limits, T),
+            self._border.limits(name, limits),
             whole(f"{name}(substeps=...)", substeps),
             self._border.kappa(call, kappa),
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from dojo_opt import models
@@ -13,7 +14,6 @@ from sim.energy import energies, momenta
 from sim.layout import work_size
 from sim.mechanism import Mechanism
 from sim.shapes import rotation_matrix
-from mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 

@@ -215,3 +215,37 @@ def test_batch_equals_single_rollouts() -> None:
     assert np.all(batch.status == 0) and np.all(batch.knot == 5)
     for k in range(6):
         np.testing.assert_array_equal(batch.x[k], PENDULUM.rollout(x0s[k], us[k]).x)
+
+
+def test_linearize_against_differences() -> None:
+    x, u = np.array([1.0, -0.5, 2.0, -1.0]), np.array([0.3, -0.2])
+    A, B = PENDULUM.replace(tolerance=1e-12).linearize(x, u)
+    e = 1e-6
+    for k, d in enumerate(e * np.eye(4)):
+        np.testing.assert_allclose(
+            A[:, k], (PENDULUM.step(x + d, u).x - PENDULUM.step(x - d, u).x) / (2 * e), atol=1e-6
+        )
+    for k, d in enumerate(e * np.eye(2)):
+        np.testing.assert_allclose(
+            B[:, k], (PENDULUM.step(x, u + d).x - PENDULUM.step(x, u - d).x) / (2 * e), atol=1e-6
+        )
+    knots = PENDULUM.linearize_trajectory([x] * 3, [u] * 2, substeps=2)
+    A2, B2 = PENDULUM.linearize(PENDULUM.step(x, u).x, u)
+    np.testing.assert_allclose(knots.A[1], A2 @ A, atol=1e-7)
+    np.testing.assert_allclose(knots.B[1], A2 @ B + B2, atol=1e-7)
+    np.testing.assert_array_equal(knots.x_next[0], PENDULUM.rollout(x, [u] * 2).x[-1])
+
+
+def test_closed_loop_follows_its_policy() -> None:
+    rng = np.random.default_rng(3)
+    x0, us, xs = rng.normal(size=4), rng.normal(size=(3, 2)), rng.normal(size=(4, 4))
+    ks, Ks, gaps = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 4)), rng.normal(size=(4, 4))
+    shot = PENDULUM.closed_loop(x0, us, xs, ks, Ks, gaps, alpha=0.25, limits=(-1.0, [0.5, np.inf]), substeps=2)
+    x = x0
+    for t in range(3):
+        u = np.clip(us[t] + 0.25 * ks[t] + Ks[t] @ (x - xs[t]), -1.0, [0.5, np.inf])
+        np.testing.assert_allclose(shot.u[t], u, rtol=1e-12)
+        x = PENDULUM.rollout(x, [u, u]).x[-1] - 0.75 * gaps[t + 1]
+        np.testing.assert_allclose(shot.x[t + 1], x, atol=1e-12)
+    assert (shot.status, shot.knot) == (Status.SOLVED, 3)
+    np.testing.assert_array_equal(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x)
