@@ -1,6 +1,7 @@
-"""Maximal states z (nbody, 13) = [position, velocity (world), quaternion, angular velocity (body)] from states x, and back.
+"""Maximal states z (nbody, 13) = [position, velocity, quaternion, angular velocity] from states x, and back.
 
-Velocities are the mean ones of the interval that led to the node, vel = (x2 - x1)/h and omega = log(q1^* q2)/h, so that
+Velocities are the mean ones of the interval that led to the node, vel = (x2 - x1)/h in world and omega = log(q1^* q2)/h
+in body axes, so that
 both states describe the same pair of configurations and the maps are inverse to each other exactly.
 """
 

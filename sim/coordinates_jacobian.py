@@ -120,8 +120,7 @@ def _joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, ou
 
     World rotations; consistent poses.   out: (nv, 12 or more).
     """
-    d = model.body_vadr[i]
-    p = model.body_parent[i]
+    d, p = model.body_vadr[i], model.body_parent[i]
     for e in range(d, model.body_vadr[i + 1]):
         for k in range(12):
             out[e, k] = 0.0
@@ -183,8 +182,7 @@ def _minimal_row(work: Work, h: float, z: Matrix, d: int, first: int, b: int, ou
     nv = work.F.shape[0]
     R = rows_of(work.rot2, b)
     L = left_jacobian(h * z[b, 10], h * z[b, 11], h * z[b, 12])
-    f, g = work.F[d], work.G[d]
-    o = first
+    f, g, o = work.F[d], work.G[d], first
     turn = transposed_times(R, f[o + 3] - g[o + 3], f[o + 4] - g[o + 4], f[o + 5] - g[o + 5])
     spin = transposed_times(R, g[o + 3], g[o + 4], g[o + 5])
     spin = times(L, spin[0], spin[1], spin[2])  # the right Jacobian is the transpose of the left one

@@ -2,8 +2,8 @@
 
     p2 = d L_d(1, 2) / d(configuration 2)
 
-Momentum is then conserved exactly, and the energy p.M^-1 p / 2 + V keeps an error of second order for all times. Contacts,
-dampers and inputs act between nodes and are not part of it.
+Momentum is then conserved exactly, and the energy p.M^-1 p / 2 + V keeps an error of second order for all times.
+Contacts, dampers and inputs act between nodes and are not part of it.
 """
 
 from __future__ import annotations

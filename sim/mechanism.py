@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -218,3 +218,14 @@ def _name_contacts(call: str, contacts: Sequence[Contact], bodies: Sequence[str]
     named = _number_repeats([_renamed(c, c.name or c.body) for c in contacts])
     checks.distinct(f"{call}: contacts", (c.name for c in named))
     return tuple(named)
+
+
+def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
+    """The mechanism with another friction or law, of all contacts or by name."""
+    if isinstance(value, Mapping):
+        for name in value:
+            checks.one_of(f"Simulator.replace({field}=...)", name, mech.contact_names)
+        contacts = [replace(c, **{field: value.get(c.name, getattr(c, field))}) for c in mech.contacts]
+    else:
+        contacts = [replace(c, **{field: value}) for c in mech.contacts]
+    return replace(mech, contacts=contacts)

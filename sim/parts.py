@@ -13,7 +13,6 @@ from sim import checks
 from sim.shapes import Shape, Solid
 
 WORLD = "world"
-
 # free translations and free rotations of each kind of joint
 KINDS: dict[str, tuple[int, int]] = {
     "fixed": (0, 0),
@@ -30,7 +29,6 @@ KINDS: dict[str, tuple[int, int]] = {
     "floating": (3, 3),
 }
 LAWS = ("impact", "linear", "nonlinear")
-FRAMES = ("world", "body")
 
 
 @dataclass(frozen=True)
@@ -63,8 +61,7 @@ def _inertia(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
             raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
         matrix = body.shape.inertia(body.mass)
     else:
-        shape: tuple[int | None, ...] = (3,) if np.ndim(body.inertia) == 1 else (3, 3)
-        matrix = checks.array(f"{call}, inertia=...)", body.inertia, shape)
+        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
         matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
     if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * np.abs(matrix).max()):
         raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
@@ -245,7 +242,7 @@ class Input:
         call = f"Input({(self.name or self.joint or self.body)!r}"
         for field in ("force", "torque"):
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
-        checks.one_of(f"{call}, frame=...)", self.frame, FRAMES)
+        checks.one_of(f"{call}, frame=...)", self.frame, ("world", "body"))
         wrench = np.array([self.force, self.torque], dtype=np.float64)
         if self.body is not None and not wrench.any():
             raise ValueError(f"{call}): give a force=... or a torque=... per unit of the input")

@@ -62,6 +62,7 @@ class Sphere(Solid):
         self._positive("radius")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
+        """2/5 m r^2."""
         i = 0.4 * mass * self.radius**2
         return i, i, i
 
@@ -79,6 +80,7 @@ class Box(Solid):
         self._positive("x", "y", "z")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
+        """m/12 (y^2 + z^2), and so on."""
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y)
 
@@ -95,6 +97,7 @@ class Cylinder(Solid):
         self._positive("radius", "length")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
+        """Across twice, then along."""
         across = mass / 12 * (3 * self.radius**2 + self.length**2)
         return across, across, mass / 2 * self.radius**2
 
@@ -115,6 +118,7 @@ class Capsule(Solid):
         self._positive("radius", "length")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
+        """Across twice, then along."""
         r, length = self.radius, self.length
         ball = mass * (4 / 3 * r) / (length + 4 / 3 * r)
         rod = mass - ball

@@ -72,7 +72,7 @@ def state_differences(floats: Vector, ints: Integers, x0s: Matrix, x1s: Matrix, 
 
 @kernel
 def normalise_quaternions(floats: Vector, ints: Integers, xs: Matrix, tolerance: float) -> int:
-    """Scale the quaternions of every row to length one, in place.
+    """Scale the quaternions of every row to length one, in place, unless they are so to 1e-12 already.
 
     Returns -1, or row * nbody + body of the first one that is off by more than the tolerance.   xs: (n, nx).
     """
@@ -85,7 +85,7 @@ def normalise_quaternions(floats: Vector, ints: Integers, xs: Matrix, tolerance:
                 s = (xs[t, a] ** 2 + xs[t, a + 1] ** 2 + xs[t, a + 2] ** 2 + xs[t, a + 3] ** 2) ** 0.5
                 if not abs(s - 1.0) <= tolerance:
                     return t * n + i
-                if s != 1.0:
+                if abs(s - 1.0) > 1e-12:
                     for k in range(4):
                         xs[t, a + k] /= s
     return -1

@@ -32,9 +32,9 @@ def raiberthopper(
            | leg            u  (3,) torque on the body about its x and y axes [N m], leg force [N], positive extends
          (foot)
 
-    The torques act on the body alone, as from reaction wheels. Masses [kg], radii and lengths [m]. The leg has a spring
-    [N/m] with its rest at leg_length, a damper [N s/m], and limits (shortest, longest) [m]. Both balls touch the ground;
-    law: see Contact.
+    The torques act on the body alone, as from reaction wheels. Masses [kg], radii and lengths [m]. The leg has a
+    spring [N/m] with its rest at leg_length, a damper [N s/m], and limits (shortest, longest) [m]. Both balls touch the
+    ground; law: see Contact.
     """
     return Mechanism(
         bodies=[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from sim.build import pack
@@ -12,7 +13,6 @@ from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
 from sim.layout import work_size
 from sim.mechanism import Mechanism
 from sim.state import integrate_states, state_differences
-from tests.sim.mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 H = 0.05

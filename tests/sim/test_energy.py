@@ -1,19 +1,19 @@
-"""Energy and momentum of a node against a plain NumPy twin, in the limit of small steps and by energy's own definition."""
+"""Energy and momentum of a node in the limit of small steps, and where they are known."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from dojo_opt import models
 from sim.build import pack
 from sim.coordinates import maximal_states
 from sim.energy import energies, momenta
-from sim.layout import read_model, work_size
+from sim.layout import work_size
 from sim.mechanism import Mechanism
 from sim.shapes import rotation_matrix
-from tests.sim.mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 

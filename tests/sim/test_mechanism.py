@@ -7,6 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import CASES, chain_with
 
 from sim.build import contact_frame, mechanism_sizes, pack, translation_axes
 from sim.layout import read_model
@@ -14,7 +17,6 @@ from sim.mechanism import Mechanism
 from sim.model import InputKind, Law
 from sim.parts import KINDS, Body, Contact, Input, Joint
 from sim.shapes import Box, Sphere
-from tests.sim.mechanisms import CASES, chain_with
 
 BALL = Sphere(0.1)
 INF = float("inf")
@@ -133,6 +135,25 @@ def test_tree_order_keeps_the_given_order_where_it_can() -> None:
     assert model.body_parent.tolist() == [-1, 0, 1, 0]
     assert model.body_qadr.tolist() == [0, 7, 8, 9, 9] and model.body_vadr.tolist() == [0, 6, 7, 8, 8]
     assert mech.q_slice("d") == slice(8, 9) and mech.v_slice("b") == slice(6, 7)
+
+
+@settings(deadline=None, derandomize=True, max_examples=50)
+@given(st.data())
+def test_any_order_of_a_tree_packs_with_parents_first(data: st.DataObject) -> None:
+    n = data.draw(st.integers(1, 8))
+    kinds = data.draw(st.lists(st.sampled_from([k for k in KINDS if k != "fixed"]), min_size=n, max_size=n))
+    parents = [data.draw(st.integers(-1, i - 1)) for i in range(n)]
+    joints = [
+        Joint(k, f"b{p}" if p >= 0 else None, f"b{i}") for i, (k, p) in enumerate(zip(kinds, parents, strict=True))
+    ]
+    mech = Mechanism([Body(f"b{i}", shape=BALL) for i in range(n)], data.draw(st.permutations(joints)))
+    model = read_model(*pack(mech))
+    for i, joint in enumerate(mech.joints):
+        assert mech.bodies[i].name == joint.child
+        assert model.body_parent[i] < i
+        assert joint.parent == ("world" if model.body_parent[i] < 0 else mech.bodies[model.body_parent[i]].name)
+        assert mech.v_slice(joint.name) == slice(model.body_vadr[i], model.body_vadr[i + 1])
+    assert (mech.nq, mech.nv) == (model.body_qadr[-1], model.body_vadr[-1])
 
 
 @pytest.mark.parametrize(("kind", "on_world"), CASES)
