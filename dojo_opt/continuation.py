@@ -22,6 +22,10 @@ Matrix = NDArray[np.float64]
 
 _GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
 _POOR_STEP = 0.1  # one shorter than this raises it
+_LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
+_SLOW = 2  # short steps in a row that bring next to nothing end a stage
+_SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
+_PATIENCE = 4  # times the rejections allowed where only regularisation is left to try
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 
 
@@ -48,7 +52,8 @@ class Continuation:
     def start(self, now: Iterate, kappa: float | None) -> None:
         """Begin at `now`, a rollout at `kappa`, or states whose gaps are not known yet (None)."""
         self.now = now
-        self._kappa = kappa
+        self.kappa = kappa
+        self._kappa_grad = 0.0
         self._fresh = False  # the quadratic model belongs to `now`
 
     def remeasure(self) -> None:
@@ -65,14 +70,27 @@ class Continuation:
         if shot.status != Status.SOLVED:
             return False
         self.now = self._line_search.accept(shot, None)
-        self._kappa, self._fresh = kappa, False
+        self.kappa, self._fresh = kappa, False
         return True
 
+    def follow(self, kappa: float) -> bool:
+        """Roll out with the gains at another smoothing; False, and nothing changed, when that loses the trajectory."""
+        if kappa == self.kappa:
+            return True
+        before, kappa_before, fresh = self.now, self.kappa, self._fresh
+        if not self.roll_with_gains(kappa):
+            return False
+        if self.now.merit - before.merit <= self._options.follow * abs(before.merit):
+            return True
+        self.now, self.kappa, self._fresh = before, kappa_before, fresh
+        return False
+
     def _enter(self, stage: Stage) -> Status:
-        """Make the trajectory belong to the smoothing of `stage`: keep its states and open the gaps, or roll out."""
-        if stage.kappa_eval == self._kappa:
+        """Make the trajectory belong to the smoothing of `stage`: roll out, or keep its states and open the gaps."""
+        started = self.kappa is not None
+        if stage.kappa_eval == self.kappa:
             return Status.SOLVED
-        if self._options.reopen == "feedback" and self._kappa is not None and self.roll_with_gains(stage.kappa_eval):
+        if self._options.reopen == "feedback" and started and self.follow(stage.kappa_eval):
             return Status.SOLVED
         problem, now = self._problem, self.now
         linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
@@ -82,7 +100,7 @@ class Continuation:
         gaps[1:] = problem.sim.difference(linear.x_next, now.x[1:])
         closed = float(np.abs(gaps).max()) <= self._options.gap
         self.now = now._replace(gaps=None if closed else gaps)
-        self._kappa = stage.kappa_eval
+        self.kappa = stage.kappa_eval
         self._fresh = stage.kappa_grad == stage.kappa_eval
         if self._fresh:
             self._descent.use(linear, self.now)
@@ -93,10 +111,11 @@ class Continuation:
         status = self._enter(stage)
         if status != Status.SOLVED:
             return status
-        rejected = 0
+        rejected = slow = 0
+        self._kappa_grad = stage.kappa_grad
         for _ in range(stage.iterations):
             if not self._fresh:
-                status = self._descent.linearize(self.now, stage.kappa_grad)
+                status = self._descent.linearize(self.now, self._kappa_grad, stage.kappa_eval)
                 if status != Status.SOLVED:
                     return Status.SIMULATION_FAILED
                 self._fresh = True
@@ -104,7 +123,7 @@ class Continuation:
             if promise.status != Status.SOLVED:
                 return Status.MAX_REGULARIZATION
             small = stage.decrease * (abs(self.now.merit) + _SMALL)
-            if self.now.gaps is None and -(promise.d0 + 0.5 * promise.d1) <= small:
+            if self.now.gaps is None and self._descent.mu <= _LIGHT and -(promise.d0 + 0.5 * promise.d1) <= small:
                 return Status.SOLVED
             status = self._over_budget()
             if status != Status.SOLVED:
@@ -114,13 +133,25 @@ class Continuation:
             if self._report(stage, promise, alpha):
                 return Status.STOPPED
             rejected = 0 if alpha > 0.0 else rejected + 1
-            if rejected >= self._options.rejections:
-                if self.now.gaps is None or not self.roll_with_gains(stage.kappa_eval):
-                    return Status.LINE_SEARCH
+            if rejected >= self._options.rejections and self._unstick(stage):
                 rejected = 0
-            if alpha > 0.0 and before.gaps is None and before.merit - self.now.merit <= small:
-                return Status.SOLVED
+            elif rejected >= _PATIENCE * self._options.rejections:
+                return Status.LINE_SEARCH
+            if alpha > 0.0 and before.gaps is None:
+                slow = slow + 1 if before.merit - self.now.merit <= small else 0
+                if slow >= (1 if alpha >= _GOOD_STEP else _SLOW):
+                    return Status.SOLVED
         return Status.SOLVED
+
+    def _unstick(self, stage: Stage) -> bool:
+        """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
+        if self.now.gaps is not None:
+            return self.roll_with_gains(stage.kappa_eval)
+        if self._kappa_grad <= stage.kappa_eval:
+            return False
+        self._kappa_grad = max(_SHARPER * self._kappa_grad, stage.kappa_eval)
+        self._descent.mu, self._fresh = self._options.regularization, False
+        return True
 
     def _advance(self, stage: Stage, promise: Promise) -> float:
         """One line search, and the regularisation that follows from its step size."""
@@ -150,7 +181,7 @@ class Continuation:
             "merit": now.merit,
             "gradient": promise.gradient,
             "kappa_eval": stage.kappa_eval,
-            "kappa_grad": stage.kappa_grad,
+            "kappa_grad": self._kappa_grad,
             "mu": self._mu,
             "alpha": alpha,
             "promised": alpha * (promise.d0 + 0.5 * alpha * promise.d1),
@@ -174,7 +205,7 @@ class Continuation:
 
     def finish(self, stage: Stage) -> None:
         """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned."""
-        if self.now.gaps is not None or self._kappa != stage.kappa_eval:
+        if self.now.gaps is not None or self.kappa != stage.kappa_eval:
             self.roll_with_gains(stage.kappa_eval)
-        if not self._fresh and self._descent.linearize(self.now, stage.kappa_grad) == Status.SOLVED:
+        if not self._fresh and self._descent.linearize(self.now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
             self._descent.gains(self.now)

@@ -17,7 +17,7 @@ from solvers.status import Status
 Matrix = NDArray[np.float64]
 
 _FACTOR = 2.0  # of the regularisation schedule, growing geometrically with repeated use: Tassa 2012, section II.F
-_USEFUL = 1e-2  # a raise starts here and a lowering below it switches off: less changes nothing visible
+_USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
 
 
 class Descent:
@@ -57,12 +57,15 @@ class Descent:
         weight = np.einsum("tii->i", self._objective.H[:-1, n:, n:]) / self._problem.horizon
         self._damping = np.where(weight > 0.0, weight, 1.0)
 
-    def linearize(self, now: Iterate, kappa: float) -> Status:
-        """Dynamics and objective around `now`; a knot that cannot be differentiated at kappa is tried ten times softer."""
+    def linearize(self, now: Iterate, kappa: float, kappa_eval: float) -> Status:
+        """Dynamics and objective around `now`, at the first smoothing that solves every knot.
+
+        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
+        """
         problem = self._problem
         status = Status.SOLVED
-        for softer in (1.0, 10.0, 100.0):
-            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=softer * kappa)
+        for level in (kappa, 10.0 * kappa, kappa_eval):
+            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=level)
             failed = np.flatnonzero(linear.status)
             if failed.size == 0:
                 self.use(linear, now)

@@ -20,10 +20,9 @@ class Stage(NamedTuple):
 
 # Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
 CONTINUATION = (
-    Stage(1e-1, 1e-1),
-    Stage(1e-2, 1e-2),
-    Stage(1e-3, 1e-3),
-    Stage(1e-6, 1e-4, 1e-4),
+    Stage(3e-2, 3e-2, 3e-2),
+    Stage(3e-3, 3e-3, 3e-2),
+    Stage(1e-6, 1e-4, 1e-3),
 )
 
 
@@ -32,12 +31,14 @@ class Options:
     """Settings of `ilqr`. The last stage is repeated, with multiplier updates, until the constraints hold."""
 
     stages: tuple[Stage, ...] = CONTINUATION
-    reopen: str = "gaps"  # at a change of kappa: "gaps" keeps the states, "feedback" rolls out with the gains
+    reopen: str = "feedback"  # at a change of kappa: "feedback" rolls out with the gains, "gaps" keeps the states
+    follow: float = 1.0  # a rollout that raises the merit by more than this share of it has lost the trajectory
+    bisections: int = 3  # of a step of kappa in which the rollout loses the trajectory
     max_iterations: int = 300  # all of them, rejected ones included
     max_updates: int = 20  # multiplier updates before the constraints count as infeasible
     violation: float = 1e-3  # largest violation of a plan that counts as solved
     gap: float = 1e-8  # largest gap of a trajectory that counts as consistent
-    penalty: float = 1.0  # first penalty of every constraint
+    penalty: float = 100.0  # first penalty of every constraint: high, so that a goal is worth the effort of reaching it
     penalty_growth: float = 10.0
     penalty_max: float = 1e8
     sufficient: float = 0.25  # the penalty of an entry grows when its violation fell to more than this share
@@ -46,16 +47,16 @@ class Options:
     value_regularization: float = 0.0  # share of the regularisation that goes to V_xx, in units of 1
     armijo: float = 1e-2  # share of the predicted decrease that a step has to bring
     ascent: float = 2.0  # with open gaps: allowed multiple of a predicted increase
-    halvings: int = 10  # of the step size
-    rejections: int = 3  # failed line searches in a row that end a stage
+    halvings: int = 6  # of the step size
+    rejections: int = 2  # failed line searches in a row before gaps are closed by force or derivatives sharpened
     time_limit: float = float("inf")  # [s]
     callback: Callable[[dict[str, Any]], None] | None = None  # once per iteration; may raise StopIteration
     verbose: bool = False
     stream: Any = None  # where the table goes, standard output by default
 
     def __post_init__(self) -> None:
-        if self.reopen not in ("gaps", "feedback"):
-            raise ValueError(f'ilqr(reopen=...): expected "gaps" or "feedback", got {self.reopen!r}')
+        if self.reopen not in ("feedback", "gaps"):
+            raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
         if len(self.stages) == 0:
             raise ValueError("ilqr(stages=...): expected at least one stage")
         object.__setattr__(self, "stages", tuple(Stage(*stage) for stage in self.stages))

@@ -19,7 +19,7 @@ from dojo_opt.continuation import Continuation
 from dojo_opt.descent import Descent
 from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
-from dojo_opt.options import Options
+from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
 from solvers.status import MESSAGES, Status
@@ -99,7 +99,9 @@ class Solver:
         options = self.options
         last = len(options.stages) - 1
         for update in range(last + options.max_updates + 1):
-            status = self.continuation.run(options.stages[min(update, last)])
+            status = self._stage(options.stages[min(update, last)], options.bisections)
+            if status == Status.SIMULATION_FAILED and update < last:
+                continue  # the next stage is another way down
             if status not in (Status.SOLVED, Status.LINE_SEARCH):
                 return status
             now = self.continuation.now
@@ -109,6 +111,18 @@ class Solver:
             self.objective.update_multipliers(now.x, now.u)
             self.continuation.remeasure()
         return Status.INFEASIBLE
+
+    def _stage(self, stage: Stage, bisections: int) -> Status:
+        """One stage; when the trajectory does not survive the step of kappa, by way of the geometric mean."""
+        continuation = self.continuation
+        kappa = continuation.kappa
+        if self.options.reopen == "feedback" and bisections > 0 and kappa is not None:
+            if not continuation.follow(stage.kappa_eval):
+                middle = (kappa * stage.kappa_eval) ** 0.5
+                status = self._stage(Stage(middle, max(middle, stage.kappa_grad), stage.decrease), bisections - 1)
+                if status not in (Status.SOLVED, Status.LINE_SEARCH, Status.SIMULATION_FAILED):
+                    return status
+        return continuation.run(stage)
 
     def _plan(self, status: Status, detail: str) -> Plan:
         """What was reached, made consistent at the last smoothing, with the gains that belong to it."""
