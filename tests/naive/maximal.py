@@ -266,7 +266,7 @@ def interior(step: Step, y: Array) -> bool:
 
 
 def solve(scene: Scene, q: Array, v: Array, u: Array, h: float, kappa: float, *,
-          tolerance: float = 1e-12, guess: Array | None = None) -> Solution:  # fmt: skip
+          tolerance: float = 1e-13, guess: Array | None = None) -> Solution:  # fmt: skip
     """Path following from a large kappa in the smoothed equations, then Newton on the bilinear ones."""
     step = Step(scene, q, v, u, h)
     count, best = 0, np.inf
@@ -283,7 +283,7 @@ def solve(scene: Scene, q: Array, v: Array, u: Array, h: float, kappa: float, *,
         count += n
         if not interior(step, polished):  # the bilinear equations have other roots
             polished, error = y, float(np.abs(step.residual(y, kappa, True)).max())
-        if error < 1e3 * tolerance and interior(step, polished):
+        if error < 1e-10 and interior(step, polished):
             return solution(step, polished, error, count)
         best = min(best, error)
     raise RuntimeError(f"the reference did not solve its step: residual {best:.1e}")

@@ -9,9 +9,9 @@ import dojo_opt as dojo
 
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2, 5e-2])
 def test_limit_of_a_falling_pendulum(time_step):
-    sim = dojo.Simulator(pendulum(1, limits=(-0.3, 2.0)), time_step=time_step, kappa=1e-8, tolerance=1e-10)
+    sim = dojo.Simulator(pendulum(1, limits=(0.3, 2.0)), time_step=time_step, kappa=1e-8, tolerance=1e-10)
     theta = run(sim, np.array([1.5, 0.0]), round(2.0 / time_step))[:, 0]
-    assert theta.min() > -0.3 - 1e-9 and theta[-1] < -0.3 + 1e-3
+    assert theta.min() > 0.3 - 1e-9 and theta[-1] < 0.3 + 1e-3
 
 
 @pytest.mark.parametrize("speed", [-100.0, 100.0])

