@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["contact_forces", "controls", "paths", "state", "trajectory"]
+__all__ = ["contact_forces", "controls", "paths", "state", "trajectory", "velocities"]
 
 
 @overload
@@ -33,6 +33,8 @@ def trajectory(
 ) -> Figure | SubFigure:
     """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot.
 
+    A mechanism without contacts shows its velocities instead of their forces.
+
     figure: draw on this one. simulator: needed for a result that was read from a file.
     """
     if figure is None:
@@ -43,7 +45,7 @@ def trajectory(
     axes = np.ravel(figure.subplots(2, 2))
     state(m, axes[0])
     controls(m, axes[1])
-    contact_forces(m, axes[2])
+    (contact_forces if m.mechanism.contacts else velocities)(m, axes[2])
     paths(m, axes[3])
     return figure
 
@@ -56,6 +58,16 @@ def state(m: Motion, ax: Axes) -> Axes:
     return _finish(ax, "coordinates [m, rad]", "time [s]")
 
 
+def velocities(m: Motion, ax: Axes) -> Axes:
+    """Joint velocities over time, each the mean of the step that led to its knot."""
+    nq = m.mechanism.nq
+    for joint in m.mechanism.joints:
+        v = m.x[:, nq:][:, m.mechanism.v_slice(joint.name)]
+        for k in range(v.shape[1]):
+            ax.plot(m.time, v[:, k], label=joint.name if v.shape[1] == 1 else f"{joint.name} {k}")
+    return _finish(ax, "velocities [m/s, rad/s]", "time [s]")
+
+
 def controls(m: Motion, ax: Axes) -> Axes:
     """Inputs over time, held over each knot."""
     for k, name in enumerate(m.mechanism.input_names):
@@ -64,20 +76,14 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Normal force of every contact, mean over each step, and the size of its friction force, dashed."""
+    """Normal force of every contact that carries load, mean over each step, and the size of its friction force, dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
-    for k, name in enumerate(m.mechanism.contact_names):
+    peak = m.normal_force.max(axis=0, initial=0.0)
+    for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
+        name = m.mechanism.contact_names[k]
         line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=f"{name}, normal")
-        ax.stairs(
-            m.friction_force[:, k],
-            edges,
-            baseline=None,
-            linestyle="--",
-            color=line.get_edgecolor(),
-            label=f"{name}, friction",
-        )
-    if not m.mechanism.contacts:
-        ax.text(0.5, 0.5, "no contacts", ha="center", va="center", transform=ax.transAxes)
+        style = {"linestyle": "--", "color": line.get_edgecolor()}
+        ax.stairs(m.friction_force[:, k], edges, baseline=None, label=f"{name}, friction", **style)
     return _finish(ax, "contact forces [N]", "time [s]")
 
 
@@ -107,7 +113,7 @@ def _finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
     ax.set_ylabel(ylabel)
     ax.grid(alpha=0.3)
     if 0 < len(ax.get_legend_handles_labels()[1]) <= 12:
-        ax.legend(fontsize="small")
+        ax.legend(fontsize="small", framealpha=0.6)
     return ax
 
 
