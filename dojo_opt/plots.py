@@ -76,7 +76,7 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Normal force of every contact that carries load, mean over each step, and the size of its friction force, dashed."""
+    """Mean normal force over each step of every contact that carries load, and the size of its friction force, dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
     for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
