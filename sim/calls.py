@@ -72,7 +72,8 @@ class Calls:
         knot = rollout.roll(
             self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard
         )
-        np.nan_to_num(reports, copy=False, nan=np.inf, posinf=np.inf)
+        if knot < steps:
+            np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
 
     def closed_loop(
@@ -104,7 +105,8 @@ class Calls:
             report,
             self.hard,
         )
-        np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
+        if knot < len(us):
+            np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, u_out, report
 
     def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
