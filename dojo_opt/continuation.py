@@ -25,7 +25,7 @@ _POOR_STEP = 0.1  # one shorter than this raises it
 _LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
 _SLOW = 2  # short steps in a row that bring next to nothing end a stage
 _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
-_PATIENCE = 4  # times the rejections allowed where only regularisation is left to try
+_PATIENCE = 2  # times the rejections allowed where only regularisation is left to try
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 
 
@@ -147,10 +147,11 @@ class Continuation:
         """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
         if self.now.gaps is not None:
             return self.roll_with_gains(stage.kappa_eval)
-        if self._kappa_grad <= stage.kappa_eval:
+        if self._kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
             return False
         self._kappa_grad = max(_SHARPER * self._kappa_grad, stage.kappa_eval)
-        self._descent.mu, self._fresh = self._options.regularization, False
+        self._descent.reset_regularization()
+        self._fresh = False
         return True
 
     def _advance(self, stage: Stage, promise: Promise) -> float:

@@ -41,9 +41,13 @@ class Descent:
 
     def reset(self) -> None:
         """Forget regularisation and gains of an earlier solve."""
-        self.mu, self._growth = self._options.regularization, 1.0
+        self.reset_regularization()
         self.K.fill(0.0)
         self.k.fill(0.0)
+
+    def reset_regularization(self) -> None:
+        """Back to the first value."""
+        self.mu, self._growth = self._options.regularization, 1.0
 
     def use(self, linear: Any, now: Iterate) -> None:
         """Take a linearisation of the dynamics at `now` and expand the objective there."""

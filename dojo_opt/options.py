@@ -14,15 +14,15 @@ class Stage(NamedTuple):
 
     kappa_eval: float
     kappa_grad: float
-    decrease: float = 1e-2  # ends when an iteration promises or brings less than this share of the merit
+    decrease: float = 3e-2  # ends when an iteration promises or brings less than this share of the merit
     iterations: int = 100  # ends after this many
 
 
 # Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
 CONTINUATION = (
-    Stage(3e-2, 3e-2, 3e-2),
-    Stage(3e-3, 3e-3, 3e-2),
-    Stage(1e-6, 1e-4, 1e-3),
+    Stage(3e-2, 3e-2),
+    Stage(3e-3, 3e-3),
+    Stage(1e-6, 1e-4),
 )
 
 
@@ -34,6 +34,7 @@ class Options:
     reopen: str = "feedback"  # at a change of kappa: "feedback" rolls out with the gains, "gaps" keeps the states
     follow: float = 1.0  # a rollout that raises the merit by more than this share of it has lost the trajectory
     bisections: int = 3  # of a step of kappa in which the rollout loses the trajectory
+    tolerance: float = 1e-3  # the last stage ends when an iteration brings less than this share of the merit
     max_iterations: int = 300  # all of them, rejected ones included
     max_updates: int = 20  # multiplier updates before the constraints count as infeasible
     violation: float = 1e-3  # largest violation of a plan that counts as solved
@@ -59,7 +60,8 @@ class Options:
             raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
         if len(self.stages) == 0:
             raise ValueError("ilqr(stages=...): expected at least one stage")
-        object.__setattr__(self, "stages", tuple(Stage(*stage) for stage in self.stages))
+        stages = tuple(Stage(*stage) for stage in self.stages)
+        object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
         for stage in self.stages:
             if not (stage.kappa_eval > 0.0 and stage.kappa_grad > 0.0):
                 raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")

@@ -16,7 +16,7 @@ Integers = NDArray[np.int64]
 _MAX_ITERATIONS = 50
 _ARMIJO = 0.1
 _MIN_STEP = 1e-10
-_TOLERANCE = 1e-12  # of the free gradient, relative to the entries of the linear term
+_TOLERANCE = 1e-12  # of the free gradient, relative to the entries of the two terms it is the sum of
 
 
 @kernel
@@ -100,17 +100,17 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
     gradient = work[2 * n * n : 2 * n * n + n]
     step = work[2 * n * n + n : 2 * n * n + 2 * n]
     trial = work[2 * n * n + 2 * n : 2 * n * n + 3 * n]
-    scale = 0.0
     for i in range(n):
-        scale = max(scale, abs(g[i]))
         x[i] = min(max(x[i], lo[i]), hi[i])
     for _ in range(_MAX_ITERATIONS):
         nfree = _find_free(H, g, lo, hi, x, gradient, free)
         if not factor_free(H, free, nfree, sub, work):
             return Status.SINGULAR, nfree
-        size = 0.0
+        size, scale = 0.0, 0.0
         for i in range(nfree):
-            size = max(size, abs(gradient[free[i]]))
+            f = free[i]
+            size = max(size, abs(gradient[f]))
+            scale = max(scale, abs(g[f]), abs(gradient[f] - g[f]))
         if size <= _TOLERANCE * scale:
             return Status.SOLVED, nfree
         slope = _newton_step(gradient, free, nfree, work, trial, step)
