@@ -13,10 +13,12 @@ from sim.friction import (
     contact_products,
     contact_products_ahead,
     recover_contact,
+    slip_violation,
     start_contact,
 )
 from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits, start_limits
-from sim.model import Model, Work
+from sim.model import Matrix, Model, Work
+from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
 
@@ -57,24 +59,37 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float) -> None:
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated."""
-    for c in range(model.contact_body.shape[0]):
-        contact_jacobian(model, work, h, c)
-        condense_contact(model, work, c)
-        fn, f1, f2 = contact_impulse(model, work, c)
-        add_contact_matrix(model, work, h, c, fn, f1, f2, work.A)
+    condense_into(model, work, h, kappa, work.A)
     add_limit_blocks(model, work, h)
 
 
 @kernel
-def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool) -> None:
+def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix) -> None:
+    """out += contacts, condensed at kappa.  (nbody, 36)"""
+    for c in range(model.contact_body.shape[0]):
+        contact_jacobian(model, work, h, c)
+        condense_contact(model, work, c, kappa)
+        fn, f1, f2 = contact_impulse(model, work, c)
+        add_contact_matrix(model, work, h, c, fn, f1, f2, out)
+
+
+@kernel
+def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
+    """A2 -= contacts: slips depend on pose 2."""
+    for c in range(model.contact_body.shape[0]):
+        add_slip_jacobian(model, work, h, c)
+
+
+@kernel
+def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool, reduce: float) -> None:
     """dnu += S2^T B^T w + limits, for the target kappa."""
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
     for c in range(model.contact_body.shape[0]):
-        contact_constant(model, work, c, kappa, corrected)
+        contact_constant(model, work, c, kappa, corrected, reduce)
         w = work.contact_w[c]
         add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
@@ -82,15 +97,15 @@ def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool) -> N
         a = work.S2[d]
         f = work.subtree[model.dof_body[d]]
         work.dnu[d] -= a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
-    limit_constants(model, work, kappa, corrected)
+    limit_constants(model, work, kappa, corrected, reduce)
 
 
 @kernel
-def recover_inequalities(model: Model, work: Work, h: float) -> None:
+def recover_inequalities(model: Model, work: Work, h: float, reduce: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
     for c in range(model.contact_body.shape[0]):
-        recover_contact(model, work, h, c)
-    recover_limits(model, work, h)
+        recover_contact(model, work, h, c, reduce)
+    recover_limits(model, work, h, reduce)
 
 
 @kernel
@@ -161,3 +176,41 @@ def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     for k in range(model.limit_dof.shape[0]):
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+
+
+@kernel
+def slip_error(model: Model, work: Work, kappa: float) -> float:
+    r = 0.0
+    for c in range(model.contact_body.shape[0]):
+        r = max(r, slip_violation(model, work, c, kappa))
+    return r
+
+
+@kernel
+def worst_contact(model: Model, work: Work, kappa: float) -> float:
+    """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
+    worst = -1.0
+    error = 0.0
+    for k in range(model.limit_dof.shape[0]):
+        error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
+    for c in range(model.contact_body.shape[0]):
+        e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
+        if e > error:
+            error = e
+            worst = float(c)
+    return worst
+
+
+@kernel
+def report_contacts(model: Model, work: Work, out: Matrix) -> None:
+    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, after a step.  (ncontact, 8)"""
+    for c in range(model.contact_body.shape[0]):
+        i = model.contact_body[c]
+        k = work.contact_kin[c]
+        F = model.contact_frame[c]
+        fn, f1, f2 = contact_impulse(model, work, c)
+        for e in range(3):
+            out[c, e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+            out[c, 3 + e] = work.pos3[i, e] + k[3 + e]
+        out[c, 6] = k[0]
+        out[c, 7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.inequalities import (
@@ -18,11 +16,13 @@ from sim.inequalities import (
     products,
     products_ahead,
     recover_inequalities,
+    slip_error,
     start_inequalities,
 )
 from sim.joints import joint_blocks, joint_impulses
 from sim.kinematics import velocity_columns
-from sim.model import Model, Vector, Work
+from sim.model import Model, Options, Outcome, Vector, Work
+from sim.newton import norm, residual_scale
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -32,34 +32,6 @@ _NO_PROGRESS = int(Status.NO_PROGRESS)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
-
-
-class Options(NamedTuple):
-    """Settings of a step."""
-
-    h: float  # time step [s]
-    kappa: float  # central-path parameter [N s m]
-    tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
-    max_iterations: int
-
-
-class Outcome(NamedTuple):
-    """How a step ended."""
-
-    status: int
-    iterations: int
-    residual: float  # largest equality residual
-    violation: float  # largest |product - kappa| of complementary pairs
-
-
-@kernel
-def residual_scale(work: Work) -> float:
-    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
-    s = 1.0
-    for i in range(work.momentum_in.shape[0]):
-        for k in range(6):
-            s = max(s, 1.0 + abs(work.momentum_in[i, k]))
-    return s
 
 
 @kernel
@@ -81,14 +53,11 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
     project(model, work.S2, work.subtree, work.residual)
     joint_impulses(model, work, h, q, v, u)
     apply_limits(model, work)
-    r = 0.0
-    for d in range(work.residual.shape[0]):
-        r = max(r, abs(work.residual[d]))
-    return r, e
+    return norm(work.residual), e
 
 
 @kernel
-def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, par: Vector) -> Outcome:
+def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> Outcome:
     h = options.h
     kappa = options.kappa
     tolerance = options.tolerance
@@ -120,15 +89,36 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
                     status = _ANGULAR_STEP
                     break
                 continue
-            k0 = max(kappa, par[0])
-            start_inequalities(model, work, k0, par[1] * k0**0.5)
+            k0 = max(kappa, 0.01)
+            floor = 0.1 * k0**0.5
+            for c in range(model.contact_body.shape[0]):
+                depth = -work.contact_kin[c, 0]
+                if depth > 0.0:
+                    k0 = max(k0, 0.3 * model.body_mass[model.contact_body[c]] * depth * depth / h)
+                    floor = max(floor, 0.5 * depth)
+            for c in range(model.limit_dof.shape[0]):
+                depth = -work.bound_gap[c]
+                if depth > 0.0:
+                    k0 = max(k0, 0.01 * depth * depth / h)
+                    floor = max(floor, 0.5 * depth)
+            start_inequalities(model, work, k0, floor)
         else:
             move_inequalities(model, work, alpha)
+            for c in range(model.contact_body.shape[0]):
+                z = work.cone[c]
+                if model.contact_friction[c] > 0 and model.contact_law[c] == 2:
+                    b0 = model.contact_friction[c] * z[1]
+                    n = (z[2] * z[2] + z[3] * z[3]) ** 0.5
+                    if n > b0:
+                        z[2] *= b0 / n
+                        z[3] *= b0 / n
         rd, re = residuals(model, work, h, q, v, u)
         r = max(rd / scale, re)
         mean, low, high = products(model, work)
-        violation = max(high - kappa, kappa - low)
-        if iterations > 0 and not (inside and ((r <= r0 or violation <= c0))):
+        center = max(kappa, mean)
+        slip = slip_error(model, work, kappa)
+        violation = max(high - kappa, kappa - low, slip)
+        if iterations > 0 and not (inside and (r <= max(r0, tolerance) or (violation <= c0 and r < 2.0 * r0 and c0 > kappa))):
             backtracks += 1
             if backtracks < 12:
                 alpha *= 0.5
@@ -145,26 +135,32 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         velocity_columns(model, work.S3, work.nu, h, work.S3nu)
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h)
+        condense_inequalities(model, work, h, center)
         if not factor(model, work):
             status = _SINGULAR
             break
         target = kappa
-        for phase in range(2):
+        affine = 1.0
+        reduce = 1.0
+        for phase in range(4):
+            if phase >= 2:
+                if alpha > 0.1:
+                    break
+                reduce = 0.5 if phase == 2 else 0.1
+                target = max(kappa, (1.0 - reduce) * mean)
             for d in range(nv):
-                work.dnu[d] = -work.residual[d]
-            inequality_rhs(model, work, target, phase == 1)
+                work.dnu[d] = -reduce * work.residual[d]
+            inequality_rhs(model, work, target, phase == 1 and affine > 0.0, reduce)
             solve(model, work, work.dnu, work.dnu)
-            recover_inequalities(model, work, h)
+            recover_inequalities(model, work, h, reduce)
             alpha = boundary_step(model, work)
             if phase == 0:
                 a = min(1.0, 0.95 * alpha)
+                affine = a
                 total = products_ahead(model, work, 0.0)
                 ahead = products_ahead(model, work, a)
                 sigma = min(max(ahead / total, 0.0), 1.0) ** 3
                 target = max(kappa, sigma * mean)
-                if par[2] > 0.0:
-                    target = max(target, min(par[2] * r, mean))
         tau = 0.95 if max(r, violation) > 1e-3 else 0.99
         alpha = min(1.0, tau * alpha)
         for d in range(nv):

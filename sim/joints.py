@@ -8,7 +8,7 @@ velocity, implicit and dissipative for every coefficient.
 from __future__ import annotations
 
 from sim.model import InputKind, Model, Vector, Work
-from sim.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_mul
+from sim.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_matrix, quat_mul
 from solvers.jit import kernel
 
 _JOINT = int(InputKind.JOINT)
@@ -112,3 +112,52 @@ def joint_blocks(model: Model, work: Work, h: float, q: Vector, v: Vector) -> No
                 for b in range(3):
                     t = P[3 * a] * J[b] + P[3 * a + 1] * J[3 + b] + P[3 * a + 2] * J[6 + b]
                     B[(n - 3 + a) * n + n - 3 + b] += g * t
+
+
+@kernel
+def add_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+    """dR_dq, dR_dv += springs; dR_dv in unit columns, to be multiplied by -h and -h J(h v)^T like all others.
+
+    scalar        h k and h k/4
+    quaternion    with M = c2 I - [s2], y = s1 + 2 s2 + s3 and ds = (c I + [s])/2 (right rotation) for each of s1, s2, s3,
+                  d(M y) = M dy - (s2.e) y/2 + y x ds2; the turns R1, R3 carry a rotation e of q2 to configurations 1, 3
+    """
+    for i in range(model.body_parent.shape[0]):
+        d = model.body_vadr[i]
+        n = model.joint_ntrans[i] if model.joint_nrot[i] == 3 else model.body_vadr[i + 1] - d
+        for e in range(d, d + n):
+            work.dR_dq[e, e] += h * model.dof_spring[e]
+            work.dR_dv[e, e] += 0.25 * h * model.dof_spring[e]
+        if model.joint_nrot[i] == 3 and model.dof_spring[d + n] > 0.0:
+            _quaternion_spring_derivatives(model, work, h, q, v, i, d + n)
+
+
+@kernel
+def _quaternion_spring_derivatives(
+    model: Model, work: Work, h: float, q: Vector, v: Vector, i: int, e: int
+) -> None:
+    """The quaternion part of `add_spring_derivatives`, rotational dofs e .. e + 2 of joint i."""
+    r1, r2, r3 = spring_turns(model, work, h, q, v, i)
+    g = h * model.dof_spring[e]
+    y = (r1[1] + 2 * r2[1] + r3[1], r1[2] + 2 * r2[2] + r3[2], r1[3] + 2 * r2[3] + r3[3])
+    c, s = r2[0], (r2[1], r2[2], r2[3])
+    P1 = turn_product(r2, r1)
+    P2 = turn_product(r2, r2)
+    P3 = turn_product(r2, r3)
+    e1 = quat_exp(-h * v[e], -h * v[e + 1], -h * v[e + 2])
+    e3 = quat_exp(h * work.nu[e], h * work.nu[e + 1], h * work.nu[e + 2])
+    R1 = quat_matrix(e1[0], e1[1], e1[2], e1[3])
+    R3 = quat_matrix(e3[0], e3[1], e3[2], e3[3])
+    Y = (0.0, -y[2], y[1], y[2], 0.0, -y[0], -y[1], y[0], 0.0)
+    dot = y[0] * s[0] + y[1] * s[1] + y[2] * s[2]
+    for a in range(3):
+        for b in range(3):
+            w = 0.0
+            t = 2.0 * P2[3 * a + b] + 0.25 * (c * Y[3 * a + b] + s[a] * y[b] - y[a] * s[b])
+            for k in range(3):
+                w += P1[3 * a + k] * R1[3 * b + k]
+                t += P3[3 * a + k] * R3[3 * b + k]
+            if a == b:
+                t -= 0.25 * dot
+            work.dR_dq[e + a, e + b] += g * (t + w)
+            work.dR_dv[e + a, e + b] += g * w

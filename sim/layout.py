@@ -22,105 +22,47 @@ HEAD = 8
 
 Shape = tuple[int | str, ...]
 
-MODEL_INTS: dict[str, Shape] = {
-    "body_parent": ("nbody",),
-    "body_qadr": ("nbody+1",),
-    "body_vadr": ("nbody+1",),
-    "joint_ntrans": ("nbody",),
-    "joint_nrot": ("nbody",),
-    "dof_body": ("nv",),
-    "dof_qadr": ("nv",),
-    "contact_body": ("ncontact",),
-    "contact_law": ("ncontact",),
-    "limit_dof": ("nlimit",),
-    "input_kind": ("nu",),
-    "input_index": ("nu",),
-}
 
-MODEL_FLOATS: dict[str, Shape] = {
-    "body_mass": ("nbody",),
-    "body_inertia": ("nbody", 9),
-    "joint_parent_point": ("nbody", 3),
-    "joint_child_point": ("nbody", 3),
-    "joint_offset": ("nbody", 4),
-    "joint_trans_axes": ("nbody", 9),
-    "joint_axis": ("nbody", 3),
-    "dof_spring": ("nv",),
-    "dof_damper": ("nv",),
-    "dof_rest": ("nv",),
-    "contact_point": ("ncontact", 3),
-    "contact_radius": ("ncontact",),
-    "contact_friction": ("ncontact",),
-    "contact_frame": ("ncontact", 9),
-    "contact_height": ("ncontact",),
-    "limit_sign": ("nlimit",),
-    "limit_bound": ("nlimit",),
-    "input_wrench": ("nu", 6),
-    "gravity": (3,),
-}
+def _shapes(text: str) -> dict[str, Shape]:
+    """{name: shape} of fields written as "name rows columns"; columns left out for a vector."""
+    rows = [field.split() for field in text.split(",")]
+    return {name: tuple(int(n) if n.isdigit() else n for n in shape) for name, *shape in rows}
 
-WORK_STEP_FIELDS: dict[str, Shape] = {
-    "origin": (3,),
-    "theta1": ("nq",),
-    "theta3": ("nq",),
-    "nu": ("nv",),
-    "nu_trial": ("nv",),
-    "dnu": ("nv",),
-    "pos1": ("nbody", 3),
-    "quat1": ("nbody", 4),
-    "rot1": ("nbody", 9),
-    "pos2": ("nbody", 3),
-    "quat2": ("nbody", 4),
-    "rot2": ("nbody", 9),
-    "pos3": ("nbody", 3),
-    "quat3": ("nbody", 4),
-    "rot3": ("nbody", 9),
-    "S1": ("nv", 6),
-    "S2": ("nv", 6),
-    "S3": ("nv", 6),
-    "S3nu": ("nv", 6),
-    "inertia_world": ("nbody", 9),
-    "momentum_in": ("nbody", 6),
-    "body_impulse": ("nbody", 6),
-    "turn_in": ("nbody", 4),
-    "turn": ("nbody", 4),
-    "balance": ("nbody", 6),
-    "wrench": ("nbody", 6),
-    "subtree": ("nbody", 6),
-    "residual": ("nv",),
-    "rhs": ("nv",),
-    "A": ("nbody", 36),
-    "U": ("nv", 6),
-    "L": ("nv", 6),
-    "D": ("nbody", 36),
-    "joint_block": ("nbody", 36),
-    "z": ("nv",),
-    "twist": ("nbody", 6),
-    "cone": ("ncontact", 12),
-    "cone_step": ("ncontact", 12),
-    "cone_trial": ("ncontact", 12),
-    "contact_kin": ("ncontact", 24),
-    "contact_W": ("ncontact", 9),
-    "contact_w": ("ncontact", 3),
-    "contact_scale": ("ncontact", 16),
-    "bound": ("nlimit", 2),
-    "bound_step": ("nlimit", 2),
-    "bound_trial": ("nlimit", 2),
-    "bound_gap": ("nlimit",),
-    "bound_w": ("nlimit",),
-}
 
-WORK_DERIVATIVE_FIELDS: dict[str, Shape] = {
-    "A1": ("nbody", 36),
-    "A2": ("nbody", 36),
-    "A3": ("nbody", 36),
-    "F": ("nv", 18),
-    "G": ("nv", 18),
-    "dR_dq": ("nv", "nv"),
-    "dR_dv": ("nv", "nv"),
-    "columns": ("nv", "2nv+nu"),
-    "panel": ("6nbody", "2nv+nu"),
-}
+MODEL_INTS = _shapes(
+    """
+    body_parent nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody, dof_body nv,
+    dof_qadr nv, contact_body ncontact, contact_law ncontact, limit_dof nlimit, input_kind nu, input_index nu
+    """
+)
+
+MODEL_FLOATS = _shapes(
+    """
+    body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
+    joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, dof_spring nv, dof_damper nv, dof_rest nv,
+    contact_point ncontact 3, contact_radius ncontact, contact_friction ncontact, contact_frame ncontact 9,
+    contact_height ncontact, limit_sign nlimit, limit_bound nlimit, input_wrench nu 6, gravity 3
+    """
+)
+
+WORK_STEP_FIELDS = _shapes(
+    """
+    origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
+    pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
+    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, body_impulse nbody 6, turn_in nbody 4, turn nbody 4,
+    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 36,
+    joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
+    contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
+    bound_step nlimit 2, bound_trial nlimit 2, bound_gap nlimit, bound_w nlimit
+    """
+)
+
+WORK_DERIVATIVE_FIELDS = _shapes(
+    """
+    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
+    panel 6nbody+6 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx
+    """
+)
 
 MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
 WORK_FIELDS = {**WORK_STEP_FIELDS, **WORK_DERIVATIVE_FIELDS}
@@ -148,8 +90,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
-        "6nbody": 6 * sizes.nbody,
+        "6nbody+6": 6 * sizes.nbody + 6,
         "2nv+nu": 2 * sizes.nv + sizes.nu,
+        "2nv": 2 * sizes.nv,
+        "nx": sizes.nq + sizes.nv,
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols
@@ -323,4 +267,8 @@ def work_view(work: Vector, ints: Integers) -> Work:
         dR_dv=_matrix(work, ints, _W.dR_dv)[0],
         columns=_matrix(work, ints, _W.columns)[0],
         panel=_matrix(work, ints, _W.panel)[0],
+        step_A=_matrix(work, ints, _W.step_A)[0],
+        step_B=_matrix(work, ints, _W.step_B)[0],
+        chain=_matrix(work, ints, _W.chain)[0],
+        step_x=_matrix(work, ints, _W.step_x)[0],
     )

@@ -38,7 +38,7 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def limit_constants(model: Model, work: Work, kappa: float, corrected: bool) -> None:
+def limit_constants(model: Model, work: Work, kappa: float, corrected: bool, reduce: float) -> None:
     """dnu += sign w, with d gamma = w - (gamma/s) sign h d nu; kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
@@ -46,16 +46,16 @@ def limit_constants(model: Model, work: Work, kappa: float, corrected: bool) -> 
         r = kappa - s * g
         if corrected:
             r -= work.bound_step[k, 0] * work.bound_step[k, 1]
-        w = (r - g * (work.bound_gap[k] - s)) / s
+        w = (r - g * reduce * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         work.dnu[model.limit_dof[k]] += model.limit_sign[k] * w
 
 
 @kernel
-def recover_limits(model: Model, work: Work, h: float) -> None:
+def recover_limits(model: Model, work: Work, h: float, reduce: float) -> None:
     """bound_step from dnu."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
         t = model.limit_sign[k] * h * work.dnu[model.limit_dof[k]]
-        work.bound_step[k, 0] = t + work.bound_gap[k] - s
+        work.bound_step[k, 0] = t + reduce * (work.bound_gap[k] - s)
         work.bound_step[k, 1] = work.bound_w[k] - work.bound[k, 1] / s * t

@@ -146,4 +146,26 @@ class Work(NamedTuple):
     dR_dq: Matrix  # (nv, nv)
     dR_dv: Matrix  # (nv, nv)
     columns: Matrix  # (nv, 2 nv + nu) right-hand sides and solutions
-    panel: Matrix  # (nbody * 6, 2 nv + nu)
+    panel: Matrix  # (6 nbody + 6, 2 nv + nu) wrenches, then twists, of all columns; six rows of scratch
+    step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
+    step_B: Matrix  # (2 nv, nu)
+    chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
+    step_x: Matrix  # (2, nq + nv) states inside a knot
+
+
+class Options(NamedTuple):
+    """Settings of a step."""
+
+    h: float  # time step [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
+    max_iterations: int
+
+
+class Outcome(NamedTuple):
+    """How a step ended."""
+
+    status: int
+    iterations: int
+    residual: float  # largest equality residual
+    violation: float  # largest |product - kappa| of complementary pairs

@@ -1,0 +1,44 @@
+"""A cube on the ground, pushed by a force."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Input, Joint
+from sim.shapes import Box
+
+
+def block(
+    *,
+    edge: float = 0.5,
+    mass: float = 1.0,
+    friction: float = 0.8,
+    law: str = "nonlinear",
+    radius: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A uniform cube whose eight corners touch the ground z = 0; it stands on it at (0, 0, edge/2).
+
+        +-----+     q  (7,) position of the centre [m], quaternion
+        |  o  |     u  (3,) force at the centre of mass along x, y, z of the world [N]
+        +-----+ edge
+
+    edge [m], mass [kg]; the corners are balls of `radius` [m] that fit inside the cube; law: see Contact.
+    """
+    half = edge / 2 - radius
+    corners = [(half * x, half * y, half * z) for x, y, z in product((1, -1), repeat=3)]
+    return Mechanism(
+        bodies=[Body("block", mass, shape=Box(edge, edge, edge))],
+        joints=[Joint("floating", None, "block")],
+        contacts=[Contact("block", p, radius, friction, law, name=f"corner_{k}") for k, p in enumerate(corners)],
+        inputs=[
+            Input(body="block", force=axis, name=f"force_{label}")
+            for label, axis in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1)))
+        ],
+        gravity=gravity,
+        name="block",
+        neutral={"block": (0.0, 0.0, edge / 2, 1.0, 0.0, 0.0, 0.0)},
+    )

@@ -1,0 +1,30 @@
+"""Two links on a pivot, both joints driven."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from dojo_opt.models.npendulum import npendulum
+from sim.mechanism import Mechanism
+
+
+def double_pendulum(
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    width: float = 0.05,
+    spring: float = 0.0,
+    damper: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """Two equal links; both angles zero is hanging straight down.
+
+        pivot o  z = 2.2 length       q  (2,) angle of link_0 to the vertical, of link_1 to link_0, about x [rad]
+              |                       u  (2,) torques at pivot and elbow [N m]
+              |
+
+    mass [kg] and length [m] of one link, spring [N m/rad], damper [N m s/rad].
+    """
+    return npendulum(
+        2, mass=mass, length=length, width=width, spring=spring, damper=damper, gravity=gravity, name="double_pendulum"
+    )

@@ -1,0 +1,55 @@
+"""A chain of links that hangs from a pivot."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Box
+
+
+def npendulum(
+    n: int = 5,
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    width: float = 0.05,
+    spring: float = 0.0,
+    damper: float = 0.0,
+    joint: str = "revolute",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    name: str = "npendulum",
+) -> Mechanism:
+    """`n` equal links; all angles zero is hanging straight down.
+
+            pivot o  z = 1.1 n length         y ->   z up,  x towards the reader
+                  |  link_0                   q  (n,) angle of each link to the one before, about x [rad]
+                  |  link_1                   u  (n,) torque at each joint [N m]
+
+    mass [kg] and length [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. `joint` may be any kind
+    without translation, e.g. "spherical"; its coordinates are then quaternions, and u three torques per joint.
+    """
+    if not isinstance(n, int) or n < 1:
+        raise ValueError(f"npendulum(n): expected a whole number >= 1, got {n!r}")
+    half = (0.0, 0.0, length / 2)
+    below = (0.0, 0.0, -length / 2)
+    pivot = (0.0, 0.0, 1.1 * n * length)
+    links = [f"link_{i}" for i in range(n)]
+    shape = Box(width, width, length)
+    bodies = [Body(link, mass, shape=shape) for link in links]
+    joints = [
+        Joint(
+            joint,
+            links[i - 1] if i else None,
+            links[i],
+            name=f"joint_{i}",
+            parent_point=below if i else pivot,
+            child_point=half,
+            axis=(1.0, 0.0, 0.0),
+            spring=spring,
+            damper=damper,
+        )
+        for i in range(n)
+    ]
+    return Mechanism(bodies, joints, gravity=gravity, name=name)

@@ -1,0 +1,66 @@
+"""Raibert's hopper: a body on a springy leg, reduced to two balls and a slider."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Input, Joint
+from sim.shapes import Sphere
+
+
+def raiberthopper(
+    *,
+    body_mass: float = 4.18,
+    foot_mass: float = 0.52,
+    body_radius: float = 0.1,
+    foot_radius: float = 0.05,
+    leg_length: float = 0.5,
+    spring: float = 0.0,
+    damper: float = 0.1,
+    limits: Sequence[float] | None = None,
+    friction: float = 0.5,
+    law: str = "nonlinear",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """It stands at (0, 0, leg_length + foot_radius) = (0, 0, 0.55), the leg straight down.
+
+        (body)    z up      q  (8,) position of the body [m], its quaternion, leg length [m]
+           |                v  (7,) velocity (world), angular velocity (body), leg rate
+           | leg            u  (3,) torque on the body about its x and y axes [N m], leg force [N], positive extends
+         (foot)
+
+    The torques act on the body alone, as from reaction wheels. Masses [kg], radii and lengths [m]. The leg has a
+    spring [N/m] with its rest at leg_length, a damper [N s/m], and limits (shortest, longest) [m]. Both balls touch the
+    ground; law: see Contact.
+    """
+    return Mechanism(
+        bodies=[
+            Body("body", body_mass, shape=Sphere(body_radius)),
+            Body("foot", foot_mass, shape=Sphere(foot_radius)),
+        ],
+        joints=[
+            Joint("floating", None, "body"),
+            Joint(
+                "prismatic",
+                "body",
+                "foot",
+                name="leg",
+                axis=(0.0, 0.0, -1.0),
+                spring=spring,
+                damper=damper,
+                rest=leg_length,
+                limits=limits,
+            ),
+        ],
+        contacts=[
+            Contact("foot", radius=foot_radius, friction=friction, law=law),
+            Contact("body", radius=body_radius, friction=friction, law=law),
+        ],
+        inputs=[Input("body", dof=3, name="torque_x"), Input("body", dof=4, name="torque_y"), Input("leg")],
+        gravity=gravity,
+        name="raiberthopper",
+        neutral={"body": (0.0, 0.0, leg_length + foot_radius, 1.0, 0.0, 0.0, 0.0), "leg": leg_length},
+    )

@@ -1,0 +1,38 @@
+"""A ball on the ground, pushed by a force."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Input, Joint
+from sim.shapes import Sphere
+
+
+def sphere(
+    *,
+    radius: float = 0.5,
+    mass: float = 1.0,
+    friction: float = 0.8,
+    law: str = "nonlinear",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A uniform ball that touches the ground z = 0; it rests on it at (0, 0, radius).
+
+        q  (7,) position of the centre [m], quaternion
+        u  (3,) force at the centre of mass along x, y, z of the world [N]
+
+    radius [m], mass [kg]; law: see Contact.
+    """
+    return Mechanism(
+        bodies=[Body("sphere", mass, shape=Sphere(radius))],
+        joints=[Joint("floating", None, "sphere")],
+        contacts=[Contact("sphere", radius=radius, friction=friction, law=law)],
+        inputs=[
+            Input(body="sphere", force=axis, name=f"force_{label}")
+            for label, axis in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1)))
+        ],
+        gravity=gravity,
+        name="sphere",
+        neutral={"sphere": (0.0, 0.0, radius, 1.0, 0.0, 0.0, 0.0)},
+    )

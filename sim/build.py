@@ -1,0 +1,124 @@
+"""pack: a Mechanism as the two flat buffers that kernels read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.layout import Sizes, allocate_model, read_model
+from sim.mechanism import Mechanism
+from sim.model import InputKind, Integers, Law, Model, Vector
+from sim.parts import Contact, Joint
+
+Floats = NDArray[np.float64]
+
+
+def mechanism_sizes(mech: Mechanism) -> Sizes:
+    """Counts of a mechanism; a limit is one bound of one degree of freedom."""
+    nlimit = sum(len(_bounds(j)) for j in mech.joints)
+    return Sizes(mech.nbody, mech.nq, mech.nv, len(mech.contacts), nlimit, len(mech.inputs or ()))
+
+
+def pack(mech: Mechanism) -> tuple[Vector, Integers]:
+    """(floats, ints) of a mechanism; see layout.py."""
+    floats, ints = allocate_model(mechanism_sizes(mech))
+    model = read_model(floats, ints)
+    _pack_tree(mech, model)
+    _pack_joints(mech.joints, model)
+    _pack_contacts(mech, model)
+    _pack_inputs(mech, model)
+    model.gravity[:] = np.asarray(mech.gravity)
+    return floats, ints
+
+
+def _pack_tree(mech: Mechanism, model: Model) -> None:
+    index = {name: i for i, name in enumerate(mech.body_names)}
+    for i, (body, joint) in enumerate(zip(mech.bodies, mech.joints, strict=True)):
+        model.body_parent[i] = index.get(joint.parent or "", -1)
+        model.body_qadr[i + 1] = model.body_qadr[i] + joint.nq
+        model.body_vadr[i + 1] = model.body_vadr[i] + joint.nv
+        model.body_mass[i] = body.mass
+        model.body_inertia[i] = np.ravel(np.asarray(body.inertia, dtype=np.float64))
+
+
+def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
+    limit = 0
+    for i, joint in enumerate(joints):
+        d = int(model.body_vadr[i])
+        dofs = slice(d, d + joint.nv)
+        model.joint_ntrans[i], model.joint_nrot[i] = joint.ntrans, joint.nrot
+        model.joint_parent_point[i] = np.asarray(joint.parent_point)
+        model.joint_child_point[i] = np.asarray(joint.child_point)
+        model.joint_offset[i] = np.asarray(joint.orientation)
+        model.joint_axis[i] = np.asarray(joint.axis)
+        model.joint_trans_axes[i] = translation_axes(joint.ntrans, joint.axis).ravel()
+        model.dof_body[dofs] = i
+        # the three degrees of freedom of a quaternion all point at its start
+        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), joint.ntrans)
+        model.dof_spring[dofs], model.dof_damper[dofs] = np.asarray(joint.spring), np.asarray(joint.damper)
+        model.dof_rest[dofs] = np.asarray(joint.rest)
+        for dof, sign, bound in _bounds(joint):
+            model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
+            limit += 1
+
+
+def _bounds(joint: Joint) -> list[tuple[int, float, float]]:
+    """(degree of freedom, +1 lower or -1 upper, bound) of every finite limit."""
+    rows = [(dof, s, b) for dof, pair in enumerate(joint.limits or ()) for s, b in zip((1.0, -1.0), pair, strict=True)]
+    return [row for row in rows if np.isfinite(row[2])]
+
+
+def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
+    """Free translations as rows of a (3, 3) matrix, zero below: along the axis, across it, or x, y, z."""
+    out = np.zeros((3, 3))
+    unit = np.asarray(axis, dtype=np.float64)
+    if ntrans == 3:
+        out[:] = np.eye(3)
+    elif ntrans == 1:
+        out[0] = unit
+    elif ntrans == 2:
+        first, second = (e for k, e in enumerate(np.eye(3)) if k != np.argmax(np.abs(unit)))
+        out[0] = _normalised(first - unit * (unit @ first))
+        out[1] = _normalised(second - unit * (unit @ second) - out[0] * (out[0] @ second))
+    return out
+
+
+def contact_frame(normal: ArrayLike) -> Floats:
+    """Rows n, t1, t2 of a right-handed frame: t1 along x (along y for a normal near x), t2 = n x t1."""
+    n = np.asarray(normal, dtype=np.float64)
+    along = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    t1 = _normalised(along - n * (n @ along))
+    return np.array([n, t1, np.cross(n, t1)])
+
+
+def _normalised(a: Floats) -> Floats:
+    return np.asarray(a / np.linalg.norm(a))
+
+
+def _law(contact: Contact) -> Law:
+    """Without friction every law is the impact law: one row instead of a cone that has shrunk to a line."""
+    return Law[contact.law.upper()] if contact.friction > 0.0 else Law.IMPACT
+
+
+def _pack_contacts(mech: Mechanism, model: Model) -> None:
+    for c, contact in enumerate(mech.contacts):
+        model.contact_body[c] = mech.body_names.index(contact.body)
+        model.contact_law[c] = _law(contact)
+        model.contact_point[c] = np.asarray(contact.point)
+        model.contact_radius[c] = contact.radius
+        model.contact_friction[c] = contact.friction
+        model.contact_frame[c] = contact_frame(contact.normal).ravel()
+        model.contact_height[c] = contact.height
+
+
+def _pack_inputs(mech: Mechanism, model: Model) -> None:
+    for k, part in enumerate(mech.inputs or ()):
+        if part.joint is not None:
+            model.input_kind[k] = InputKind.JOINT
+            model.input_index[k] = model.body_vadr[mech.joint_names.index(part.joint)] + part.dof
+        else:
+            model.input_kind[k] = InputKind.WORLD if part.frame == "world" else InputKind.BODY
+            model.input_index[k] = mech.body_names.index(part.body or "")
+            model.input_wrench[k] = np.concatenate([np.asarray(part.force), np.asarray(part.torque)])

@@ -1,0 +1,200 @@
+"""Calls: the one place where Python enters compiled code, with all buffers that cross the border.
+
+    settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
+    report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
+    contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
+
+Scratch belongs to a thread, so that one Simulator may be used from several.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
+from sim.layout import NCONTACT, NLIMIT, NQ, NU, NV, work_size
+from sim.model import Integers, Vector
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+
+REPORT, CONTACT = 5, 8
+_CHUNKS = 4  # per core: evens out knots that take longer
+
+
+class Settings(NamedTuple):
+    """Settings of a time step."""
+
+    time_step: float  # [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float
+    max_iterations: int
+
+    def array(self, kappa: float | None = None) -> Vector:
+        """As kernels read it, at another kappa when given."""
+        return np.array(self if kappa is None else self._replace(kappa=kappa), dtype=np.float64)
+
+
+class Calls:
+    """The kernels of one packed mechanism, as functions of checked arrays."""
+
+    def __init__(self, floats: Vector, ints: Integers, settings: Settings) -> None:
+        self.floats, self.ints, self.settings = floats, ints, settings
+        self.nx, self.ndx = int(ints[NQ] + ints[NV]), 2 * int(ints[NV])
+        self.nu, self.ncontact = int(ints[NU]), int(ints[NCONTACT])
+        self.hard = 1 if ints[NCONTACT] + ints[NLIMIT] else None  # None: the interior point is not compiled
+        self._scratch = threading.local()
+
+    def _work(self) -> Vector:
+        """This thread's buffer."""
+        if not hasattr(self._scratch, "one"):
+            self._scratch.one = np.zeros(work_size(self.ints))
+        return self._scratch.one
+
+    def _works(self, count: int) -> Floats:
+        """This thread's buffers for a parallel call, one per chunk."""
+        chunks = max(1, min(count, _CHUNKS * (os.cpu_count() or 1)))
+        if not hasattr(self._scratch, "many") or len(self._scratch.many) < chunks:
+            self._scratch.many = np.zeros((chunks, work_size(self.ints)))
+        return self._scratch.many[:chunks]
+
+    def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
+        """(number of solved steps, states, report of every step, contacts of every step)."""
+        steps = len(us)
+        xs = np.zeros((steps + 1, self.nx))
+        reports = np.zeros((steps, REPORT))
+        contacts = np.zeros((steps, self.ncontact, CONTACT))
+        knot = rollout.roll(
+            self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard
+        )
+        np.nan_to_num(reports, copy=False, nan=np.inf, posinf=np.inf)
+        return int(knot), xs, reports, contacts
+
+    def closed_loop(
+        self,
+        x: Vector,
+        us: Floats,
+        policy: tuple[Floats, Floats, Floats, Floats],
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+    ) -> tuple[int, Floats, Floats, Vector]:
+        """(number of solved knots, states, inputs, report of the last step); policy: xs, ks, Ks, gaps."""
+        xs, u_out, report = np.zeros((len(us) + 1, self.nx)), np.zeros((len(us), self.nu)), np.zeros(REPORT)
+        settings = self.settings.array(kappa)
+        knot = rollout.closed_loop(
+            self.floats,
+            self.ints,
+            self._work(),
+            settings,
+            x,
+            us,
+            policy,
+            alpha,
+            limits,
+            substeps,
+            xs,
+            u_out,
+            report,
+            self.hard,
+        )
+        np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
+        return int(knot), xs, u_out, report
+
+    def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
+        """(A, B, next states, report of every knot) of all knots, in parallel."""
+        n = len(us)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        settings, works = self.settings.array(kappa), self._works(n)
+        rollout.linearize_knots(
+            self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports, self.hard
+        )
+        unsolved = reports[:, 0] != Status.SOLVED
+        for out in (A, B, x_next):
+            out[unsolved] = 0.0
+        return A, B, x_next, reports
+
+    def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
+        """(A, B, next state, report) of one step, without the threads."""
+        A, B = np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu))
+        x_next, report = np.zeros(self.nx), np.zeros(REPORT)
+        settings = self.settings.array(kappa)
+        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard)
+        return A, B, x_next, report
+
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+        """(states, status and number of solved steps of every rollout), in parallel."""
+        n, steps = us.shape[:2]
+        xs = np.zeros((n, steps + 1, self.nx))
+        status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        settings, works = self.settings.array(), self._works(n)
+        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots, self.hard)
+        return xs, status, knots
+
+    def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
+        """(status, state) with the velocity v at the node q."""
+        x = np.concatenate([q, v])
+        status = start.start_at(self.floats, self.ints, self._work(), self.settings.time_step, v, x)
+        return int(status), x
+
+    def integrate(self, xs: Floats, dxs: Floats) -> Floats:
+        """x (+) dx of every row."""
+        out = np.zeros_like(xs)
+        state.integrate_states(self.floats, self.ints, xs, dxs, out)
+        return out
+
+    def difference(self, x0s: Floats, x1s: Floats) -> Floats:
+        """x1 (-) x0 of every row."""
+        out = np.zeros((len(x0s), self.ndx))
+        state.state_differences(self.floats, self.ints, x0s, x1s, out)
+        return out
+
+    def normalise(self, xs: Floats, tolerance: float) -> int:
+        """Normalise quaternions in place; see `normalise_quaternions`."""
+        return int(state.normalise_quaternions(self.floats, self.ints, xs, tolerance))
+
+    def maximal(self, xs: Floats, nbody: int) -> Floats:
+        """z of every row, (n, nbody, 13)."""
+        out = np.zeros((len(xs) * nbody, 13))
+        coordinates.maximal_states(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        return out.reshape(len(xs), nbody, 13)
+
+    def minimal(self, zs: Floats) -> Floats:
+        """x of every z, (n, nbody, 13)."""
+        out = np.zeros((len(zs), self.nx))
+        flat = zs.reshape(-1, 13)
+        coordinates.minimal_states(self.floats, self.ints, self._work(), self.settings.time_step, flat, out)
+        return out
+
+    def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
+        """dz/dx."""
+        out = np.zeros((12 * nbody, self.ndx))
+        h = self.settings.time_step
+        coordinates_jacobian.maximal_jacobian_at(self.floats, self.ints, self._work(), h, x, out)
+        return out
+
+    def minimal_jacobian(self, z: Floats) -> Floats:
+        """dx/dz."""
+        out = np.zeros((self.ndx, 12 * len(z)))
+        h = self.settings.time_step
+        coordinates_jacobian.minimal_jacobian_at(self.floats, self.ints, self._work(), h, z, out)
+        return out
+
+    def energies(self, xs: Floats) -> Floats:
+        """(kinetic, potential) energy of every row."""
+        out = np.zeros((len(xs), 2))
+        energy.energies(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        return out
+
+    def momenta(self, xs: Floats) -> Floats:
+        """(linear, angular) momentum of every row."""
+        out = np.zeros((len(xs), 6))
+        energy.momenta(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        return out

@@ -1,0 +1,96 @@
+"""Checks of what a user passes in: every message names the call, what was expected, and what was got."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def _floats(call: str, value: Any) -> Floats:
+    """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused."""
+    try:
+        with np.errstate(all="ignore"):
+            raw = np.asarray(value)
+            if raw.dtype.kind not in "biufO":
+                raise TypeError
+            return np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected real numbers, got {value!r}") from None
+
+
+def array(call: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
+    """`value` as a finite float64 array of the given shape (None: any length)."""
+    out = _floats(call, value)
+    fits = out.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, out.shape, strict=True))
+    if not fits:
+        wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
+        raise ValueError(f"{call}: expected shape ({wanted}), got {out.shape}")
+    if not np.isfinite(out).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(out))[0])
+        where = f" at index {index[0] if len(index) == 1 else index}" if index else ""
+        raise ValueError(f"{call}: expected finite numbers, got {out[index]}{where}")
+    return out
+
+
+def number(call: str, value: Any, at_least: float | None = None, above: float | None = None) -> float:
+    """`value` as a finite float within the stated bound."""
+    if np.ndim(value) != 0:
+        raise ValueError(f"{call}: expected one number, got {value!r}")
+    out = float(array(call, value, ()))
+    if at_least is not None and out < at_least:
+        raise ValueError(f"{call}: expected a number >= {at_least:g}, got {out:g}")
+    if above is not None and out <= above:
+        raise ValueError(f"{call}: expected a number > {above:g}, got {out:g}")
+    return out
+
+
+def vector(call: str, value: Any, length: int) -> tuple[float, ...]:
+    """`value` as a tuple of finite floats."""
+    return tuple(float(x) for x in array(call, value, (length,)))
+
+
+def direction(call: str, value: Any) -> tuple[float, ...]:
+    """`value` scaled to a unit vector."""
+    out = array(call, value, (3,))
+    length = float(np.linalg.norm(out))
+    if length < 1e-9:
+        raise ValueError(f"{call}: expected a direction, got the zero vector")
+    return tuple(float(x) for x in out / length)
+
+
+def quaternion(call: str, value: Any) -> tuple[float, ...]:
+    """`value` as a unit quaternion (w, x, y, z); refused when its length is off by more than 1e-6."""
+    out = array(call, value, (4,))
+    length = float(np.linalg.norm(out))
+    if abs(length - 1.0) > 1e-6:
+        raise ValueError(f"{call}: expected a unit quaternion (w, x, y, z), got length {length:g}")
+    return tuple(float(x) for x in out / length)
+
+
+def name(call: str, value: Any) -> str:
+    """`value` as a name that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{call}: expected a name, got {value!r}")
+    return value
+
+
+def one_of(call: str, value: Any, known: Iterable[str]) -> str:
+    """`value` as one of the known words."""
+    words = list(known)
+    if not isinstance(value, str) or value not in words:
+        raise ValueError(f"{call}: {value!r} is not one of: {', '.join(words) or '(none)'}")
+    return value
+
+
+def distinct(call: str, names: Iterable[str]) -> None:
+    """Refuse a name that is given twice."""
+    seen: set[str] = set()
+    for n in names:
+        if n in seen:
+            raise ValueError(f"{call}: the name {n!r} is used twice")
+        seen.add(n)

@@ -1,0 +1,85 @@
+"""describe: what a scene consists of, what a step has to compute for it, and what is left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.build import mechanism_sizes
+from sim.mechanism import Mechanism
+from sim.parts import Joint
+
+if TYPE_CHECKING:
+    from sim.simulator import Simulator
+
+
+def describe(sim: Simulator) -> str:
+    """A page of text."""
+    mech = sim.mechanism
+    lines = [
+        f"{mech.name}: {sim.nbody} bodies, {sim.nv} degrees of freedom, {_total_mass(mech):.4g} kg",
+        f"  state x ({sim.nx},) = q ({sim.nq},), v ({sim.nv},);  perturbation dx ({sim.ndx},);  input u ({sim.nu},)",
+        f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}",
+        "joints",
+        *(_joint_line(mech, j) for j in mech.joints),
+        "inputs",
+        *(f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)),
+        "contacts",
+        *_contact_lines(mech),
+        "a step",
+        *(f"  {what:<18}{state}" for what, state in _parts(mech)),
+    ]
+    return "\n".join(lines)
+
+
+def _total_mass(mech: Mechanism) -> float:
+    return sum(b.mass for b in mech.bodies)
+
+
+def _span(s: slice) -> str:
+    """Indices as a user would write them."""
+    return "-" if s.start == s.stop else str(s.start) if s.stop == s.start + 1 else f"{s.start}:{s.stop}"
+
+
+def _joint_line(mech: Mechanism, joint: Joint) -> str:
+    """Name, kind, place in the tree, coordinates, and what else is on the joint."""
+    extra = [
+        word
+        for word, there in (
+            ("spring", any(np.atleast_1d(np.asarray(joint.spring)))),
+            ("damper", any(np.atleast_1d(np.asarray(joint.damper)))),
+            ("limits", any(np.isfinite(b) for pair in joint.limits or () for b in pair)),
+        )
+        if there
+    ]
+    at = f"q[{_span(mech.q_slice(joint.name))}], v[{_span(mech.v_slice(joint.name))}]"
+    tail = f"  with {', '.join(extra)}" if extra else ""
+    return f"  {joint.name:<18}{joint.kind:<16}{joint.parent} -> {joint.child}:  {at}{tail}"
+
+
+def _contact_lines(mech: Mechanism) -> list[str]:
+    lines = []
+    for c in mech.contacts:
+        law = c.law if c.friction > 0 else "impact"
+        shape = f"ball of {c.radius:g} m" if c.radius else "point"
+        lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}")
+    return lines
+
+
+def _parts(mech: Mechanism) -> list[tuple[str, str]]:
+    """What a step computes, and what it leaves out."""
+    nlimit = mechanism_sizes(mech).nlimit
+    cones = sum(c.friction > 0 and c.law == "nonlinear" for c in mech.contacts)
+    pyramids = sum(c.friction > 0 and c.law == "linear" for c in mech.contacts)
+    impacts = len(mech.contacts) - cones - pyramids
+    springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
+    dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
+    solver = "interior point" if mech.contacts or nlimit else "Newton's method; interior point left out"
+    counts = (
+        ("contacts", len(mech.contacts), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
+        ("joint limits", nlimit, f"{nlimit} bounds"),
+        ("springs", springs, f"{springs} joints"),
+        ("dampers", dampers, f"{dampers} joints"),
+    )
+    return [("solver", solver), *((what, text if n else "left out") for what, n, text in counts)]

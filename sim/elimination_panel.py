@@ -1,0 +1,113 @@
+"""The elimination applied to many right-hand sides at once: inner loops run along the columns and vectorise."""
+
+from __future__ import annotations
+
+from sim.model import Matrix, Model, Work
+from solvers.jit import kernel
+
+
+@kernel
+def _rows_minus(S: Matrix, d: int, P: Matrix, r: int, out: Matrix) -> None:
+    """out[d] -= S[d] . P[r : r + 6]"""
+    a, b, c, e, f, g = S[d, 0], S[d, 1], S[d, 2], S[d, 3], S[d, 4], S[d, 5]
+    p0, p1, p2, p3, p4, p5 = P[r], P[r + 1], P[r + 2], P[r + 3], P[r + 4], P[r + 5]
+    x = out[d]
+    for k in range(x.shape[0]):
+        x[k] -= a * p0[k] + b * p1[k] + c * p2[k] + e * p3[k] + f * p4[k] + g * p5[k]
+
+
+@kernel
+def _add_rows(S: Matrix, d: int, X: Matrix, P: Matrix, r: int) -> None:
+    """P[r : r + 6] += S[d] X[d]"""
+    a, b, c, e, f, g = S[d, 0], S[d, 1], S[d, 2], S[d, 3], S[d, 4], S[d, 5]
+    p0, p1, p2, p3, p4, p5 = P[r], P[r + 1], P[r + 2], P[r + 3], P[r + 4], P[r + 5]
+    x = X[d]
+    for k in range(x.shape[0]):
+        t = x[k]
+        p0[k] += a * t
+        p1[k] += b * t
+        p2[k] += c * t
+        p3[k] += e * t
+        p4[k] += f * t
+        p5[k] += g * t
+
+
+@kernel
+def _apply_block(model: Model, work: Work, i: int, sign: float, rows: Matrix, first: int, add: bool) -> None:
+    """columns[joint i] = [columns +] sign D^-1 rows[first ...]; scratch rows keep the aliasing safe."""
+    d = model.body_vadr[i]
+    n = model.body_vadr[i + 1] - d
+    D = work.D[i]
+    for a in range(n):
+        x = work.columns[d + a]
+        if not add:
+            for k in range(x.shape[0]):
+                x[k] = 0.0
+        for b in range(n):
+            g = sign * D[a * n + b]
+            y = rows[first + b]
+            for k in range(x.shape[0]):
+                x[k] += g * y[k]
+
+
+@kernel
+def solve_panel(model: Model, work: Work) -> None:
+    """columns := H^-1 columns, as `solve` for one right-hand side."""
+    nbody = model.body_parent.shape[0]
+    X = work.columns
+    P = work.panel
+    last = 6 * nbody
+    for r in range(last):
+        p = P[r]
+        for k in range(p.shape[0]):
+            p[k] = 0.0
+    for i in range(nbody - 1, -1, -1):
+        d0 = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d0
+        q = model.body_parent[i]
+        for d in range(d0, d0 + n):
+            _rows_minus(work.S2, d, P, 6 * i, X)
+        for a in range(n):
+            x = X[d0 + a]
+            s = P[last + a]
+            for k in range(x.shape[0]):
+                s[k] = x[k]
+        _apply_block(model, work, i, 1.0, P, last, False)
+        if q >= 0:
+            for d in range(d0, d0 + n):
+                _add_rows(work.U, d, X, P, 6 * i)
+            for r in range(6):
+                p = P[6 * i + r]
+                s = P[6 * q + r]
+                for k in range(p.shape[0]):
+                    s[k] += p[k]
+    for i in range(nbody):
+        d0 = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d0
+        q = model.body_parent[i]
+        for r in range(6):
+            p = P[6 * i + r]
+            if q >= 0:
+                s = P[6 * q + r]
+                for k in range(p.shape[0]):
+                    p[k] = s[k]
+            else:
+                for k in range(p.shape[0]):
+                    p[k] = 0.0
+        if q >= 0:
+            for a in range(n):
+                s = P[last + a]
+                for k in range(s.shape[0]):
+                    s[k] = 0.0
+            for a in range(n):
+                L = work.L[d0 + a]
+                s = P[last + a]
+                v = P[6 * i]
+                for r in range(6):
+                    v = P[6 * i + r]
+                    g = L[r]
+                    for k in range(s.shape[0]):
+                        s[k] += g * v[k]
+            _apply_block(model, work, i, -1.0, P, last, True)
+        for d in range(d0, d0 + n):
+            _add_rows(work.S3nu, d, X, P, 6 * i)

@@ -1,0 +1,161 @@
+"""Energy and momentum at the nodes of a motion, by the discrete Legendre transform of the interval that led there.
+
+    p2 = d L_d(1, 2) / d(configuration 2)
+
+Momentum is then conserved exactly, and the energy p.M^-1 p / 2 + V keeps an error of second order for all times.
+Contacts, dampers and inputs act between nodes and are not part of it.
+"""
+
+from __future__ import annotations
+
+from sim.coordinates import node_poses
+from sim.dynamics import angular_momentum, world_inertia
+from sim.elimination import factor, project, solve, subtree_sums
+from sim.joints import relative_to_rest
+from sim.layout import model_view, work_view
+from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.rotation import cross, quat_exp, quat_mul, quat_turn
+from solvers.jit import kernel
+
+
+@kernel
+def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) -> None:
+    """out[i] = momentum of body i at the node, world axes, about the origin of the world:
+
+        linear     p = m (x2 - x1)/h + h/2 m g
+        angular    x2 x p + P-(1, 2)
+
+    Springs and joints are left out: between bodies they cancel.   Fills configurations 1 and 2.   out: (nbody, 6).
+    """
+    node_poses(model, work, h, x)
+    world_inertia(model, work.rot2, work.inertia_world)
+    for i in range(model.body_parent.shape[0]):
+        a, b = work.quat1[i], work.quat2[i]
+        c, x_, y_, z_ = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+        Px, Py, Pz = angular_momentum(work.inertia_world, i, h, c, -x_, -y_, -z_)
+        m = model.body_mass[i]
+        for k in range(3):
+            out[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + 0.5 * h * model.gravity[k])
+        mx, my, mz = cross(work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2], out[i, 0], out[i, 1], out[i, 2])
+        out[i, 3] = mx - Px
+        out[i, 4] = my - Py
+        out[i, 5] = mz - Pz
+
+
+@kernel
+def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
+    """out -= d V_d(1, 2)/d(q2), the half of the spring impulse at the node (accumulated).
+
+        scalar        V_d = h k/2 ((q1 + q2)/2 - rest)^2       derivative  h k/2 ((q1 + q2)/2 - rest)
+        quaternion    V_d = h k/2 |s1 + s2|^2                  derivative  h k/2 (c2 I - [s2]) (s1 + s2)
+
+    s: vector part of the rotation from rest.   out: (nv,).
+    """
+    nv = model.dof_body.shape[0]
+    nq = x.shape[0] - nv
+    for i in range(model.body_parent.shape[0]):
+        end = model.body_vadr[i + 1]
+        if model.joint_nrot[i] == 3:
+            end -= 3
+            k = model.dof_spring[end]
+            if k > 0.0:
+                w = x[nq + end : nq + end + 3]
+                r2 = relative_to_rest(model, i, x[:nq])
+                e = quat_exp(-h * w[0], -h * w[1], -h * w[2])
+                r1 = quat_mul(r2[0], r2[1], r2[2], r2[3], e[0], e[1], e[2], e[3])
+                s0, s1, s2 = r1[1] + r2[1], r1[2] + r2[2], r1[3] + r2[3]
+                t = cross(r2[1], r2[2], r2[3], s0, s1, s2)
+                out[end] -= 0.5 * h * k * (r2[0] * s0 - t[0])
+                out[end + 1] -= 0.5 * h * k * (r2[0] * s1 - t[1])
+                out[end + 2] -= 0.5 * h * k * (r2[0] * s2 - t[2])
+        for d in range(model.body_vadr[i], end):
+            middle = x[model.dof_qadr[d]] - 0.5 * h * x[nq + d] - model.dof_rest[d]
+            out[d] -= 0.5 * h * model.dof_spring[d] * middle
+
+
+@kernel
+def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
+    """out[i] = inertia of body i about the origin of the world, 6 x 6 row-major, at configuration 2:
+
+    [ m I       -m [d]           ]
+    [ m [d]     J - m [d] [d]    ]       d: to the centre of mass
+    """
+    for i in range(model.body_parent.shape[0]):
+        m = model.body_mass[i]
+        x, y, z = work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2]
+        s = x * x + y * y + z * z
+        J = work.inertia_world[i]
+        A = out[i]
+        for k in range(36):
+            A[k] = 0.0
+        for k in range(3):
+            A[7 * k] = m
+        A[4], A[5], A[9], A[11], A[15], A[16] = m * z, -m * y, -m * z, m * x, m * y, -m * x
+        A[19], A[20], A[24], A[26], A[30], A[31] = -m * z, m * y, m * z, -m * x, -m * y, m * x
+        A[21], A[22], A[23] = J[0] + m * (s - x * x), J[1] - m * x * y, J[2] - m * x * z
+        A[27], A[28], A[29] = J[3] - m * y * x, J[4] + m * (s - y * y), J[5] - m * y * z
+        A[33], A[34], A[35] = J[6] - m * z * x, J[7] - m * z * y, J[8] + m * (s - z * z)
+
+
+@kernel
+def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
+    """p.M^-1 p / 2, with p = S2^T (momenta of the bodies) + springs and M = S2^T (inertia) S2 at configuration 2."""
+    node_momentum(model, work, h, x, work.wrench)
+    subtree_sums(model, work.wrench, work.subtree)
+    project(model, work.S2, work.subtree, work.residual)
+    add_spring_momentum(model, h, x, work.residual)
+    spatial_inertia(model, work, work.A)
+    for d in range(work.S2.shape[0]):
+        for k in range(6):
+            work.S3nu[d, k] = work.S2[d, k]
+    for i in range(work.joint_block.shape[0]):
+        for k in range(36):
+            work.joint_block[i, k] = 0.0
+    factor(model, work)
+    solve(model, work, work.residual, work.dnu)
+    energy = 0.0
+    for d in range(work.dnu.shape[0]):
+        energy += 0.5 * work.residual[d] * work.dnu[d]
+    return energy
+
+
+@kernel
+def potential_energy(model: Model, work: Work, x: Vector) -> float:
+    """Sum of -m g.x2, of k/2 (q - rest)^2 for scalar springs, and of 2 k |s|^2 for those of quaternion joints."""
+    energy = 0.0
+    for i in range(model.body_parent.shape[0]):
+        for k in range(3):
+            energy -= model.body_mass[i] * model.gravity[k] * work.pos2[i, k]
+        end = model.body_vadr[i + 1]
+        if model.joint_nrot[i] == 3:
+            end -= 3
+            if model.dof_spring[end] > 0.0:
+                r = relative_to_rest(model, i, x)
+                energy += 2.0 * model.dof_spring[end] * (r[1] * r[1] + r[2] * r[2] + r[3] * r[3])
+        for d in range(model.body_vadr[i], end):
+            stretch = x[model.dof_qadr[d]] - model.dof_rest[d]
+            energy += 0.5 * model.dof_spring[d] * stretch * stretch
+    return energy
+
+
+@kernel
+def energies(floats: Vector, ints: Integers, buffer: Vector, h: float, xs: Matrix, out: Matrix) -> None:
+    """out[t] = (kinetic, potential) energy of state t [J].   xs: (n, nx); out: (n, 2)."""
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    for t in range(xs.shape[0]):
+        out[t, 0] = kinetic_energy(model, work, h, xs[t])
+        out[t, 1] = potential_energy(model, work, xs[t])
+
+
+@kernel
+def momenta(floats: Vector, ints: Integers, buffer: Vector, h: float, xs: Matrix, out: Matrix) -> None:
+    """out[t] = (linear, angular about the origin of the world) momentum of state t.   xs: (n, nx); out: (n, 6)."""
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    for t in range(xs.shape[0]):
+        node_momentum(model, work, h, xs[t], work.wrench)
+        for k in range(6):
+            out[t, k] = 0.0
+            for i in range(model.body_parent.shape[0]):
+                out[t, k] += work.wrench[i, k]

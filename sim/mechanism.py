@@ -1,0 +1,231 @@
+"""Mechanism: bodies hung on joints in a tree, with contacts and inputs; sorted and validated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim import checks
+from sim.parts import WORLD, Body, Contact, Input, Joint
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
+
+    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones
+    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
+              or all of q
+    """
+
+    bodies: Sequence[Body]
+    joints: Sequence[Joint]
+    contacts: Sequence[Contact] = ()
+    inputs: Sequence[Input] | None = None
+    gravity: ArrayLike = (0.0, 0.0, -9.81)  # [m/s^2]
+    name: str = "mechanism"
+    neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        checks.name("Mechanism(name=...)", self.name)
+        call = f"Mechanism({self.name!r}"
+        for field, kind in (("bodies", Body), ("joints", Joint), ("contacts", Contact), ("inputs", Input)):
+            if field != "inputs" or self.inputs is not None:
+                object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
+        bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", joints)
+        if self.nv == 0:
+            raise ValueError(f"{call}): no joint is free to move")
+        object.__setattr__(self, "contacts", _name_contacts(f"{call})", self.contacts, self.body_names))
+        object.__setattr__(self, "inputs", self._name_inputs(call))
+        object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
+        object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
+
+    @property
+    def nbody(self) -> int:
+        """Number of bodies, and of joints."""
+        return len(self.bodies)
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return sum(j.nq for j in self.joints)
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return sum(j.nv for j in self.joints)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies, in tree order."""
+        return tuple(b.name for b in self.bodies)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in tree order."""
+        return tuple(j.name for j in self.joints)
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(c.name for c in self.contacts)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the entries of u."""
+        return tuple(i.name for i in self.inputs or ())
+
+    def q_slice(self, joint: str) -> slice:
+        """Where the coordinates of a joint are in q."""
+        i = self.joint_names.index(checks.one_of("Mechanism.q_slice(joint)", joint, self.joint_names))
+        start = sum(j.nq for j in self.joints[:i])
+        return slice(start, start + self.joints[i].nq)
+
+    def v_slice(self, joint: str) -> slice:
+        """Where the velocities of a joint are in v."""
+        i = self.joint_names.index(checks.one_of("Mechanism.v_slice(joint)", joint, self.joint_names))
+        start = sum(j.nv for j in self.joints[:i])
+        return slice(start, start + self.joints[i].nv)
+
+    def _name_inputs(self, call: str) -> tuple[Input, ...]:
+        """The inputs with names, after a look at what they act on."""
+        if self.inputs is None:
+            free = [j for j in self.joints if j.kind != "floating"]
+            given = [Input(j.name, dof=d) for j in free for d in range(j.nv)]
+        else:
+            given = list(self.inputs)
+        out = []
+        for part in given:
+            if part.joint is not None:
+                label = checks.one_of(f"{call}, inputs=...): joint", part.joint, self.joint_names)
+                nv = self.joints[self.joint_names.index(label)].nv
+                if not isinstance(part.dof, int | np.integer) or not 0 <= part.dof < nv:
+                    raise ValueError(
+                        f"{call}): Input({label!r}, dof={part.dof!r}): the joint has {nv} degrees of freedom"
+                    )
+                label += f"[{part.dof}]" if nv > 1 else ""
+            else:
+                label = checks.one_of(f"{call}, inputs=...): body", part.body, self.body_names)
+            out.append(_renamed(part, part.name or label))
+        return tuple(_number_repeats(out))
+
+    def _coordinates(self, call: str, given: Any) -> tuple[float, ...]:
+        """q from a table by joint, or from a vector; quaternions are checked and normalised."""
+        q = np.zeros(self.nq)
+        table = {} if given is None else given
+        if isinstance(table, Mapping):
+            for name in table:
+                checks.one_of(f"{call}: joint", name, self.joint_names)
+        else:
+            values = checks.array(call, table, (self.nq,))
+            table = {j.name: values[self.q_slice(j.name)] for j in self.joints}
+        for joint in self.joints:
+            at = self.q_slice(joint.name)
+            if joint.nrot == 3:
+                q[at.stop - 4] = 1.0
+            if joint.name in table:
+                value = checks.array(f"{call}: joint {joint.name!r}", np.atleast_1d(table[joint.name]), (joint.nq,))
+                q[at] = value
+                if joint.nrot == 3:
+                    q[at.stop - 4 : at.stop] = checks.quaternion(f"{call}: joint {joint.name!r}", value[-4:])
+        return tuple(float(x) for x in q)
+
+
+def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
+    """The parts as a tuple, each of the expected kind."""
+    parts = tuple(given) if isinstance(given, Iterable) else (given,)
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ValueError(f"{call}: expected a list of {kind.__name__}, got {part!r}")
+    return parts
+
+
+def _sort_tree(
+    call: str, bodies: Sequence[Body], joints: Sequence[Joint]
+) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
+    """Joints with parents before children, otherwise in the given order; bodies in the order of their joints."""
+    if not bodies:
+        raise ValueError(f"{call}: expected at least one body")
+    checks.distinct(f"{call}: bodies", (b.name for b in bodies))
+    checks.distinct(f"{call}: joints", (j.name for j in joints))
+    by_name = {b.name: b for b in bodies}
+    if WORLD in by_name:
+        raise ValueError(f"{call}: a body cannot be named {WORLD!r}")
+    hangs_on: dict[str, str] = {}
+    for j in joints:
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *by_name])
+        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, by_name)
+        if j.child in hangs_on:
+            raise ValueError(
+                f"{call}: body {j.child!r} is the child of two joints, {hangs_on[j.child]!r} and {j.name!r}; "
+                "closed loops are not supported yet"
+            )
+        hangs_on[j.child] = j.name
+    for name in by_name:
+        if name not in hangs_on:
+            raise ValueError(
+                f"{call}: body {name!r} hangs on no joint; a free body needs Joint('floating', None, {name!r})"
+            )
+    placed, order, waiting = {WORLD}, [], list(joints)
+    while waiting:
+        ready = [j for j in waiting if j.parent in placed]
+        if not ready:
+            raise ValueError(f"{call}: joints in a cycle: {', '.join(repr(j.name) for j in waiting)}")
+        # one at a time, so that the given order survives wherever it is a tree order
+        placed.add(ready[0].child)
+        order.append(ready[0])
+        waiting.remove(ready[0])
+    return tuple(by_name[j.child] for j in order), tuple(order)
+
+
+def _renamed(part: Any, name: str) -> Any:
+    """The part under another name; frozen parts are rebuilt without repeating their checks."""
+    if part.name == name:
+        return part
+    out = object.__new__(type(part))
+    for field, value in vars(part).items():
+        object.__setattr__(out, field, value)
+    object.__setattr__(out, "name", name)
+    return out
+
+
+def _number_repeats(parts: Sequence[Any]) -> list[Any]:
+    """Parts of equal name get numbers: foot, foot -> foot_0, foot_1."""
+    names = [p.name for p in parts]
+    counts: dict[str, int] = {}
+    out = []
+    for part in parts:
+        if names.count(part.name) > 1:
+            k = counts.get(part.name, 0)
+            counts[part.name] = k + 1
+            out.append(_renamed(part, f"{part.name}_{k}"))
+        else:
+            out.append(part)
+    return out
+
+
+def _name_contacts(call: str, contacts: Sequence[Contact], bodies: Sequence[str]) -> tuple[Contact, ...]:
+    """The contacts with names, after a look at their bodies."""
+    for c in contacts:
+        checks.one_of(f"{call}: body of contact {c.name!r}" if c.name else f"{call}: contact body", c.body, bodies)
+    checks.distinct(f"{call}: contacts", (c.name for c in contacts if c.name))
+    named = _number_repeats([_renamed(c, c.name or c.body) for c in contacts])
+    checks.distinct(f"{call}: contacts", (c.name for c in named))
+    return tuple(named)
+
+
+def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
+    """The mechanism with another friction or law, of all contacts or by name."""
+    if isinstance(value, Mapping):
+        for name in value:
+            checks.one_of(f"Simulator.replace({field}=...)", name, mech.contact_names)
+        contacts = [replace(c, **{field: value.get(c.name, getattr(c, field))}) for c in mech.contacts]
+    else:
+        contacts = [replace(c, **{field: value}) for c in mech.contacts]
+    return replace(mech, contacts=contacts)

@@ -1,0 +1,97 @@
+"""The step of a scene without contacts and limits: Newton's method on the momentum balance, nothing else compiled."""
+
+from __future__ import annotations
+
+from sim.dynamics import momentum_balance, momentum_balance_jacobian
+from sim.elimination import factor, project, solve, subtree_sums
+from sim.joints import joint_blocks, joint_impulses
+from sim.kinematics import velocity_columns
+from sim.model import Model, Options, Outcome, Vector, Work
+from solvers.jit import kernel
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
+_SINGULAR = int(Status.SINGULAR)
+
+
+@kernel
+def residual_scale(work: Work) -> float:
+    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
+    s = 1.0
+    for i in range(work.momentum_in.shape[0]):
+        for k in range(6):
+            s = max(s, 1.0 + abs(work.momentum_in[i, k]))
+    return s
+
+
+@kernel
+def norm(x: Vector) -> float:
+    """Largest absolute entry; NaN if any entry is NaN."""
+    r = 0.0
+    for d in range(x.shape[0]):
+        a = abs(x[d])
+        if not a <= r:
+            r = a
+    return r
+
+
+@kernel
+def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> Outcome:
+    """Solve R(v25) = 0 from v25 = v15; halve steps that leave the domain or let the residual grow.
+
+    Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
+    """
+    h = options.h
+    scale = residual_scale(work)
+    for d in range(v.shape[0]):
+        work.nu_trial[d] = v[d]
+        work.dnu[d] = 0.0
+    alpha = 1.0
+    last = 1e300
+    halvings = 0
+    iterations = 0
+    r = 1e300
+    status = _MAX_ITERATIONS
+    while True:
+        for d in range(v.shape[0]):
+            work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
+        inside = momentum_balance(model, work, h, q)
+        for i in range(work.balance.shape[0]):
+            for k in range(6):
+                work.wrench[i, k] = work.balance[i, k]
+        subtree_sums(model, work.wrench, work.subtree)
+        project(model, work.S2, work.subtree, work.residual)
+        joint_impulses(model, work, h, q, v, u)
+        r = norm(work.residual) / scale
+        if not (inside and r < max(last, options.tolerance)):
+            if halvings > 40:
+                status = _NO_PROGRESS
+                break
+            halvings += 1
+            if iterations == 0:  # the start itself lies outside: slow everything down
+                for d in range(v.shape[0]):
+                    work.nu_trial[d] *= 0.7
+            alpha *= 0.5
+            continue
+        if r < options.tolerance:
+            status = _SOLVED
+            break
+        if iterations == options.max_iterations:
+            break
+        iterations += 1
+        halvings = 0
+        last = r
+        alpha = 1.0
+        velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+        momentum_balance_jacobian(model, work, h, work.A)
+        joint_blocks(model, work, h, q, v)
+        if not factor(model, work):
+            status = _SINGULAR
+            break
+        for d in range(v.shape[0]):
+            work.nu_trial[d] = work.nu[d]
+            work.rhs[d] = -work.residual[d]
+        solve(model, work, work.rhs, work.dnu)
+    return Outcome(status, iterations, r, 0.0)

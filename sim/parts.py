@@ -1,0 +1,250 @@
+"""Body, Joint, Contact, Input: the parts a user puts together into a Mechanism. Each checks its own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim import checks
+from sim.shapes import Shape, Solid
+
+WORLD = "world"
+# free translations and free rotations of each kind of joint
+KINDS: dict[str, tuple[int, int]] = {
+    "fixed": (0, 0),
+    "prismatic": (1, 0),  # along the axis
+    "planar": (2, 0),  # across the axis
+    "fixed_orientation": (3, 0),
+    "revolute": (0, 1),  # about the axis
+    "cylindrical": (1, 1),
+    "planar_axis": (2, 1),  # across and about the axis: the base of a planar robot
+    "free_revolute": (3, 1),
+    "spherical": (0, 3),
+    "cylindrical_free": (1, 3),
+    "planar_free": (2, 3),
+    "floating": (3, 3),
+}
+LAWS = ("impact", "linear", "nonlinear")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body. Its frame has its origin at the centre of mass.
+
+    inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; left out, that of `shape`.
+    """
+
+    name: str
+    mass: float = 1.0  # [kg]
+    inertia: ArrayLike | None = None
+    shape: Shape | None = None
+
+    def __post_init__(self) -> None:
+        checks.name("Body(name=...)", self.name)
+        call = f"Body({self.name!r}"
+        object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
+        if self.shape is not None and not isinstance(self.shape, Solid):
+            raise ValueError(f"{call}, shape=...): expected Sphere, Box, Cylinder or Capsule, got {self.shape!r}")
+        object.__setattr__(self, "inertia", _inertia(call, self))
+
+
+def _inertia(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
+    """The inertia as rows, after the tests that every rigid body passes."""
+    if body.inertia is None:
+        if body.shape is None:
+            raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
+        if np.any(np.asarray(body.shape.center)):
+            raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
+        matrix = body.shape.inertia(body.mass)
+    else:
+        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
+        matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
+    if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * np.abs(matrix).max()):
+        raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
+    matrix = 0.5 * (matrix + matrix.T)
+    a, b, c = np.linalg.eigvalsh(matrix)
+    if a <= 0.0:
+        raise ValueError(f"{call}, inertia=...): not positive definite, its principal moments are {a:g}, {b:g}, {c:g}")
+    if c > (a + b) * (1 + 1e-6):
+        raise ValueError(
+            f"{call}, inertia=...): no rigid body has principal moments {a:g}, {b:g}, {c:g}: "
+            "the largest exceeds the sum of the others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in matrix)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What lets `child` move relative to `parent`.
+
+        joint frame   at `parent_point` in the parent, turned by `orientation` (quaternion, joint to parent)
+        coordinates   translations first, then rotations; at zero the child's axes are those of the joint frame
+        `axis`        in the joint frame; a plane across it has its coordinates along x, y, z in this order, without
+                      the one nearest to the axis (axis y: x then z)
+
+    Points are measured from the centres of mass [m]. spring [N/m, N m/rad], damper [N s/m, N m s/rad] and rest take one
+    number or one per degree of freedom; a quaternion joint has one spring constant, and its rest is a rotation vector.
+    limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite.
+    """
+
+    kind: str
+    parent: str | None
+    child: str
+    name: str = ""  # default: that of the child
+    parent_point: ArrayLike = (0.0, 0.0, 0.0)
+    child_point: ArrayLike = (0.0, 0.0, 0.0)
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    spring: ArrayLike = 0.0
+    damper: ArrayLike = 0.0
+    rest: ArrayLike = 0.0
+    limits: Sequence[Any] | None = None
+
+    def __post_init__(self) -> None:
+        checks.name("Joint(child=...)", self.child)
+        object.__setattr__(self, "name", checks.name("Joint(name=...)", self.name or self.child))
+        call = f"Joint({self.name!r}"
+        checks.one_of(f"{call}, kind=...)", self.kind, KINDS)
+        object.__setattr__(self, "parent", checks.name(f"{call}, parent=...)", self.parent or WORLD))
+        for field in ("parent_point", "child_point"):
+            object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
+        object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
+        object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
+        for field in ("spring", "damper", "rest"):
+            object.__setattr__(self, field, self._per_dof(call, field))
+        object.__setattr__(self, "limits", self._limits(call))
+
+    @property
+    def ntrans(self) -> int:
+        """Number of free translations."""
+        return KINDS[self.kind][0]
+
+    @property
+    def nrot(self) -> int:
+        """Number of free rotations: 0, 1 or 3."""
+        return KINDS[self.kind][1]
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return self.ntrans + self.nrot
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates: one per degree of freedom, four for three rotations."""
+        return self.nv + (self.nrot == 3)
+
+    def _per_dof(self, call: str, field: str) -> tuple[float, ...]:
+        """One value per degree of freedom."""
+        call, value = f"{call}, {field}=...)", getattr(self, field)
+        if np.ndim(value) == 0:
+            values = (checks.number(call, value),) * self.nv
+            if field == "rest" and self.nrot == 3 and any(values):
+                raise ValueError(f"{call}: expected {self.nv} numbers, the last three a rotation vector, got {value!r}")
+        else:
+            values = checks.vector(call, value, self.nv)
+        if field != "rest" and any(x < 0.0 for x in values):
+            raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
+        if field == "spring" and self.nrot == 3 and len(set(values[-3:])) > 1:
+            raise ValueError(
+                f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}"
+            )
+        return values
+
+    def _limits(self, call: str) -> tuple[tuple[float, float], ...]:
+        """One (lo, hi) per degree of freedom, infinite where there is none."""
+        call = f"{call}, limits=...)"
+        free = (-np.inf, np.inf)
+        given = self.limits
+        if given is None:
+            return (free,) * self.nv
+        if (
+            len(given) == 2
+            and all(np.ndim(x) == 0 for x in given)
+            and (self.nv == 1 or any(x is not None for x in given))
+        ):
+            given = (given,)
+        if len(given) != self.nv:
+            raise ValueError(f"{call}: expected {self.nv} pairs (lo, hi), one per degree of freedom, got {len(given)}")
+        out = []
+        for dof, pair in enumerate(given):
+            lo, hi = _bounds(call, free if pair is None else pair)
+            if self.nrot == 3 and dof >= self.ntrans and (lo, hi) != free:
+                raise ValueError(f"{call}: the three rotations of a {self.kind} joint cannot be limited")
+            out.append((lo, hi))
+        return tuple(out)
+
+
+def _bounds(call: str, pair: Any) -> tuple[float, float]:
+    """(lo, hi) with lo < hi; None stands for no bound."""
+    try:
+        lo, hi = (float(x) if x is not None else s * np.inf for x, s in zip(pair, (-1, 1), strict=True))
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected a pair (lo, hi), got {pair!r}") from None
+    if not lo < hi or lo == np.inf or hi == -np.inf:
+        raise ValueError(f"{call}: expected lo < hi, got ({lo:g}, {hi:g})")
+    return lo, hi
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
+
+    law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
+    """
+
+    body: str
+    point: ArrayLike = (0.0, 0.0, 0.0)  # from the centre of mass, body axes [m]
+    radius: float = 0.0  # [m]
+    friction: float = 0.5
+    law: str = "nonlinear"
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    height: float = 0.0  # [m]
+    name: str = ""  # default: that of the body, numbered when it has several
+
+    def __post_init__(self) -> None:
+        checks.name("Contact(body=...)", self.body)
+        call = f"Contact({self.name or self.body!r}"
+        object.__setattr__(self, "point", checks.vector(f"{call}, point=...)", self.point, 3))
+        for field in ("radius", "friction"):
+            value = checks.number(f"{call}, {field}=...)", getattr(self, field), at_least=0.0)
+            object.__setattr__(self, field, value)
+        checks.one_of(f"{call}, law=...)", self.law, LAWS)
+        object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
+        object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
+
+
+@dataclass(frozen=True)
+class Input:
+    """One entry of u: a force or torque on a joint coordinate, or a wrench on a body at its centre of mass.
+
+    Input("knee")                                 the torque of a joint with one degree of freedom [N m]
+    Input("base", dof=3)                          its fourth degree of freedom [N or N m]
+    Input(body="block", force=(1, 0, 0))          u newtons along x, world axes
+    Input(body="drone", force=(0, 0, 1), torque=(0, 0, 0.02), frame="body")
+    """
+
+    joint: str | None = None
+    dof: int = 0
+    body: str | None = None
+    force: ArrayLike = (0.0, 0.0, 0.0)
+    torque: ArrayLike = (0.0, 0.0, 0.0)
+    frame: str = "world"
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.joint is None) == (self.body is None):
+            raise ValueError("Input(...): give either a joint or body=...")
+        call = f"Input({(self.name or self.joint or self.body)!r}"
+        for field in ("force", "torque"):
+            object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
+        checks.one_of(f"{call}, frame=...)", self.frame, ("world", "body"))
+        wrench = np.array([self.force, self.torque], dtype=np.float64)
+        if self.body is not None and not wrench.any():
+            raise ValueError(f"{call}): give a force=... or a torque=... per unit of the input")
+        if self.joint is not None and wrench.any():
+            raise ValueError(f"{call}): force and torque are for an input on a body")

@@ -1,0 +1,147 @@
+"""What Simulator returns: frozen dataclasses of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mechanism import Mechanism
+from solvers.status import MESSAGES, Status
+
+if TYPE_CHECKING:
+    from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class SimulationError(RuntimeError):
+    """A time step that did not reach its tolerance; `status` says why."""
+
+    def __init__(self, message: str, status: Status) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Contacts over one step, (ncontact, ...), or over the steps of a trajectory, (T, ncontact, ...). World axes."""
+
+    names: tuple[str, ...]
+    normals: Floats  # (ncontact, 3)
+    time_step: float  # [s]
+    impulse: Floats  # (..., ncontact, 3) impulse on the body [N s]
+    point: Floats  # (..., ncontact, 3) where it acts, at the end of the step [m]
+    gap: Floats  # (..., ncontact) distance from the ground at the end of the step [m]
+    slip: Floats  # (..., ncontact) sliding speed [m/s]
+
+    @property
+    def force(self) -> Floats:
+        """(..., ncontact, 3) mean force on the body over the step [N]."""
+        return self.impulse / self.time_step
+
+    @property
+    def normal_force(self) -> Floats:
+        """(..., ncontact) mean normal force [N]."""
+        return np.einsum("...cj,cj->...c", self.force, self.normals)
+
+    @property
+    def friction_force(self) -> Floats:
+        """(..., ncontact) size of the mean friction force [N]."""
+        along = self.normal_force[..., None] * self.normals
+        return np.asarray(np.linalg.norm(self.force - along, axis=-1))
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """One time step. When it was not solved, x is the state before it."""
+
+    x: Floats  # (nx,)
+    status: Status
+    iterations: int
+    residual: float  # largest error of a balance or gap equation [N s, m]
+    violation: float  # largest |product - kappa| of the complementary pairs
+    contacts: Contacts
+
+    @property
+    def success(self) -> bool:
+        """Whether the step reached its tolerance."""
+        return self.status == Status.SOLVED
+
+    @property
+    def message(self) -> str:
+        """The status as a sentence."""
+        return MESSAGES[self.status]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows."""
+
+    simulator: Simulator
+    x: Floats  # (T + 1, nx)
+    u: Floats  # (T, nu) [N, N m]
+    time: Floats  # (T + 1,) [s]
+    status: Status
+    knot: int  # number of solved steps
+    residual: float  # of the last step that was tried
+    iterations: Integers  # (T,)
+    contacts: Contacts
+    message: str
+
+    @property
+    def success(self) -> bool:
+        """Whether all steps reached their tolerance."""
+        return self.status == Status.SOLVED
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A closed-loop rollout; x and u end at the first knot that was not solved."""
+
+    x: Floats  # (T + 1, nx)
+    u: Floats  # (T, nu) [N, N m]
+    status: Status
+    knot: int  # number of solved knots
+    residual: float  # of the last step that was tried
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """Derivatives of every knot at its state and input, in tangent coordinates."""
+
+    A: Floats  # (T, ndx, ndx)
+    B: Floats  # (T, ndx, nu)
+    x_next: Floats  # (T, nx)
+    status: Integers  # (T,) Status of each knot; what belongs to an unsolved knot is zero
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state."""
+
+    x: Floats  # (n, T + 1, nx)
+    status: Integers  # (n,) Status
+    knot: Integers  # (n,) number of solved steps
+
+
+def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
+    """Contacts from the rows (..., ncontact, 8) of a kernel."""
+    normals = np.array([np.asarray(c.normal) for c in mech.contacts]).reshape(-1, 3)
+    parts = (rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
+    return Contacts(mech.contact_names, normals, time_step, *parts)
+
+
+def error_of(mech: Mechanism, where: str, report: Floats, tolerance: float) -> SimulationError:
+    """The sentence of a status, with the numbers of the report of a kernel."""
+    status, iterations, residual, violation, contact = report
+    reason = Status(int(status))
+    text = f"{where}: {MESSAGES[reason]}"
+    if reason in (Status.MAX_ITERATIONS, Status.NO_PROGRESS):
+        text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})."
+        if contact >= 0:
+            text += f" Contact {mech.contact_names[int(contact)]!r} is worst, off by {violation:.1e}."
+    return SimulationError(text, reason)

@@ -1,0 +1,294 @@
+"""Whole horizons, where Python enters compiled code: rollouts, feedback rollouts, linearizations, batches.
+
+    settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
+    report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
+    contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
+    hard       None for scenes without contacts and limits: their code is then not compiled
+
+Every function takes the flat buffers of `layout.py`; every loop stops at the first step that is not SOLVED.
+"""
+
+from __future__ import annotations
+
+from sim.inequalities import report_contacts, worst_contact
+from sim.layout import model_view, work_view
+from sim.model import Integers, Matrix, Model, Options, Vector, Work
+from sim.state import integrate_state, state_difference
+from sim.step import step, step_with_gradient
+from solvers.jit import kernel, parallel_kernel, prange
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+Cube = Matrix  # (n, rows, columns)
+
+
+@kernel
+def _options(settings: Vector) -> Options:
+    return Options(settings[0], settings[1], settings[2], int(settings[3]))
+
+
+@kernel
+def reported_step(
+    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, report: Vector, hard: int | None
+) -> bool:
+    """One step and its report; True when SOLVED."""
+    r = step(model, work, options, x, u, out, hard)
+    report[0] = r.status
+    report[1] = r.iterations
+    report[2] = r.residual
+    report[3] = r.violation
+    report[4] = -1.0
+    if hard is not None and r.status != _SOLVED:
+        report[4] = worst_contact(model, work, options.kappa)
+    return r.status == _SOLVED
+
+
+@kernel
+def roll(
+    floats: Vector,
+    ints: Integers,
+    buffer: Vector,
+    settings: Vector,
+    x: Vector,
+    us: Matrix,
+    xs: Matrix,
+    reports: Matrix,
+    contacts: Cube,
+    hard: int | None,
+) -> int:
+    """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
+
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 8).
+    """
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    options = _options(settings)
+    for k in range(x.shape[0]):
+        xs[0, k] = x[k]
+    for t in range(us.shape[0]):
+        if not reported_step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard):
+            return t
+        if hard is not None:
+            report_contacts(model, work, contacts[t])
+    return us.shape[0]
+
+
+@kernel
+def _knot(
+    model: Model,
+    work: Work,
+    options: Options,
+    substeps: int,
+    x: Vector,
+    u: Vector,
+    out: Vector,
+    report: Vector,
+    hard: int | None,
+) -> bool:
+    """out = state after `substeps` steps with u held."""
+    for k in range(x.shape[0]):
+        out[k] = x[k]
+    for _ in range(substeps):
+        a = work.step_x[0]
+        for k in range(x.shape[0]):
+            a[k] = out[k]
+        if not reported_step(model, work, options, a, u, out, report, hard):
+            return False
+    return True
+
+
+@kernel
+def closed_loop(
+    floats: Vector,
+    ints: Integers,
+    buffer: Vector,
+    settings: Vector,
+    x: Vector,
+    us: Matrix,
+    policy: tuple[Matrix, Matrix, Cube, Matrix],
+    alpha: float,
+    limits: tuple[Vector, Vector],
+    substeps: int,
+    xs: Matrix,
+    u_out: Matrix,
+    report: Vector,
+    hard: int | None,
+) -> int:
+    """Rollout under the policy (xs_ref, k, K, gaps) of a backward pass; returns the number of solved knots.
+
+        u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_ref_t))
+        x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1        gap_t+1 = f(xs_ref_t, us_t) (-) xs_ref_t+1
+
+    us, u_out: (T, nu); xs, xs_ref: (T + 1, nx); k: (T, nu); K: (T, nu, ndx); gaps: (T + 1, ndx).
+    """
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    options = _options(settings)
+    xs_ref, ks, Ks, gaps = policy
+    low, high = limits
+    ndx = gaps.shape[1]
+    dx = work.chain[0]
+    for k in range(x.shape[0]):
+        xs[0, k] = x[k]
+    for t in range(us.shape[0]):
+        state_difference(model, xs_ref[t], xs[t], dx[:ndx])
+        for j in range(us.shape[1]):
+            a = us[t, j] + alpha * ks[t, j]
+            K = Ks[t, j]
+            for k in range(ndx):
+                a += K[k] * dx[k]
+            u_out[t, j] = min(max(a, low[j]), high[j])
+        if not _knot(model, work, options, substeps, xs[t], u_out[t], xs[t + 1], report, hard):
+            return t
+        if alpha < 1.0:
+            for k in range(ndx):
+                dx[k] = (alpha - 1.0) * gaps[t + 1, k]
+            a = work.step_x[0]
+            for k in range(x.shape[0]):
+                a[k] = xs[t + 1, k]
+            integrate_state(model, a, dx[:ndx], xs[t + 1])
+    return us.shape[0]
+
+
+@kernel
+def _chain(work: Work, A: Matrix, B: Matrix) -> None:
+    """A := A_step A, B := A_step B + B_step."""
+    n = A.shape[0]
+    m = B.shape[1]
+    T = work.chain
+    S = work.step_A
+    for i in range(n):
+        t = T[i]
+        for k in range(n):
+            t[k] = 0.0
+        for k in range(m):
+            t[n + k] = work.step_B[i, k]
+        for j in range(n):
+            s = S[i, j]
+            a = A[j]
+            b = B[j]
+            for k in range(n):
+                t[k] += s * a[k]
+            for k in range(m):
+                t[n + k] += s * b[k]
+    for i in range(n):
+        for k in range(n):
+            A[i, k] = T[i, k]
+        for k in range(m):
+            B[i, k] = T[i, n + k]
+
+
+@kernel
+def linearize(
+    floats: Vector,
+    ints: Integers,
+    buffer: Vector,
+    settings: Vector,
+    x: Vector,
+    u: Vector,
+    substeps: int,
+    A: Matrix,
+    B: Matrix,
+    x_next: Vector,
+    report: Vector,
+    hard: int | None,
+) -> int:
+    """A, B of one knot: the product of the derivatives of its steps.  Returns the Status."""
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    options = _options(settings)
+    for k in range(x.shape[0]):
+        x_next[k] = x[k]
+    for s in range(substeps):
+        a = work.step_x[0]
+        for k in range(x.shape[0]):
+            a[k] = x_next[k]
+        r = step_with_gradient(model, work, options, a, u, x_next, work.step_A, work.step_B, hard)
+        report[0] = r.status
+        report[1] = r.iterations
+        report[2] = r.residual
+        report[3] = r.violation
+        report[4] = -1.0
+        if r.status != _SOLVED:
+            if hard is not None:
+                report[4] = worst_contact(model, work, options.kappa)
+            return r.status
+        if s > 0:
+            _chain(work, A, B)
+            continue
+        for i in range(A.shape[0]):
+            for k in range(A.shape[0]):
+                A[i, k] = work.step_A[i, k]
+            for k in range(B.shape[1]):
+                B[i, k] = work.step_B[i, k]
+    return _SOLVED
+
+
+@parallel_kernel
+def linearize_knots(
+    floats: Vector,
+    ints: Integers,
+    buffers: Matrix,
+    settings: Vector,
+    xs: Matrix,
+    us: Matrix,
+    substeps: int,
+    A: Cube,
+    B: Cube,
+    x_next: Matrix,
+    reports: Matrix,
+    hard: int | None,
+) -> None:
+    """`linearize` of every knot (xs[t], us[t]), spread over the threads: chunk c has the scratch buffers[c]."""
+    n = us.shape[0]
+    chunks = buffers.shape[0]
+    for c in prange(chunks):
+        for t in range(c * n // chunks, (c + 1) * n // chunks):
+            linearize(
+                floats, ints, buffers[c], settings, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard
+            )
+
+
+@kernel
+def _roll_status(
+    floats: Vector,
+    ints: Integers,
+    buffer: Vector,
+    settings: Vector,
+    x0: Vector,
+    us: Matrix,
+    xs: Matrix,
+    hard: int | None,
+) -> tuple[int, int]:
+    """A rollout that keeps its states only: (status, number of solved steps)."""
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    options = _options(settings)
+    for k in range(x0.shape[0]):
+        xs[0, k] = x0[k]
+    for t in range(us.shape[0]):
+        r = step(model, work, options, xs[t], us[t], xs[t + 1], hard)
+        if r.status != _SOLVED:
+            return r.status, t
+    return _SOLVED, us.shape[0]
+
+
+@parallel_kernel
+def roll_batch(
+    floats: Vector,
+    ints: Integers,
+    buffers: Matrix,
+    settings: Vector,
+    x0s: Matrix,
+    us: Cube,
+    xs: Cube,
+    status: Integers,
+    knots: Integers,
+    hard: int | None,
+) -> None:
+    """Rollouts from x0s[i] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,)."""
+    n = us.shape[0]
+    chunks = buffers.shape[0]
+    for c in prange(chunks):
+        for i in range(c * n // chunks, (c + 1) * n // chunks):
+            status[i], knots[i] = _roll_status(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard)

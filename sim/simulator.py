@@ -1,0 +1,208 @@
+"""Simulator: one mechanism with a time step; its steps, rollouts and derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import replace as changed
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.border import whole
+from sim.calls import Settings
+from sim.describe import describe
+from sim.mechanism import Mechanism, with_contacts
+from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
+from sim.states import States
+from solvers.status import MESSAGES, Status
+
+Floats = NDArray[np.float64]
+
+_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations")
+
+
+class Simulator(States):
+    """A mechanism, a time step [s], and how exactly a step is solved.
+
+    kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
+                    kappa / impulse; smaller is harder
+    tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
+    max_iterations  of the interior point
+
+    A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        time_step: float = 0.02,
+        kappa: float = 1e-6,
+        tolerance: float = 1e-8,
+        max_iterations: int = 50,
+    ) -> None:
+        if not isinstance(mechanism, Mechanism):
+            raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
+        if not isinstance(max_iterations, int | np.integer) or max_iterations < 1:
+            raise ValueError(f"Simulator(max_iterations=...): expected a whole number >= 1, got {max_iterations!r}")
+        super().__init__(
+            mechanism,
+            Settings(
+                checks.number("Simulator(time_step=...)", time_step, above=0.0),
+                checks.number("Simulator(kappa=...)", kappa, above=0.0),
+                checks.number("Simulator(tolerance=...)", tolerance, above=0.0),
+                int(max_iterations),
+            ),
+        )
+
+    def __reduce__(self) -> Any:
+        return Simulator, (self.mechanism, *self._calls.settings)
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name}={value:g}" for name, value in self._calls.settings._asdict().items())
+        return f"Simulator({self.mechanism.name}, {numbers})"
+
+    def replace(self, **settings: Any) -> Simulator:
+        """The same with other settings: those of Simulator(...), and `friction`, `law`, `gravity`, `mechanism`.
+
+        friction, law: for all contacts, or {contact name: value}. Compiled code is shared.
+        """
+        known = ("mechanism", *_SETTINGS, "friction", "law", "gravity")
+        for key in settings:
+            checks.one_of("Simulator.replace(...)", key, known)
+        mech = settings.pop("mechanism", self.mechanism)
+        for field in ("friction", "law"):
+            if field in settings:
+                mech = with_contacts(mech, field, settings.pop(field))
+        if "gravity" in settings:
+            mech = changed(mech, gravity=settings.pop("gravity"))
+        return Simulator(mech, **{**self._calls.settings._asdict(), **settings})
+
+    def describe(self) -> str:
+        """What the scene consists of, what a step computes, and what is left out because nothing needs it."""
+        return describe(self)
+
+    def step(self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False) -> StepResult:
+        """One time step from x under the input u (zero when left out)."""
+        state = self._border.state("step", x)
+        us = self._border.inputs("step", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
+        knot, xs, reports, contacts = self._calls.roll(state, us[None])
+        status, iterations, residual, violation = reports[0, :4]
+        if knot == 0 and throw:
+            raise error_of(self.mechanism, "Simulator.step", reports[0], self.tolerance)
+        out = xs[knot] if knot else state
+        return StepResult(
+            out,
+            Status(int(status)),
+            int(iterations),
+            float(residual),
+            float(violation),
+            contacts_of(self.mechanism, self.time_step, contacts[0]),
+        )
+
+    def rollout(self, x: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Trajectory:
+        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so."""
+        state = self._border.state("rollout", x)
+        inputs = self._border.inputs("rollout", "us", us, (None, self.nu))
+        knot, xs, reports, contacts = self._calls.roll(state, inputs)
+        last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
+        status = Status(int(last[0]))
+        error = (
+            None
+            if status == Status.SOLVED
+            else error_of(self.mechanism, f"Simulator.rollout: step {knot}", last, self.tolerance)
+        )
+        if error and throw:
+            raise error
+        return Trajectory(
+            simulator=self,
+            x=xs[: knot + 1],
+            u=inputs[:knot],
+            time=self.time_step * np.arange(knot + 1.0),
+            status=status,
+            knot=knot,
+            residual=float(last[2]),
+            iterations=reports[:knot, 1].astype(np.int64),
+            contacts=contacts_of(self.mechanism, self.time_step, contacts[:knot]),
+            message=str(error) if error else MESSAGES[status],
+        )
+
+    def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
+        """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
+        call = "Simulator.rollout_batch"
+        inputs = self._border.inputs("rollout_batch", "us", us, (None, None, self.nu))
+        starts = self._border.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
+        xs, status, knots = self._calls.roll_batch(starts, inputs)
+        for x, knot in zip(xs, knots, strict=True):
+            x[knot + 1 :] = x[knot]
+        return Batch(xs, status, knots)
+
+    def closed_loop(
+        self,
+        x0: ArrayLike,
+        us: ArrayLike,
+        xs: ArrayLike | None = None,
+        ks: ArrayLike | None = None,
+        Ks: ArrayLike | None = None,
+        gaps: ArrayLike | None = None,
+        alpha: float = 1.0,
+        limits: tuple[ArrayLike, ArrayLike] | None = None,
+        substeps: int = 1,
+        kappa: float | None = None,
+    ) -> Shot:
+        """Rollout under a policy, each knot `substeps` steps with u held:
+
+            u_t     = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t))
+            x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
+
+        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
+        of u.
+        It stops at the first knot that cannot be solved.
+        """
+        call = "closed_loop"
+        state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
+        name = f"Simulator.{call}"
+        factor = checks.number(f"{name}(alpha=...)", alpha)
+        knot, x_out, u_out, report = self._calls.closed_loop(
+            state,
+            inputs,
+            self._border.policy(name, state, len(inputs), (xs, ks, Ks, gaps)),
+            factor,
+            self._border.limits(name, limits),
+            whole(f"{name}(substeps=...)", substeps),
+            self._border.kappa(call, kappa),
+        )
+        return Shot(x_out[: knot + 1], u_out[:knot], Status(int(report[0])), knot, float(report[2]))
+
+    # ---- derivatives
+
+    def linearize(self, x: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None) -> tuple[Floats, Floats]:
+        """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
+
+        By the implicit function theorem, in tangent coordinates. An unsolved step raises SimulationError.
+        """
+        state = self._border.state("linearize", x)
+        us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
+        A, B, _, report = self._calls.linearize_one(state, us, self._border.kappa("linearize", kappa))
+        if report[0] != Status.SOLVED:
+            raise error_of(self.mechanism, "Simulator.linearize", report, self.tolerance)
+        return A, B
+
+    def linearize_trajectory(
+        self, xs: ArrayLike, us: ArrayLike, substeps: int = 1, kappa: float | None = None
+    ) -> Linearization:
+        """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
+
+        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu).
+        """
+        call = "Simulator.linearize_trajectory"
+        inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
+        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
+        if len(states) - len(inputs) not in (0, 1):
+            raise ValueError(
+                f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
+            )
+        steps = whole(f"{call}(substeps=...)", substeps)
+        level = self._border.kappa("linearize_trajectory", kappa)
+        A, B, x_next, reports = self._calls.linearize(states[: len(inputs)], inputs, steps, level)
+        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))

@@ -1,0 +1,139 @@
+"""States from a velocity at a node: the mean velocity of the interval before it that has the node's momentum."""
+
+from __future__ import annotations
+
+from sim.dynamics import _turns_below_half, momentum_balance_jacobian
+from sim.elimination import factor, project, solve, subtree_sums
+from sim.energy import add_spring_momentum, node_momentum, spatial_inertia
+from sim.kinematics import velocity_columns
+from sim.layout import model_view, work_view
+from sim.model import Integers, Model, Vector, Work
+from sim.rotation import quat_turn
+from solvers.jit import kernel
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
+_NOT_FINITE = int(Status.NOT_FINITE)
+_SINGULAR = int(Status.SINGULAR)
+_ANGULAR_STEP = int(Status.ANGULAR_STEP)
+
+
+@kernel
+def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> None:
+    """out = M(q) v = S2^T (inertia (S2 v)), at the poses of configuration 2 in `work`.   out: (nv,)."""
+    spatial_inertia(model, work, work.A)
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        for k in range(6):
+            work.twist[i, k] = work.twist[p, k] if p >= 0 else 0.0
+            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                work.twist[i, k] += work.S2[d, k] * v[d]
+        for r in range(6):
+            f = 0.0
+            for k in range(6):
+                f += work.A[i, 6 * r + k] * work.twist[i, k]
+            work.wrench[i, r] = f
+    subtree_sums(model, work.wrench, work.subtree)
+    project(model, work.S2, work.subtree, out)
+
+
+@kernel
+def momentum_error(model: Model, work: Work, h: float, x: Vector, target: Vector, out: Vector) -> float:
+    """out = p(x) - target, p the node momentum in joint coordinates; returns its largest entry."""
+    node_momentum(model, work, h, x, work.wrench)
+    subtree_sums(model, work.wrench, work.subtree)
+    project(model, work.S2, work.subtree, out)
+    add_spring_momentum(model, h, x, out)
+    error = 0.0
+    for d in range(out.shape[0]):
+        out[d] -= target[d]
+        error = max(error, abs(out[d])) if abs(out[d]) < 1e300 else 1e301
+    return error
+
+
+@kernel
+def _turn_back(work: Work) -> None:
+    """The interval 1-2 read backwards, as `momentum_balance_jacobian` reads the interval 2-3."""
+    for i in range(work.pos1.shape[0]):
+        a, b = work.quat1[i], work.quat2[i]
+        c, x, y, z = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+        work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3] = c, x, y, z
+        work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3] = c, -x, -y, -z
+        for k in range(3):
+            work.pos3[i, k] = work.pos1[i, k]
+
+
+@kernel
+def newton_direction(model: Model, work: Work, h: float, v: Vector) -> bool:
+    """dnu = -(dp/dv15)^-1 (p - target), at the state of the last `momentum_error`; False when singular.
+
+        -dp/dv15 = S2^T A S1nu - h^2 k/4,     A = d(-momentum)/d(pose 1),   S1nu = d(pose 1)/d(v15)
+
+    The spring term is exact but for quaternion joints.
+    """
+    _turn_back(work)
+    momentum_balance_jacobian(model, work, h, work.A)
+    velocity_columns(model, work.S1, v, -h, work.S3nu)
+    for i in range(model.body_parent.shape[0]):
+        d = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d
+        for k in range(n * n):
+            work.joint_block[i, k] = 0.0
+        for k in range(n):
+            work.joint_block[i, k * n + k] = -0.25 * h * h * model.dof_spring[d + k]
+    if not factor(model, work):
+        return False
+    solve(model, work, work.residual, work.dnu)
+    return True
+
+
+@kernel
+def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector) -> int:
+    """Solve p(q, v15) = M(q) velocity for v15 by Newton's method with backtracking.
+
+    x: [q; first guess of v15], its velocities are overwritten; velocity: (nv,).
+    """
+    nv = velocity.shape[0]
+    nq = x.shape[0] - nv
+    v = x[nq:]
+    momentum_error(model, work, h, x, velocity, work.residual)  # for the poses
+    momentum_of_velocity(model, work, velocity, work.nu)
+    scale = 1.0
+    for d in range(nv):
+        scale = max(scale, abs(work.nu[d]))
+    error = momentum_error(model, work, h, x, work.nu, work.residual)
+    for _ in range(50):
+        _turn_back(work)
+        if not _turns_below_half(model, work, h, v):
+            return _ANGULAR_STEP
+        if not error < 1e300:
+            return _NOT_FINITE
+        if error <= 1e-14 * scale:
+            return _SOLVED
+        if not newton_direction(model, work, h, v):
+            return _SINGULAR
+        for d in range(nv):
+            work.nu_trial[d] = v[d]
+        alpha = 1.0
+        while alpha > 1e-6:
+            for d in range(nv):
+                v[d] = work.nu_trial[d] + alpha * work.dnu[d]
+            trial = momentum_error(model, work, h, x, work.nu, work.residual)
+            _turn_back(work)
+            if trial < error and _turns_below_half(model, work, h, v):
+                break
+            alpha *= 0.5
+        if alpha <= 1e-6:
+            for d in range(nv):
+                v[d] = work.nu_trial[d]
+            return _SOLVED if error <= 1e-11 * scale else _NO_PROGRESS
+        error = trial
+    return _MAX_ITERATIONS
+
+
+@kernel
+def start_at(floats: Vector, ints: Integers, buffer: Vector, h: float, velocity: Vector, x: Vector) -> int:
+    """`start_state` from flat buffers."""
+    return start_state(model_view(floats, ints), work_view(buffer, ints), h, velocity, x)

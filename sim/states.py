@@ -1,0 +1,113 @@
+"""States: what can be said about a state without moving it. The half of Simulator that is not about motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.border import Border, shaped
+from sim.build import mechanism_sizes, pack
+from sim.calls import Calls, Settings
+from sim.mechanism import Mechanism
+from sim.results import SimulationError
+from solvers.status import MESSAGES, Status
+
+Floats = NDArray[np.float64]
+
+
+class States:
+    """Sizes and settings of a simulator, its states on their manifold, and other views of them."""
+
+    def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
+        self.mechanism = mechanism
+        self.time_step, self.kappa, self.tolerance, self.max_iterations = settings
+        self.model_floats, self.model_ints = pack(mechanism)
+        self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
+        self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
+        self._calls = Calls(self.model_floats, self.model_ints, settings)
+        self._border = Border(mechanism, self._calls)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if hasattr(self, "_border"):
+            raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
+        super().__setattr__(name, value)
+
+    def neutral(self) -> Floats:
+        """The standing or hanging state of the mechanism, at rest."""
+        return np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
+
+    def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """State with coordinates q (nq,) whose velocity at the node is v (nv,).
+
+        The velocity of a state is the mean one of the interval before it; this one has the momentum M(q) v at its end,
+        so that a simulation started with it is right to second order from its first step.
+        """
+        q0 = checks.array("Simulator.start(q)", q, (self.nq,))
+        v0 = checks.array("Simulator.start(v)", v, (self.nv,))
+        q0 = self._border.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
+        status, x = self._calls.start(q0, v0)
+        if status != Status.SOLVED:
+            reason = Status(status)
+            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
+        return x
+
+    def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
+        """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
+        xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
+        return self._calls.integrate(xs, dxs).reshape(*lead, self.nx)
+
+    def difference(self, x0: ArrayLike, x1: ArrayLike) -> Floats:
+        """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
+        x0s, x1s, lead = self._border.paired("difference", ("x0", x0, self.nx), ("x1", x1, self.nx))
+        return self._calls.difference(x0s, x1s).reshape(*lead, self.ndx)
+
+    def maximal(self, x: ArrayLike) -> Floats:
+        """z (nbody, 13) per body [position, velocity (world), quaternion, omega (body)]; leading axes allowed."""
+        xs, lead = self._border.stacked("maximal", "x", x)
+        return self._calls.maximal(xs, self.nbody).reshape(*lead, self.nbody, 13)
+
+    def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
+        """The state x with maximal(x) = z; leading axes allowed.
+
+        A z that is off its joints by more than `joint_tolerance` [m, rad] at either end of its interval is refused;
+        with infinity, the nearest motion along the joints is returned.
+        """
+        zs = np.array(shaped("Simulator.minimal(z)", z, (self.nbody, 13)))
+        lead = zs.shape[:-2]
+        zs = zs.reshape(-1, self.nbody, 13)
+        self._border.check_maximal(zs)
+        xs = self._calls.minimal(zs)
+        if joint_tolerance < np.inf:
+            self._border.check_joints(zs, self._calls.maximal(xs, self.nbody), joint_tolerance)
+        return xs.reshape(*lead, self.nx)
+
+    def maximal_jacobian(self, x: ArrayLike) -> Floats:
+        """dz/dx (12 nbody, ndx), per body [position, velocity, rotation, omega], in tangent coordinates."""
+        return self._calls.maximal_jacobian(self._border.state("maximal_jacobian", x), self.nbody)
+
+    def minimal_jacobian(self, z: ArrayLike) -> Floats:
+        """dx/dz (ndx, 12 nbody), the inverse of `maximal_jacobian` along the joints."""
+        zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
+        self._border.check_maximal(zs[None])
+        return self._calls.minimal_jacobian(zs)
+
+    def energy(self, x: ArrayLike) -> Any:
+        """Kinetic and potential energy at the node [J]; leading axes allowed."""
+        xs, lead = self._border.stacked("energy", "x", x)
+        total = self._calls.energies(xs).sum(axis=1).reshape(lead)
+        return total if lead else float(total)
+
+    def kinetic_energy(self, x: ArrayLike) -> Any:
+        """Kinetic energy at the node [J]; leading axes allowed."""
+        xs, lead = self._border.stacked("kinetic_energy", "x", x)
+        kinetic = self._calls.energies(xs)[:, 0].reshape(lead)
+        return kinetic if lead else float(kinetic)
+
+    def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
+        """(linear [N s], angular about the world's origin [N m s]) momentum at the node; leading axes allowed."""
+        xs, lead = self._border.stacked("momentum", "x", x)
+        p = self._calls.momenta(xs).reshape(*lead, 6)
+        return p[..., :3].copy(), p[..., 3:].copy()

@@ -1,0 +1,128 @@
+"""The ready-made mechanisms: sizes, masses, and that they stand on the ground."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+
+from dojo_opt import models
+from sim.build import mechanism_sizes, pack
+from sim.kinematics import tree_poses
+from sim.layout import model_view, read_model, read_work, work_size, work_view
+from sim.mechanism import Mechanism
+from sim.model import Integers, Vector
+from solvers.jit import kernel
+
+# nbody, nq, nv, ncontact, nlimit, nu
+SIZES = {
+    "pendulum": (1, 1, 1, 0, 0, 1),
+    "double_pendulum": (2, 2, 2, 0, 0, 2),
+    "npendulum": (5, 5, 5, 0, 0, 5),
+    "cartpole": (2, 2, 2, 0, 0, 1),
+    "acrobot": (2, 2, 2, 0, 0, 1),
+    "block": (1, 7, 6, 8, 0, 3),
+    "sphere": (1, 7, 6, 1, 0, 3),
+    "raiberthopper": (2, 8, 7, 2, 0, 3),
+    "quadruped": (13, 19, 18, 4, 24, 12),
+}
+
+
+@kernel
+def _poses(floats: Vector, ints: Integers, work: Vector, q: Vector) -> None:
+    w = work_view(work, ints)
+    tree_poses(model_view(floats, ints), q, q, w.origin, w.pos2, w.quat2, w.rot2, w.S2)
+
+
+def poses(mech: Mechanism, q: object = None) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and rotation matrices of the bodies."""
+    floats, ints = pack(mech)
+    work = np.zeros(work_size(ints))
+    _poses(floats, ints, work, np.array(mech.neutral if q is None else q, dtype=np.float64))
+    w = read_work(work, ints)
+    return w.pos2, w.rot2.reshape(-1, 3, 3)
+
+
+def clearances(mech: Mechanism) -> dict[str, float]:
+    """Distance of every contact from the ground in the neutral configuration."""
+    pos, rot = poses(mech)
+    model = read_model(*pack(mech))
+    points = [pos[b] + rot[b] @ p for b, p in zip(model.contact_body, model.contact_point, strict=True)]
+    return {n: float(p[2] - r) for n, p, r in zip(mech.contact_names, points, model.contact_radius, strict=True)}
+
+
+def test_every_model_is_listed() -> None:
+    assert set(models.__all__) == set(SIZES)
+
+
+@pytest.mark.parametrize("name", models.__all__)
+def test_sizes_and_documentation(name: str) -> None:
+    build = getattr(models, name)
+    assert tuple(mechanism_sizes(build())) == SIZES[name]
+    assert build().name == name
+    for p in inspect.signature(build).parameters.values():
+        assert p.default is not inspect.Parameter.empty
+    for word in ("q  (", "u  ("):
+        assert word in build.__doc__
+
+
+@pytest.mark.parametrize("name", ["block", "sphere", "raiberthopper", "quadruped"])
+def test_neutral_touches_the_ground(name: str) -> None:
+    gaps = clearances(getattr(models, name)())
+    assert min(gaps.values()) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_quadruped_stands_on_four_feet() -> None:
+    for stance in ((0.7853981633974483, -1.5707963267948966), (0.9, -1.425)):
+        gaps = clearances(models.quadruped(contacts="all", stance=stance))
+        feet = [gap for name, gap in gaps.items() if name.endswith("foot")]
+        np.testing.assert_allclose(feet, 0.0, atol=1e-15)
+        assert min(gap for name, gap in gaps.items() if not name.endswith("foot")) > 0.05
+    mech = models.quadruped()
+    assert sum(b.mass for b in mech.bodies) == pytest.approx(13.5)
+    pos, _ = poses(mech)
+    feet = pos[[mech.body_names.index(f"{leg}_calf") for leg in ("FR", "FL", "RR", "RL")]]
+    np.testing.assert_allclose(feet[:, 1] > 0, [False, True, False, True])
+    np.testing.assert_allclose(feet[:, 0] > 0, [True, True, False, False])
+
+
+def test_quadruped_is_symmetric_left_and_right() -> None:
+    mech = models.quadruped(contacts="all")
+    model = read_model(*pack(mech))
+    mirror = np.array([1.0, -1.0, 1.0])
+    J = model.body_inertia.reshape(-1, 3, 3)
+    for part in ("hip", "thigh", "calf"):
+        for end in "FR":
+            r, left = (mech.body_names.index(f"{end}{side}_{part}") for side in "RL")
+            np.testing.assert_allclose(J[left], J[r] * np.outer(mirror, mirror))
+            np.testing.assert_allclose(model.joint_child_point[left], model.joint_child_point[r] * mirror)
+    np.testing.assert_allclose(model.contact_point[3:6], model.contact_point[:3] * mirror)
+
+
+def test_pendulums_hang() -> None:
+    pos, _ = poses(models.npendulum(3, length=0.5))
+    np.testing.assert_allclose(pos, [[0, 0, 1.65 - 0.25 - 0.5 * i] for i in range(3)], atol=1e-15)
+    pos, _ = poses(models.pendulum(), [np.pi])
+    np.testing.assert_allclose(pos, [[0, 0, 1.6]], atol=1e-15)
+
+
+def test_cartpole_hangs_at_zero_and_stands_at_pi() -> None:
+    np.testing.assert_allclose(poses(models.cartpole(), [0.3, 0.0])[0], [[0, 0.3, 0], [0, 0.3, -0.5]], atol=1e-15)
+    np.testing.assert_allclose(poses(models.cartpole(), [0.3, np.pi])[0][1], [0, 0.3, 0.5], atol=1e-15)
+    # a small positive angle turns about x: the hanging pole swings towards +y
+    assert poses(models.cartpole(), [0.0, 0.1])[0][1, 1] > 0
+
+
+def test_hopper_stands_at_its_leg_length() -> None:
+    pos, _ = poses(models.raiberthopper())
+    np.testing.assert_allclose(pos, [[0, 0, 0.55], [0, 0, 0.05]], atol=1e-15)
+
+
+def test_wrong_parameters_are_named() -> None:
+    with pytest.raises(ValueError, match=r"npendulum\(n\): expected a whole number >= 1, got 0"):
+        models.npendulum(0)
+    with pytest.raises(ValueError, match=r"quadruped\(contacts=\.\.\.\): 'paws' is not one of: feet, all"):
+        models.quadruped(contacts="paws")
+    with pytest.raises(ValueError, match=r"Contact\('corner_0', friction=\.\.\.\)"):
+        models.block(friction=-1.0)

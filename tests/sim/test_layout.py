@@ -1,0 +1,122 @@
+"""The flat buffers hold what the NamedTuples declare, for compiled code and for Python alike."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim.model
+from sim.layout import (
+    MODEL_FIELDS,
+    MODEL_INTS,
+    WORK_DERIVATIVE_FIELDS,
+    WORK_FIELDS,
+    Sizes,
+    allocate_model,
+    model_view,
+    read_model,
+    read_work,
+    work_size,
+    work_view,
+)
+from sim.model import Integers, Model, Vector, Work
+from solvers.jit import kernel
+
+ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5)
+BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)
+
+
+def declared_shapes(cls: type) -> dict[str, list[str] | None]:
+    """Shapes as the comments of model.py state them; None where there is no comment."""
+    text = Path(sim.model.__file__).read_text().split(f"class {cls.__name__}(NamedTuple)")[1].split("\nclass ")[0]
+    shapes: dict[str, list[str] | None] = {}
+    for name, comment in re.findall(r"^    (\w+): \w+(.*)$", text, re.MULTILINE):
+        stated = re.search(r"# \(([^)]*)\)", comment)
+        shapes[name] = [re.sub(r"[ *]", "", n) for n in stated[1].split(",") if n.strip()] if stated else None
+    return shapes
+
+
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
+def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
+    stated = declared_shapes(cls)
+    assert set(table) == set(stated)
+    for name, shape in table.items():
+        written = stated[name]
+        assert written is None or written == [str(n).replace("6nbody", "nbody6") for n in shape], name
+
+
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
+def test_kind_matches_annotation(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
+    kinds = {(True, 1): "Integers", (False, 1): "Vector", (False, 2): "Matrix"}
+    for name, shape in table.items():
+        assert cls.__annotations__[name].__forward_arg__ == kinds[name in MODEL_INTS, len(shape)], name
+
+
+@pytest.mark.parametrize("sizes", [ALL, BARE])
+def test_fields_tile_their_buffers(sizes: Sizes) -> None:
+    floats, ints = allocate_model(sizes)
+    work = np.zeros(work_size(ints))
+    model, scratch = read_model(floats, ints), read_work(work, ints)
+    for name, value in zip(Model._fields, model, strict=True):
+        value[...] += 1
+        assert np.all(value == 1), f"{name} overlaps another field"
+    for name, value in zip(Work._fields, scratch, strict=True):
+        value[...] += 1.0
+        assert np.all(value == 1.0), f"{name} overlaps another field"
+    assert np.all(floats == 1.0) and np.all(work == 1.0)
+
+
+@kernel
+def _mark_model(floats: Vector, ints: Integers) -> None:
+    m = model_view(floats, ints)
+    for i in range(m.body_parent.shape[0]):
+        m.body_parent[i] = 10 + i
+        for k in range(9):
+            m.body_inertia[i, k] = 100 * i + k
+    for d in range(m.dof_rest.shape[0]):
+        m.dof_rest[d] = -1.0 - d
+    for c in range(m.contact_frame.shape[0]):
+        m.contact_law[c] = 2
+        m.contact_frame[c, 8] = 3.0
+    m.gravity[2] = -9.81
+
+
+@kernel
+def _mark_work(work: Vector, ints: Integers) -> int:
+    w = work_view(work, ints)
+    for i in range(w.pos3.shape[0]):
+        w.pos3[i, 2] = 5.0 + i
+    for r in range(w.panel.shape[0]):
+        for k in range(w.panel.shape[1]):
+            w.panel[r, k] = r + 0.5 * k
+    return int(w.columns.shape[1]) * 1000 + int(w.A3.shape[0])
+
+
+@pytest.mark.parametrize("sizes", [ALL, BARE])
+def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
+    floats, ints = allocate_model(sizes)
+    _mark_model(floats, ints)
+    model = read_model(floats, ints)
+    assert model.body_parent.tolist() == [10 + i for i in range(sizes.nbody)]
+    np.testing.assert_array_equal(model.body_inertia, 100 * np.arange(sizes.nbody)[:, None] + np.arange(9))
+    np.testing.assert_array_equal(model.dof_rest, -1.0 - np.arange(sizes.nv))
+    assert model.contact_law.tolist() == [2] * sizes.ncontact and model.gravity[2] == -9.81
+
+    width = 2 * sizes.nv + sizes.nu
+    work = np.zeros(work_size(ints))
+    assert _mark_work(work, ints) == 1000 * width + sizes.nbody
+    scratch = read_work(work, ints)
+    np.testing.assert_array_equal(scratch.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
+    np.testing.assert_array_equal(scratch.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(width))
+
+
+def test_short_buffer_has_no_derivative_rows() -> None:
+    _, ints = allocate_model(ALL)
+    work = np.zeros(work_size(ints, derivatives=False))
+    assert _mark_work(work, ints) == 1000 * (2 * ALL.nv + ALL.nu)
+    scratch = read_work(work, ints)
+    for name in WORK_FIELDS:
+        assert (getattr(scratch, name).size == 0) == (name in WORK_DERIVATIVE_FIELDS), name

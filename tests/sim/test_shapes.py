@@ -1,0 +1,46 @@
+"""Inertias against integration over the solid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+
+
+def inside(shape: Shape, p: np.ndarray) -> np.ndarray:
+    x, y, z = p.T
+    if isinstance(shape, Sphere):
+        return x**2 + y**2 + z**2 < shape.radius**2
+    if isinstance(shape, Box):
+        return (abs(x) < shape.x / 2) & (abs(y) < shape.y / 2) & (abs(z) < shape.z / 2)
+    if isinstance(shape, Cylinder):
+        return (x**2 + y**2 < shape.radius**2) & (abs(z) < shape.length / 2)
+    beyond = np.maximum(abs(z) - shape.length / 2, 0.0)
+    return x**2 + y**2 + beyond**2 < shape.radius**2
+
+
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.3), Box(0.2, 0.4, 0.6), Cylinder(0.2, 0.5), Capsule(0.2, 0.3), Capsule(0.3, 0.01)]
+)
+def test_inertia_is_the_integral(shape: Shape) -> None:
+    axis = np.linspace(-0.5, 0.5, 101)[:-1] + 0.005
+    p = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    p = p[inside(shape, p)]
+    mass = 2.5
+    second = mass * p.T @ p / len(p)
+    np.testing.assert_allclose(shape.inertia(mass), np.trace(second) * np.eye(3) - second, rtol=0.01, atol=1e-4)
+
+
+def test_orientation_turns_the_inertia() -> None:
+    q = (0.5, 0.5, 0.5, 0.5)
+    R = rotation_matrix(q)
+    np.testing.assert_allclose(
+        Box(1, 2, 3, orientation=q).inertia(1.0), R @ Box(1, 2, 3).inertia(1.0) @ R.T, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("make", [lambda: Sphere(0.0), lambda: Box(1, -1, 1), lambda: Capsule(0.1, float("nan"))])
+def test_sizes_are_positive(make: object) -> None:
+    with pytest.raises(ValueError, match=r"(Sphere|Box|Capsule)\((radius|y|length)=\.\.\.\)"):
+        make()  # type: ignore[operator]

@@ -1,0 +1,251 @@
+"""The Simulator's border: what it accepts, what it returns, and how it says no."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dojo_opt import models
+from sim.simulator import Simulator
+from solvers.status import Status
+
+SIM = Simulator(models.raiberthopper(), time_step=0.01)
+PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)
+X = SIM.neutral()
+
+
+def state(**changes: float) -> np.ndarray:
+    """The standing hopper with some entries replaced."""
+    x = X.copy()
+    for key, value in changes.items():
+        x[int(key[1:])] = value
+    return x
+
+
+def maximal(**changes: float) -> np.ndarray:
+    """Its maximal state with some entries replaced, by flat index."""
+    z = SIM.maximal(X)
+    for key, value in changes.items():
+        z.reshape(-1)[int(key[1:])] = value
+    return z
+
+
+def test_sizes() -> None:
+    assert (SIM.nbody, SIM.nq, SIM.nv, SIM.nx, SIM.ndx, SIM.nu, SIM.ncontact) == (2, 8, 7, 15, 14, 3, 2)
+    assert (SIM.time_step, SIM.kappa, SIM.tolerance) == (0.01, 1e-6, 1e-8)
+
+
+def test_settings_are_fixed() -> None:
+    with pytest.raises(AttributeError, match=r"Simulator.time_step: .*use replace\(time_step="):
+        SIM.time_step = 0.1
+
+
+def test_replace() -> None:
+    other = SIM.replace(time_step=0.05, friction=0.9, gravity=(0, 0, -1.62), kappa=1e-4)
+    assert (other.time_step, other.kappa, other.tolerance) == (0.05, 1e-4, SIM.tolerance)
+    assert [c.friction for c in other.mechanism.contacts] == [0.9, 0.9]
+    assert other.mechanism.gravity == (0.0, 0.0, -1.62)
+    assert [c.friction for c in SIM.mechanism.contacts] == [0.5, 0.5]
+    only = SIM.replace(friction={"foot": 1.2}, law="linear").mechanism.contacts
+    assert [(c.name, c.friction, c.law) for c in only] == [("foot", 1.2, "linear"), ("body", 0.5, "linear")]
+
+
+def test_pickle() -> None:
+    other = pickle.loads(pickle.dumps(SIM))
+    assert other.mechanism == SIM.mechanism and repr(other) == repr(SIM)
+    np.testing.assert_array_equal(other.model_floats, SIM.model_floats)
+
+
+def test_describe_says_what_is_there_and_what_is_not() -> None:
+    text = SIM.describe()
+    for word in (
+        "raiberthopper: 2 bodies, 7 degrees",
+        "leg",
+        "q[7], v[6]",
+        "u[0]  torque_x",
+        "2 cones",
+        "interior point",
+    ):
+        assert word in text
+    assert "joint limits      left out" in text
+    text = PENDULUM.describe()
+    for word in (
+        "contacts          left out",
+        "Newton's method; interior point left out",
+        "springs           left out",
+    ):
+        assert word in text
+
+
+def test_leading_axes() -> None:
+    xs = np.tile(X, (4, 3, 1))
+    assert SIM.maximal(xs).shape == (4, 3, 2, 13)
+    assert SIM.minimal(SIM.maximal(xs)).shape == xs.shape
+    assert SIM.energy(xs).shape == (4, 3) and isinstance(SIM.energy(X), float)
+    linear, angular = SIM.momentum(xs[0])
+    assert linear.shape == angular.shape == (3, 3)
+
+
+def test_inputs_are_not_written_to() -> None:
+    x = state(_3=1.0 + 1e-8)
+    before = x.copy()
+    SIM.energy(x), SIM.maximal(x), SIM.step(x)
+    np.testing.assert_array_equal(x, before)
+
+
+def test_lists_and_other_types_are_welcome() -> None:
+    assert SIM.energy(X.tolist()) == SIM.energy(X)
+    assert PENDULUM.energy(np.zeros(4, dtype=np.float32)) == PENDULUM.energy(np.zeros(4, dtype=int))
+    wide = np.zeros((4, 8))
+    wide[:, 0] = 0.3
+    assert PENDULUM.energy(wide[:, ::8].ravel()) == PENDULUM.energy([0.3] * 4)
+
+
+def test_jacobians_of_maximal_and_minimal() -> None:
+    x = SIM.integrate(X, 0.3 * np.random.default_rng(0).normal(size=14))
+    back, forward = SIM.minimal_jacobian(SIM.maximal(x)), SIM.maximal_jacobian(x)
+    assert forward.shape == (24, 14)
+    np.testing.assert_allclose(back @ forward, np.eye(14), atol=1e-10)
+
+
+def test_minimal_of_violated_joints() -> None:
+    z = maximal(_13=0.01)  # the foot 1 cm to the side
+    with pytest.raises(ValueError, match=r"Simulator.minimal\(z\): joint 'leg' is violated by 1.0e-02"):
+        SIM.minimal(z)
+    assert SIM.minimal(z, joint_tolerance=np.inf)[7] == pytest.approx(0.5)
+
+
+ERRORS: list[tuple[Callable[[], object], str]] = [
+    (lambda: Simulator("hopper"), r"Simulator\(mechanism\): expected a Mechanism, got 'hopper'"),
+    (lambda: Simulator(SIM.mechanism, time_step=0), r"Simulator\(time_step=\.\.\.\): expected a number > 0, got 0"),
+    (lambda: Simulator(SIM.mechanism, kappa=-1), r"Simulator\(kappa=\.\.\.\): expected a number > 0"),
+    (lambda: Simulator(SIM.mechanism, tolerance=np.nan), r"Simulator\(tolerance=\.\.\.\): .* got nan"),
+    (
+        lambda: Simulator(SIM.mechanism, max_iterations=0),
+        r"Simulator\(max_iterations=\.\.\.\): expected a whole number",
+    ),
+    (lambda: SIM.replace(timestep=0.1), r"Simulator.replace\(\.\.\.\): 'timestep' is not one of: mechanism, time_step"),
+    (
+        lambda: SIM.replace(friction={"toe": 1}),
+        r"Simulator.replace\(friction=\.\.\.\): 'toe' is not one of: foot, body",
+    ),
+    (lambda: SIM.step(X[:5]), r"Simulator.step\(x\): expected shape \(15,\), got \(5,\)"),
+    (lambda: SIM.step("zero"), r"Simulator.step\(x\): expected real numbers, got 'zero'"),
+    (lambda: SIM.step(X + 1j), r"Simulator.step\(x\): expected real numbers"),
+    (lambda: SIM.step(state(_9=np.nan)), r"Simulator.step\(x\): expected finite numbers, got nan at index 9"),
+    (lambda: SIM.step(state(_3=0.5)), r"Simulator.step\(x\): joint 'body': expected a unit quaternion, got length 0.5"),
+    (lambda: SIM.step(X, np.zeros(2)), r"Simulator.step\(u\): expected shape \(3,\), got \(2,\)"),
+    (lambda: SIM.step(X, [0, np.inf, 0]), r"Simulator.step\(u\): expected finite numbers, got inf at index 1"),
+    (lambda: SIM.rollout(X, np.zeros((4, 2))), r"Simulator.rollout\(us\): expected shape \(any, 3\), got \(4, 2\)"),
+    (lambda: SIM.rollout(X, np.full((4, 3), np.nan)), r"Simulator.rollout\(us\): .* got nan at index \(0, 0\)"),
+    (lambda: SIM.rollout_batch(X, np.zeros((2, 4, 3))), r"rollout_batch\(x0s\): expected shape \(2, 15\), got \(15,\)"),
+    (lambda: SIM.linearize(X, kappa=0), r"Simulator.linearize\(kappa=\.\.\.\): expected a number > 0"),
+    (lambda: SIM.linearize_trajectory([X] * 3, np.zeros((5, 3))), r"\(xs\): expected 5 or 6 states, as us, got 3"),
+    (lambda: SIM.linearize_trajectory([X, state(_3=2)], np.zeros((2, 3))), r"joint 'body' in row 1: expected a unit"),
+    (
+        lambda: SIM.linearize_trajectory([X], np.zeros((1, 3)), substeps=0),
+        r"\(substeps=\.\.\.\): expected a whole number",
+    ),
+    (
+        lambda: SIM.closed_loop(X, np.zeros((4, 3)), Ks=np.zeros((4, 3, 14))),
+        r"closed_loop\(Ks=.*gains need the states xs",
+    ),
+    (lambda: SIM.closed_loop(X, np.zeros((4, 3)), ks=np.zeros(3)), r"closed_loop\(ks=.*expected shape \(4, 3\)"),
+    (lambda: SIM.closed_loop(X, np.zeros((4, 3)), limits=(1, -1)), r"closed_loop\(limits=.*lower <= upper"),
+    (lambda: SIM.closed_loop(X, np.zeros((4, 3)), limits=(1, [1, 2])), r"closed_loop\(limits=.*as wide as u \(3\)"),
+    (lambda: SIM.closed_loop(X, np.zeros((4, 3)), alpha=np.nan), r"closed_loop\(alpha=.* got nan"),
+    (lambda: SIM.start(np.zeros(8), np.zeros(7)), r"Simulator.start\(q\): joint 'body': expected a unit quaternion"),
+    (lambda: SIM.start(X[:8], np.zeros(6)), r"Simulator.start\(v\): expected shape \(7,\), got \(6,\)"),
+    (lambda: SIM.energy(np.zeros((2, 3))), r"Simulator.energy\(x\): expected shape \(\.\.\., 15\), got \(2, 3\)"),
+    (lambda: SIM.integrate(X, X), r"Simulator.integrate\(dx\): expected shape \(14,\), got \(15,\)"),
+    (lambda: SIM.maximal(np.zeros(3)), r"Simulator.maximal\(x\): expected shape \(15,\), got \(3,\)"),
+    (lambda: SIM.minimal(np.zeros((3, 13))), r"Simulator.minimal\(z\): expected shape \(2, 13\), got \(3, 13\)"),
+    (lambda: SIM.minimal(maximal(_6=0.1)), r"Simulator.minimal\(z\): body 'body': expected a unit quaternion"),
+    (lambda: SIM.minimal(maximal(_23=400.0)), r"Simulator.minimal\(z\): body 'foot': A body turns by half a turn"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), ERRORS, ids=[m[:60] for _, m in ERRORS])
+def test_errors_name_the_call_and_the_culprit(call: Callable[[], object], message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        call()
+
+
+def test_step_and_rollout_agree() -> None:
+    x0, us = np.array([1.0, -0.5, 0.2, 0.1]), np.full((5, 2), 0.3)
+    t = PENDULUM.rollout(x0, us)
+    assert t.success and t.knot == 5 and t.x.shape == (6, 4) and t.u.shape == (5, 2)
+    np.testing.assert_allclose(t.time, 0.01 * np.arange(6))
+    x = x0
+    for expected in t.x[1:]:
+        r = PENDULUM.step(x, us[0])
+        assert r.success and r.status == Status.SOLVED
+        np.testing.assert_array_equal(r.x, expected)
+        x = r.x
+    assert t.contacts.impulse.shape == (5, 0, 3) and t.contacts.normal_force.shape == (5, 0)
+
+
+def test_rollout_of_no_steps() -> None:
+    t = PENDULUM.rollout(np.zeros(4), np.zeros((0, 2)))
+    assert t.success and t.x.shape == (1, 4) and t.knot == 0
+
+
+def test_unsolved_step_is_not_used() -> None:
+    sim = PENDULUM.replace(max_iterations=1, tolerance=1e-15)
+    x0 = np.array([1.0, -0.5, 3.0, 8.0])
+    r = sim.step(x0)
+    assert not r.success and r.status == Status.MAX_ITERATIONS
+    np.testing.assert_array_equal(r.x, x0)
+    t = sim.rollout(x0, np.zeros((3, 2)))
+    assert (t.knot, len(t.x), len(t.u), len(t.contacts.gap)) == (0, 1, 0, 0)
+    assert t.message.startswith("Simulator.rollout: step 0: The iteration limit") and "Residual" in t.message
+    with pytest.raises(RuntimeError, match=r"Simulator.rollout: step 0: The iteration limit"):
+        sim.rollout(x0, np.zeros((3, 2)), throw=True)
+    with pytest.raises(RuntimeError, match=r"Simulator.step: The iteration limit"):
+        sim.step(x0, throw=True)
+
+
+def test_batch_equals_single_rollouts() -> None:
+    rng = np.random.default_rng(0)
+    x0s, us = rng.normal(size=(6, 4)), rng.normal(size=(6, 5, 2))
+    batch = PENDULUM.rollout_batch(x0s, us)
+    assert np.all(batch.status == 0) and np.all(batch.knot == 5)
+    for k in range(6):
+        np.testing.assert_array_equal(batch.x[k], PENDULUM.rollout(x0s[k], us[k]).x)
+
+
+def test_linearize_against_differences() -> None:
+    x, u = np.array([1.0, -0.5, 2.0, -1.0]), np.array([0.3, -0.2])
+    A, B = PENDULUM.replace(tolerance=1e-12).linearize(x, u)
+    e = 1e-6
+    for k, d in enumerate(e * np.eye(4)):
+        np.testing.assert_allclose(
+            A[:, k], (PENDULUM.step(x + d, u).x - PENDULUM.step(x - d, u).x) / (2 * e), atol=1e-6
+        )
+    for k, d in enumerate(e * np.eye(2)):
+        np.testing.assert_allclose(
+            B[:, k], (PENDULUM.step(x, u + d).x - PENDULUM.step(x, u - d).x) / (2 * e), atol=1e-6
+        )
+    knots = PENDULUM.linearize_trajectory([x] * 3, [u] * 2, substeps=2)
+    A2, B2 = PENDULUM.linearize(PENDULUM.step(x, u).x, u)
+    np.testing.assert_allclose(knots.A[1], A2 @ A, atol=1e-7)
+    np.testing.assert_allclose(knots.B[1], A2 @ B + B2, atol=1e-7)
+    np.testing.assert_array_equal(knots.x_next[0], PENDULUM.rollout(x, [u] * 2).x[-1])
+
+
+def test_closed_loop_follows_its_policy() -> None:
+    rng = np.random.default_rng(3)
+    x0, us, xs = rng.normal(size=4), rng.normal(size=(3, 2)), rng.normal(size=(4, 4))
+    ks, Ks, gaps = rng.normal(size=(3, 2)), rng.normal(size=(3, 2, 4)), rng.normal(size=(4, 4))
+    shot = PENDULUM.closed_loop(x0, us, xs, ks, Ks, gaps, alpha=0.25, limits=(-1.0, [0.5, np.inf]), substeps=2)
+    x = x0
+    for t in range(3):
+        u = np.clip(us[t] + 0.25 * ks[t] + Ks[t] @ (x - xs[t]), -1.0, [0.5, np.inf])
+        np.testing.assert_allclose(shot.u[t], u, rtol=1e-12)
+        x = PENDULUM.rollout(x, [u, u]).x[-1] - 0.75 * gaps[t + 1]
+        np.testing.assert_allclose(shot.x[t + 1], x, atol=1e-12)
+    assert (shot.status, shot.knot) == (Status.SOLVED, 3)
+    np.testing.assert_array_equal(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x)

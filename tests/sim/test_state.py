@@ -1,0 +1,82 @@
+"""integrate and difference are inverse to each other on the manifold of states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mechanisms import chain_with
+
+from sim.simulator import Simulator
+
+SIM = Simulator(chain_with("planar_free", on_world=False))
+PROPERTY = settings(deadline=None, derandomize=True, max_examples=60)
+NUMBER = st.floats(-10.0, 10.0)
+
+
+def states(draw: st.DrawFn) -> np.ndarray:
+    """Any state: quaternions from any rotation vector."""
+    dx = np.array(draw(st.lists(NUMBER, min_size=SIM.ndx, max_size=SIM.ndx)))
+    return np.asarray(SIM.integrate(SIM.neutral(), dx))
+
+
+any_state = st.composite(states)()
+
+
+@st.composite
+def perturbations(draw: st.DrawFn) -> np.ndarray:
+    """Steps whose rotations stay below half a turn, from tiny to large."""
+    size = draw(st.sampled_from([0.0, 1e-300, 1e-160, 1e-12, 1e-6, 1e-3, 0.1, 1.0]))
+    return size * np.array(draw(st.lists(st.floats(-1.8, 1.8), min_size=SIM.ndx, max_size=SIM.ndx)))
+
+
+@PROPERTY
+@given(any_state, perturbations())
+def test_difference_inverts_integrate(x: np.ndarray, dx: np.ndarray) -> None:
+    np.testing.assert_allclose(SIM.difference(x, SIM.integrate(x, dx)), dx, rtol=1e-9, atol=1e-14)
+
+
+@PROPERTY
+@given(any_state, any_state)
+def test_integrate_inverts_difference(x0: np.ndarray, x1: np.ndarray) -> None:
+    back = SIM.integrate(x0, SIM.difference(x0, x1))
+    np.testing.assert_allclose(SIM.difference(x1, back), 0.0, atol=1e-9)
+
+
+@PROPERTY
+@given(any_state, perturbations())
+def test_quaternions_stay_of_length_one(x: np.ndarray, dx: np.ndarray) -> None:
+    moved = SIM.integrate(x, dx)
+    for joint in SIM.mechanism.joints:
+        if joint.nrot == 3:
+            stop = SIM.mechanism.q_slice(joint.name).stop
+            assert abs(np.linalg.norm(moved[stop - 4 : stop]) - 1.0) < 1e-14
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-4, 0.1, 3.0, np.pi - 1e-3, np.pi - 1e-9, np.pi])
+def test_every_angle_to_half_a_turn(angle: float) -> None:
+    x, dx = SIM.neutral(), np.zeros(SIM.ndx)
+    dx[3:6] = angle * np.array([2.0, -1.0, 2.0]) / 3
+    back = SIM.difference(x, SIM.integrate(x, dx))
+    # at half a turn itself the two directions are the same rotation
+    sign = np.sign(back[3] * dx[3]) if angle == np.pi else 1.0
+    np.testing.assert_allclose(sign * back, dx, rtol=1e-12, atol=1e-300)
+
+
+def test_opposite_quaternions_are_the_same_state() -> None:
+    x = SIM.neutral()
+    other = x.copy()
+    other[3:7] *= -1.0
+    np.testing.assert_array_equal(SIM.difference(x, other), 0.0)
+
+
+def test_leading_axes_are_broadcast() -> None:
+    x = SIM.neutral()
+    dx = 0.1 * np.arange(3 * 2 * SIM.ndx, dtype=float).reshape(3, 2, SIM.ndx) / SIM.ndx
+    moved = SIM.integrate(x, dx)
+    assert moved.shape == (3, 2, SIM.nx)
+    np.testing.assert_allclose(moved[2, 1], SIM.integrate(x, dx[2, 1]), rtol=1e-15)
+    np.testing.assert_allclose(SIM.difference(x, moved), dx, atol=1e-13)
+    with pytest.raises(ValueError, match=r"Simulator.integrate: leading axes \(3,\) of x and \(2,\) of dx do not"):
+        SIM.integrate(np.tile(x, (3, 1)), dx[0])
