@@ -25,8 +25,9 @@ def test_impact_at_100_metres_per_second(time_step, law):
     x = np.r_[0.0, 0.0, 0.1 + 3.3 * 100.0 * time_step, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -100.0, np.zeros(3)]
     xs = run(sim, x, 20)
     assert gaps(sim, xs).min() > -1e-8
-    assert np.abs(xs[-1, 7:10]).max() < 2e-2, "no rebound"
-    assert gaps(sim, xs[-1]) < 1e-3
+    hop = np.sqrt(1e-6 / time_step)  # the central path lifts a ball that was pressed to gap 0: m v = kappa / (h v)
+    assert np.abs(xs[8:, 7:10]).max() < 1.1 * hop, "no rebound"
+    assert gaps(sim, xs[8:]).max() < hop**2 / 9.81 + 2e-4
 
 
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2])
