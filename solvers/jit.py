@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import numba
 from numba import prange
 
-__all__ = ["kernel", "parallel_kernel", "prange", "compiled_signatures", "cache_folder"]
+__all__ = ["kernel", "parallel_kernel", "prange", "compiled_signatures", "cache_folder", "local_kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -80,12 +80,12 @@ if _FOLDER is not None:
     _prune(_FOLDER.parent)
 
 
-def _compile(func: F, **flags: Any) -> F:
+def _compile(func: F, cache: bool = True, **flags: Any) -> F:
     users_folder = numba.config.CACHE_DIR
     try:
         if _FOLDER is not None:
             numba.config.CACHE_DIR = str(_FOLDER)
-        compiled = numba.njit(cache=_FOLDER is not None, **_FLAGS, **flags)(func)
+        compiled = numba.njit(cache=cache and _FOLDER is not None, **_FLAGS, **flags)(func)
     finally:
         numba.config.CACHE_DIR = users_folder
     _REGISTRY.append(compiled)
@@ -100,6 +100,13 @@ def kernel(func: F) -> F:
     """
     inner = not {"Model", "Work"}.isdisjoint(func.__annotations__.values())
     return _compile(func, _nrt=False, no_cpython_wrapper=inner, no_cfunc_wrapper=True)
+
+
+def local_kernel(func: F) -> F:
+    """A kernel made inside a function, around another kernel: Numba never finds such a closure in its cache again, so
+    it is compiled once per process and leaves no file behind.
+    """
+    return _compile(func, cache=False, _nrt=False)
 
 
 def parallel_kernel(func: F) -> F:

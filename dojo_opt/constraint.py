@@ -1,0 +1,122 @@
+"""Constraints: what a plan must do, met by an augmented Lagrangian with a multiplier and a penalty per entry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.residual import ResidualKernels
+from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
+
+Integers = NDArray[np.int64]
+Vector = NDArray[np.float64]
+
+__all__ = ["ControlBounds", "Goal", "ResidualConstraint", "StateBounds"]
+
+
+def _chosen(call: str, components: Any, count: int) -> Integers:
+    """Component numbers as an array; None means all."""
+    if components is None:
+        return np.arange(count)
+    chosen = np.atleast_1d(np.asarray(components, dtype=np.int64)).copy()
+    if chosen.size == 0 or np.any(chosen < 0) or np.any(chosen >= count):
+        raise ValueError(f"{call}: expected components in [0, {count}), got {chosen.tolist()}")
+    return chosen
+
+
+@dataclass(frozen=True)
+class Goal:
+    """(x_t (-) target)_i = 0 for the chosen tangent components i (default all) at `knots` (default the last).
+
+    target: (nx,), or one row per knot.
+    """
+
+    target: ArrayLike
+    components: Any = None
+    knots: Any = -1
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
+        target = table("Goal(target=...)", self.target, knots.size, sim.nx)
+        mask = np.zeros((knots.size, sim.ndx))
+        mask[:, _chosen("Goal(components=...)", self.components, sim.ndx)] = 1.0
+        return StateTerm("Goal", knots, mask, target, layout)
+
+
+def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: Integers) -> tuple[Any, Integers, Vector]:
+    """Reference, repeated components and signs of  lower - z <= 0  and  z - upper <= 0, infinite bounds left out."""
+    columns = chosen.size
+    with_inf = [np.broadcast_to(np.asarray(b, dtype=float), (rows, columns)) for b in (lower, upper)]
+    if np.any(np.isnan(with_inf)) or np.any(with_inf[0] > with_inf[1]):
+        raise ValueError(f"{call}: expected lower <= upper, got lower {lower}, upper {upper}")
+    keep = [np.any(np.isfinite(b), axis=0) for b in with_inf]
+    reference = np.concatenate([b[:, k] for b, k in zip(with_inf, keep, strict=True)], axis=1)
+    big = np.where(np.isfinite(reference), reference, np.sign(reference) * 1e100)
+    sign = np.repeat([-1.0, 1.0], [int(k.sum()) for k in keep])
+    return np.ascontiguousarray(big), np.concatenate([chosen[k] for k in keep]), sign
+
+
+@dataclass(frozen=True)
+class StateBounds:
+    """lower <= component <= upper of chosen scalar tangent components (default all) at `knots` (default 1 to T).
+
+    lower, upper: scalars or one per component, infinite where free. A rotation by quaternion has no such bounds.
+    """
+
+    lower: ArrayLike
+    upper: ArrayLike
+    components: Any = None
+    knots: Any = None
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
+        knots = knots[knots > 0] if self.knots is None else knots
+        chosen = _chosen("StateBounds(components=...)", self.components, sim.ndx)
+        reference, columns, sign = _bounds("StateBounds", self.lower, self.upper, knots.size, chosen)
+        if np.any(layout[columns] < 0):
+            bad = int(columns[layout[columns] < 0][0])
+            raise ValueError(f"StateBounds(components=...): component {bad} belongs to a quaternion, which has no bounds")
+        pick = Pick(True, layout[columns], columns, sign)
+        return PickTerm("StateBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
+
+
+@dataclass(frozen=True)
+class ControlBounds:
+    """lower <= u_i <= upper for chosen controls (default all) at `knots` (default all), as a soft-to-hard constraint.
+
+    `Problem(control_limits=...)` is exact at every iteration and usually better; use this to bound single knots.
+    """
+
+    lower: ArrayLike
+    upper: ArrayLike
+    components: Any = None
+    knots: Any = None
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        del layout
+        knots = knot_list("ControlBounds(knots=...)", self.knots, horizon, last=False)
+        chosen = _chosen("ControlBounds(components=...)", self.components, sim.nu)
+        reference, columns, sign = _bounds("ControlBounds", self.lower, self.upper, knots.size, chosen)
+        pick = Pick(False, columns, sim.ndx + columns, sign)
+        return PickTerm("ControlBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
+
+
+@dataclass(frozen=True)
+class ResidualConstraint:
+    """r(x_t, u_t) = 0, or r <= 0 with equality=False, for a compiled function of the user; see `ResidualCost`."""
+
+    function: Callable[..., Any]
+    dimension: int
+    equality: bool = True
+    jacobian: Callable[..., Any] | None = None
+    knots: Any = None
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        knots = knot_list("ResidualConstraint(knots=...)", self.knots, horizon, last=True)
+        kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
+        weight = np.ones((knots.size, self.dimension))
+        return ResidualTerm("ResidualConstraint", knots, weight, not self.equality, kernels, layout)

@@ -1,0 +1,212 @@
+"""Iterations at one smoothing level, and the passage from one level to the next."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.descent import Descent
+from dojo_opt.line_search import Iterate, LineSearch
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options, Stage
+from dojo_opt.plan import table_header, table_line
+from dojo_opt.problem import Problem
+from solvers.riccati import Promise
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+
+_GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
+_POOR_STEP = 0.1  # one shorter than this raises it
+_LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
+_SLOW = 2  # short steps in a row that bring next to nothing end a stage
+_SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
+_PATIENCE = 2  # times the rejections allowed where only regularisation is left to try
+_SMALL = 1e-9  # merit below which changes are judged absolutely
+
+
+class Continuation:
+    """The present iterate, the smoothing it belongs to, and the record of all iterations."""
+
+    now: Iterate
+
+    def __init__(
+        self, problem: Problem, options: Options, objective: Objective, descent: Descent, line_search: LineSearch
+    ) -> None:
+        self._problem = problem
+        self._options = options
+        self._objective = objective
+        self._descent = descent
+        self._line_search = line_search
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last solve and start the clock."""
+        self.begin = self._tick = time.perf_counter()
+        self.history: list[dict[str, Any]] = []
+
+    def start(self, now: Iterate, kappa: float | None) -> None:
+        """Begin at `now`, a rollout at `kappa`, or states whose gaps are not known yet (None)."""
+        self.now = now
+        self.kappa = kappa
+        self._kappa_grad = 0.0
+        self._fresh = False  # the quadratic model belongs to `now`
+
+    def remeasure(self) -> None:
+        """The multipliers have changed: the merit and the model of the objective are out of date."""
+        now = self.now
+        cost, merit = self._objective.evaluate(now.x, now.u)
+        self.now = now._replace(cost=cost, merit=merit)
+        if self._fresh:
+            self._descent.expand(self.now)
+
+    def roll_with_gains(self, kappa: float) -> bool:
+        """Replace the trajectory by its own closed-loop rollout at `kappa`; False when the simulator cannot."""
+        shot = self._line_search.roll(self.now, None, self._descent.K, 1.0, kappa)
+        if shot.status != Status.SOLVED:
+            return False
+        self.now = self._line_search.accept(shot, None)
+        self.kappa, self._fresh = kappa, False
+        return True
+
+    def follow(self, kappa: float) -> bool:
+        """Roll out with the gains at another smoothing; False, and nothing changed, when that loses the trajectory."""
+        if kappa == self.kappa:
+            return True
+        before, kappa_before, fresh = self.now, self.kappa, self._fresh
+        if not self.roll_with_gains(kappa):
+            return False
+        if self.now.merit - before.merit <= self._options.follow * abs(before.merit):
+            return True
+        self.now, self.kappa, self._fresh = before, kappa_before, fresh
+        return False
+
+    def _enter(self, stage: Stage) -> Status:
+        """Make the trajectory belong to the smoothing of `stage`: roll out, or keep its states and open the gaps."""
+        started = self.kappa is not None
+        if stage.kappa_eval == self.kappa:
+            return Status.SOLVED
+        if self._options.reopen == "feedback" and started and self.follow(stage.kappa_eval):
+            return Status.SOLVED
+        problem, now = self._problem, self.now
+        linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
+        if np.any(linear.status):
+            return Status.SOLVED if self.roll_with_gains(stage.kappa_eval) else Status.SIMULATION_FAILED
+        gaps = np.zeros((problem.horizon + 1, problem.sim.ndx))
+        gaps[1:] = problem.sim.difference(linear.x_next, now.x[1:])
+        closed = float(np.abs(gaps).max()) <= self._options.gap
+        self.now = now._replace(gaps=None if closed else gaps)
+        self.kappa = stage.kappa_eval
+        self._fresh = stage.kappa_grad == stage.kappa_eval
+        if self._fresh:
+            self._descent.use(linear, self.now)
+        return Status.SOLVED
+
+    def run(self, stage: Stage) -> Status:
+        """Iterate until the stage is done (SOLVED), stuck (LINE_SEARCH), or the whole solve has to end."""
+        status = self._enter(stage)
+        if status != Status.SOLVED:
+            return status
+        rejected = slow = 0
+        self._kappa_grad = stage.kappa_grad
+        for _ in range(stage.iterations):
+            if not self._fresh:
+                status = self._descent.linearize(self.now, self._kappa_grad, stage.kappa_eval)
+                if status != Status.SOLVED:
+                    return Status.SIMULATION_FAILED
+                self._fresh = True
+            promise = self._descent.gains(self.now)
+            if promise.status != Status.SOLVED:
+                return Status.MAX_REGULARIZATION
+            small = stage.decrease * (abs(self.now.merit) + _SMALL)
+            if self.now.gaps is None and self._descent.mu <= _LIGHT and -(promise.d0 + 0.5 * promise.d1) <= small:
+                return Status.SOLVED
+            status = self._over_budget()
+            if status != Status.SOLVED:
+                return status
+            before = self.now
+            alpha = self._advance(stage, promise)
+            if self._report(stage, promise, alpha):
+                return Status.STOPPED
+            rejected = 0 if alpha > 0.0 else rejected + 1
+            if rejected >= self._options.rejections and self._unstick(stage):
+                rejected = 0
+            elif rejected >= _PATIENCE * self._options.rejections:
+                return Status.LINE_SEARCH
+            if alpha > 0.0 and before.gaps is None:
+                slow = slow + 1 if before.merit - self.now.merit <= small else 0
+                if slow >= (1 if alpha >= _GOOD_STEP else _SLOW):
+                    return Status.SOLVED
+        return Status.SOLVED
+
+    def _unstick(self, stage: Stage) -> bool:
+        """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
+        if self.now.gaps is not None:
+            return self.roll_with_gains(stage.kappa_eval)
+        if self._kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
+            return False
+        self._kappa_grad = max(_SHARPER * self._kappa_grad, stage.kappa_eval)
+        self._descent.reset_regularization()
+        self._fresh = False
+        return True
+
+    def _advance(self, stage: Stage, promise: Promise) -> float:
+        """One line search, and the regularisation that follows from its step size."""
+        descent = self._descent
+        alpha, self.now = self._line_search.search(self.now, promise, descent.k, descent.K, stage.kappa_eval)
+        self._mu = descent.mu
+        if alpha >= _GOOD_STEP:
+            descent.lower_regularization()
+        elif alpha < _POOR_STEP:
+            descent.raise_regularization()
+        self._fresh = self._fresh and alpha == 0.0
+        return alpha
+
+    def _over_budget(self) -> Status:
+        if len(self.history) >= self._options.max_iterations:
+            return Status.MAX_ITERATIONS
+        if time.perf_counter() - self.begin >= self._options.time_limit:
+            return Status.TIME_LIMIT
+        return Status.SOLVED
+
+    def _report(self, stage: Stage, promise: Promise, alpha: float) -> bool:
+        """Record the iteration, print it, call back; True when the callback wants to stop."""
+        now, tock = self.now, time.perf_counter()
+        record = {
+            "iteration": len(self.history) + 1,
+            "cost": now.cost,
+            "merit": now.merit,
+            "gradient": promise.gradient,
+            "kappa_eval": stage.kappa_eval,
+            "kappa_grad": self._kappa_grad,
+            "mu": self._mu,
+            "alpha": alpha,
+            "promised": alpha * (promise.d0 + 0.5 * alpha * promise.d1),
+            "gap": now.gap,
+            "violation": self._objective.violation(now.x, now.u),
+            "milliseconds": 1e3 * (tock - self._tick),
+        }
+        self._tick = tock
+        self.history.append(record)
+        if self._options.verbose:
+            stream = self._options.stream or sys.stdout
+            if len(self.history) == 1:
+                print(table_header(), file=stream)
+            print(table_line(record), file=stream)
+        if self._options.callback is not None:
+            try:
+                self._options.callback(record)
+            except StopIteration:
+                return True
+        return False
+
+    def finish(self, stage: Stage) -> None:
+        """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned."""
+        if self.now.gaps is not None or self.kappa != stage.kappa_eval:
+            self.roll_with_gains(stage.kappa_eval)
+        if not self._fresh and self._descent.linearize(self.now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
+            self._descent.gains(self.now)

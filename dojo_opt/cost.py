@@ -1,0 +1,100 @@
+"""Costs: what a plan should do well. All are weighted squares of residuals, so Gauss-Newton is exact for linear ones.
+
+Weights multiply squares without a factor 1/2: a cost is `scale * sum w r^2`. Use `scale=0.5` for the other convention.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.residual import ResidualKernels
+from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
+
+Integers = NDArray[np.int64]
+
+__all__ = ["Effort", "ResidualCost", "Spec", "Tracking"]
+
+
+class Spec(Protocol):
+    """A cost or constraint as a user writes it."""
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        """The same for one simulator and horizon, with its arrays."""
+        ...
+
+
+def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale: float) -> NDArray[np.float64]:
+    weight = table(call, value, rows, columns)
+    if np.any(weight < 0.0) or not scale >= 0.0:
+        raise ValueError(f"{call}: expected no negative weight and scale, got min {weight.min()}, scale {scale}")
+    return scale * weight
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, in the tangent space (rotations by their rotation vector).
+
+    reference: (nx,), or one row per knot; weight: scalar, (ndx,), or one row per knot. knots: default all T + 1.
+    """
+
+    reference: ArrayLike
+    weight: ArrayLike
+    knots: Any = None
+    scale: float = 1.0
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
+        reference = table("Tracking(reference=...)", self.reference, knots.size, sim.nx)
+        weight = _checked_weight("Tracking(weight=...)", self.weight, knots.size, sim.ndx, self.scale)
+        return StateTerm("Tracking", knots, weight, reference, layout)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
+
+    weight: scalar, (nu,) or (T, nu), per N^2 or (N m)^2; reference: likewise.
+    """
+
+    weight: ArrayLike
+    reference: ArrayLike = 0.0
+    scale: float = 1.0
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        del layout
+        knots = np.arange(horizon)
+        reference = table("Effort(reference=...)", self.reference, horizon, sim.nu)
+        weight = _checked_weight("Effort(weight=...)", self.weight, horizon, sim.nu, self.scale)
+        pick = Pick(False, np.arange(sim.nu), sim.ndx + np.arange(sim.nu), np.ones(sim.nu))
+        return PickTerm("Effort", knots, weight, reference, pick)
+
+
+@dataclass(frozen=True)
+class ResidualCost:
+    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a compiled function of the user.
+
+        @dojo.kernel
+        def residual(x, u, out): ...                          # out: (dimension,)
+
+    jacobian(x, u, out) with out (dimension, ndx + nu) is optional; without it the derivative is a central difference on
+    the manifold. Either way the loop over the knots is compiled once per process (about a second), because Numba cannot
+    cache a loop around a function that it is given. At the final knot u is zero.
+    """
+
+    function: Callable[..., Any]
+    dimension: int
+    weight: ArrayLike = 1.0
+    jacobian: Callable[..., Any] | None = None
+    knots: Any = None
+    scale: float = 1.0
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        knots = knot_list("ResidualCost(knots=...)", self.knots, horizon, last=True)
+        weight = _checked_weight("ResidualCost(weight=...)", self.weight, knots.size, self.dimension, self.scale)
+        kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
+        return ResidualTerm("ResidualCost", knots, weight, False, kernels, layout)

@@ -1,0 +1,104 @@
+"""Which way to go: linearise, expand, and run the backward pass with as much regularisation as it needs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.line_search import Iterate
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options
+from dojo_opt.problem import Problem
+from solvers.riccati import Promise, Quadratic, Regularization, backward, work_size
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+
+_FACTOR = 2.0  # of the regularisation schedule, growing geometrically with repeated use: Tassa 2012, section II.F
+_USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
+
+
+class Descent:
+    """Gains K (T, nu, ndx), k (T, nu) at an iterate, with all buffers of the backward pass."""
+
+    def __init__(self, problem: Problem, objective: Objective, options: Options) -> None:
+        sim, T = problem.sim, problem.horizon
+        self.K = np.zeros((T, sim.nu, sim.ndx))
+        self.k = np.zeros((T, sim.nu))
+        self.mu = 0.0
+        self._growth = 1.0
+        self._problem = problem
+        self._objective = objective
+        self._options = options
+        self._damping = np.ones(sim.nu)
+        self._free = np.zeros(sim.nu, dtype=np.int64)
+        self._buffer = np.zeros(work_size(sim.ndx, sim.nu))
+        self._no_gaps = np.zeros((T + 1, sim.ndx))
+        self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
+        self._linear: Any = None
+
+    def reset(self) -> None:
+        """Forget regularisation and gains of an earlier solve."""
+        self.reset_regularization()
+        self.K.fill(0.0)
+        self.k.fill(0.0)
+
+    def reset_regularization(self) -> None:
+        """Back to the first value."""
+        self.mu, self._growth = self._options.regularization, 1.0
+
+    def use(self, linear: Any, now: Iterate) -> None:
+        """Take a linearisation of the dynamics at `now` and expand the objective there."""
+        self._linear = linear
+        self.expand(now)
+
+    def expand(self, now: Iterate) -> None:
+        """Expand the objective at `now`, and take the mean control weight as the unit of regularisation."""
+        self._objective.expand(now.x, now.u)
+        n = self._problem.sim.ndx
+        weight = np.einsum("tii->i", self._objective.H[:-1, n:, n:]) / self._problem.horizon
+        self._damping = np.where(weight > 0.0, weight, 1.0)
+
+    def linearize(self, now: Iterate, kappa: float, kappa_eval: float) -> Status:
+        """Dynamics and objective around `now`, at the first smoothing that solves every knot.
+
+        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
+        """
+        problem = self._problem
+        status = Status.SOLVED
+        for level in (kappa, 10.0 * kappa, kappa_eval):
+            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=level)
+            failed = np.flatnonzero(linear.status)
+            if failed.size == 0:
+                self.use(linear, now)
+                return Status.SOLVED
+            status = Status(int(linear.status[failed[0]]))
+        return status
+
+    def gains(self, now: Iterate) -> Promise:
+        """K and k at the smallest regularisation, from the present one upwards, that makes every Q_uu positive definite."""
+        lo, hi = self._free_limits
+        if self._problem.control_limits is not None:
+            lo, hi = (bound - now.u for bound in self._problem.control_limits)
+        gaps = self._no_gaps if now.gaps is None else now.gaps
+        model = Quadratic(self._linear.A, self._linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+        while True:
+            value = self.mu * self._options.value_regularization
+            promise = backward(
+                model, Regularization(self.mu, value, self._damping), self.K, self.k, self._free, self._buffer
+            )
+            if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
+                return promise
+            self.raise_regularization()
+
+    def raise_regularization(self) -> None:
+        """After a failure: faster with every failure in a row."""
+        self._growth = max(_FACTOR, self._growth * _FACTOR)
+        self.mu = min(max(_USEFUL, self.mu * self._growth), self._options.regularization_max)
+
+    def lower_regularization(self) -> None:
+        """After a good step: faster with every good step in a row."""
+        self._growth = min(1.0 / _FACTOR, self._growth / _FACTOR)
+        self.mu = self.mu * self._growth if self.mu * self._growth >= _USEFUL else 0.0

@@ -1,0 +1,156 @@
+"""Iterative LQR with gaps: single and multiple shooting in one code path, through a continuation of contact smoothing.
+
+One iteration: differentiate the time steps along the trajectory, solve the linear-quadratic problem around it (Descent),
+and roll the gains out (LineSearch). Stages lower the smoothing; between them the trajectory is kept and its gaps are
+opened, or it is rolled out with the gains: never open loop, which an unstable robot does not survive.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dojo_opt.continuation import Continuation
+from dojo_opt.descent import Descent
+from dojo_opt.line_search import Iterate, LineSearch
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options, Stage
+from dojo_opt.plan import Plan
+from dojo_opt.problem import Problem
+from solvers.status import MESSAGES, Status
+
+__all__ = ["Solver", "ilqr"]
+
+
+def ilqr(
+    problem: Problem,
+    controls: ArrayLike | None = None,
+    states: ArrayLike | None = None,
+    *,
+    warm_start: Plan | None = None,
+    options: Options | None = None,
+    **settings: Any,
+) -> Plan:
+    """Plan a trajectory.
+
+    controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the same
+    problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
+    """
+    options = Options(**settings) if options is None else replace(options, **settings)
+    return Solver(problem, options).solve(controls, states, warm_start)
+
+
+class Solver:
+    """iLQR with its buffers, for problems that are solved again and again from changing starts."""
+
+    def __init__(self, problem: Problem, options: Options | None = None) -> None:
+        self.problem = problem
+        self.options = Options() if options is None else options
+        self.objective = Objective(problem, self.options)
+        self.descent = Descent(problem, self.objective, self.options)
+        self.line_search = LineSearch(problem, self.objective, self.options)
+        self.continuation = Continuation(problem, self.options, self.objective, self.descent, self.line_search)
+
+    def solve(
+        self, controls: ArrayLike | None = None, states: ArrayLike | None = None, warm_start: Plan | None = None
+    ) -> Plan:
+        """Plan from a guess; see `ilqr`."""
+        self.continuation.reset()
+        self.descent.reset()
+        if warm_start is None:
+            self.objective.reset()
+        else:
+            controls = warm_start.u if controls is None else controls
+            states = warm_start.x if states is None else states
+            self.objective.reset(warm_start.multipliers, warm_start.penalties)
+        status, detail = self._guess(controls, states)
+        if status == Status.SOLVED:
+            status = self._run()
+        return self._plan(status, detail)
+
+    def _guess(self, controls: ArrayLike | None, states: ArrayLike | None) -> tuple[Status, str]:
+        """First iterate: the rollout of the controls, or the given states with their gaps still to be opened."""
+        problem, search = self.problem, self.line_search
+        us = problem.controls0 if controls is None else problem.check_controls("ilqr(controls=...)", controls)
+        if problem.control_limits is not None:
+            us = np.clip(us, *problem.control_limits)
+        xs = problem.states0 if states is None and controls is None else states
+        if xs is not None:
+            xs = problem.check_states("ilqr(states=...)", xs)
+            self.continuation.start(Iterate(xs, us, None, *self.objective.evaluate(xs, us)), None)
+            return Status.SOLVED, ""
+        idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us, None, np.inf, np.inf)
+        kappa = self.options.stages[0].kappa_eval
+        shot = search.roll(idle, None, None, 1.0, kappa)
+        if shot.status != Status.SOLVED:
+            self.continuation.start(idle, kappa)
+            reason = Status(int(shot.status))
+            return Status.SIMULATION_FAILED, f" Knot {int(shot.knot)}, {reason.name}: {MESSAGES[reason]}"
+        self.continuation.start(search.accept(shot, None), kappa)
+        return Status.SOLVED, ""
+
+    def _run(self) -> Status:
+        """Stages from smooth to hard; after each the multipliers are updated, and the last is repeated until they fit."""
+        options = self.options
+        last = len(options.stages) - 1
+        for update in range(last + options.max_updates + 1):
+            status = self._stage(options.stages[min(update, last)], options.bisections)
+            if status == Status.SIMULATION_FAILED and update < last:
+                continue  # the next stage is another way down
+            if status not in (Status.SOLVED, Status.LINE_SEARCH):
+                return status
+            now = self.continuation.now
+            met = self.objective.violation(now.x, now.u) <= options.violation
+            if update >= last and met and now.gap <= options.gap:
+                return status
+            self.objective.update_multipliers(now.x, now.u)
+            self.continuation.remeasure()
+        return Status.INFEASIBLE
+
+    def _stage(self, stage: Stage, bisections: int) -> Status:
+        """One stage; when the trajectory does not survive the step of kappa, by way of the geometric mean."""
+        continuation = self.continuation
+        kappa = continuation.kappa
+        if self.options.reopen == "feedback" and bisections > 0 and kappa is not None:
+            if not continuation.follow(stage.kappa_eval):
+                middle = (kappa * stage.kappa_eval) ** 0.5
+                status = self._stage(Stage(middle, max(middle, stage.kappa_grad), stage.decrease), bisections - 1)
+                if status not in (Status.SOLVED, Status.LINE_SEARCH, Status.SIMULATION_FAILED):
+                    return status
+        return continuation.run(stage)
+
+    def _plan(self, status: Status, detail: str) -> Plan:
+        """What was reached, made consistent at the last smoothing, with the gains that belong to it."""
+        continuation, options = self.continuation, self.options
+        if status != Status.SIMULATION_FAILED:
+            continuation.finish(options.stages[-1])
+        now = continuation.now
+        violation = self.objective.violation(now.x, now.u)
+        plan = Plan(
+            success=status == Status.SOLVED,
+            status=status,
+            message=MESSAGES[status] + detail,
+            nit=len(continuation.history),
+            fun=now.cost,
+            x=now.x,
+            u=now.u,
+            K=self.descent.K.copy(),
+            k=self.descent.k.copy(),
+            violation=violation,
+            gap=now.gap,
+            seconds=time.perf_counter() - continuation.begin,
+            time_step=float(self.problem.sim.time_step),
+            substeps=self.problem.substeps,
+            history=continuation.history,
+            multipliers=[term.slope.copy() for term in self.objective.constraints],
+            penalties=[2.0 * term.weight for term in self.objective.constraints],
+            problem=self.problem,
+        )
+        if options.verbose:
+            print(plan.closing_line(), file=options.stream or sys.stdout)
+        return plan

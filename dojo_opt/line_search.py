@@ -1,0 +1,86 @@
+"""How far to go along the gains: nonlinear rollouts with decreasing step size, judged by what the model promised."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options
+from dojo_opt.problem import Problem
+from solvers.riccati import Promise
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+
+class Iterate(NamedTuple):
+    """A trajectory and how good it is."""
+
+    x: Matrix  # (T + 1, nx)
+    u: Matrix  # (T, nu)
+    gaps: Matrix | None  # (T + 1, ndx) f(x_t, u_t) (-) x_{t+1}, None when consistent
+    cost: float
+    merit: float
+
+    @property
+    def gap(self) -> float:
+        """Largest entry of the gaps."""
+        return 0.0 if self.gaps is None else float(np.abs(self.gaps).max())
+
+
+class LineSearch:
+    """Rolls out  u_t = us_t + a k_t + K_t (x_t (-) xs_t)  with the share 1 - a of every gap left open.
+
+    A trial counts only when every time step was solved. With d = a d0 + a^2/2 d1 the promised change of merit, it is
+    taken when merit - merit_old <= armijo d for d < 0; with open gaps, closing them may cost, and d > 0 allows an
+    increase up to ascent d.   Mastalli et al. 2020, "Crocoddyl".
+    """
+
+    def __init__(self, problem: Problem, objective: Objective, options: Options) -> None:
+        self._problem = problem
+        self._objective = objective
+        self._options = options
+
+    def roll(self, now: Iterate, k: Matrix | None, K: Stack | None, alpha: float, kappa: float) -> Any:
+        """One rollout from the start of the problem; the simulator stops at the first step that it cannot solve."""
+        problem = self._problem
+        return problem.sim.closed_loop(
+            problem.start,
+            now.u,
+            xs=now.x,
+            ks=k,
+            Ks=K,
+            gaps=now.gaps if alpha < 1.0 else None,
+            alpha=alpha,
+            limits=problem.control_limits,
+            substeps=problem.substeps,
+            kappa=kappa,
+        )
+
+    def accept(self, shot: Any, gaps: Matrix | None) -> Iterate:
+        """The rollout as the next iterate."""
+        cost, merit = self._objective.evaluate(shot.x, shot.u)
+        return Iterate(shot.x, shot.u, gaps, cost, merit)
+
+    def search(self, now: Iterate, promise: Promise, k: Matrix, K: Stack, kappa: float) -> tuple[float, Iterate]:
+        """(step size, new iterate), or (0, the old one) when no step size is good enough."""
+        options = self._options
+        alpha = 1.0
+        for _ in range(options.halvings + 1):
+            shot = self.roll(now, k, K, alpha, kappa)
+            if shot.status == Status.SOLVED:
+                cost, merit = self._objective.evaluate(shot.x, shot.u)
+                predicted = alpha * (promise.d0 + 0.5 * alpha * promise.d1)
+                if predicted < 0.0:
+                    good = merit - now.merit <= options.armijo * predicted
+                else:
+                    good = now.gaps is not None and merit - now.merit <= options.ascent * predicted
+                if good:
+                    gaps = None if now.gaps is None or alpha == 1.0 else (1.0 - alpha) * now.gaps
+                    return alpha, Iterate(shot.x, shot.u, gaps, cost, merit)
+            alpha *= 0.5
+        return 0.0, now

@@ -1,0 +1,81 @@
+"""Objective: all terms of a problem, their quadratic model along a trajectory, and the multipliers of its constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.options import Options
+from dojo_opt.problem import Problem
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+
+class Objective:
+    """cost + augmented Lagrangian (the merit), with gradient g (T + 1, ndx + nu) and Gauss-Newton Hessian H."""
+
+    def __init__(self, problem: Problem, options: Options) -> None:
+        size = problem.sim.ndx + problem.sim.nu
+        self.costs = problem.costs
+        self.constraints = problem.constraints
+        self.g = np.zeros((problem.horizon + 1, size))
+        self.H = np.zeros((problem.horizon + 1, size, size))
+        self._options = options
+        self._last: list[Matrix] = []
+
+    def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
+        """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem."""
+        for given in (multipliers, penalties):
+            if given and [a.shape for a in given] != [term.slope.shape for term in self.constraints]:
+                raise ValueError(
+                    "ilqr(warm_start=...): expected multipliers of shapes "
+                    f"{[term.slope.shape for term in self.constraints]}, got {[a.shape for a in given]}"
+                )
+        for i, term in enumerate(self.constraints):
+            term.slope[:] = multipliers[i] if multipliers else 0.0
+            term.weight[:] = 0.5 * (penalties[i] if penalties else self._options.penalty) * term.mask
+        self._last = []
+
+    def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
+        """(cost, merit) at (xs, us)."""
+        cost = 0.0
+        for term in self.costs:
+            cost += term.value(xs, us)
+        merit = cost
+        for term in self.constraints:
+            merit += term.value(xs, us)
+        return cost, merit
+
+    def expand(self, xs: Matrix, us: Matrix) -> None:
+        """Fill g and H at (xs, us)."""
+        self.g.fill(0.0)
+        self.H.fill(0.0)
+        for term in (*self.costs, *self.constraints):
+            term.expand(xs, us, self.g, self.H)
+
+    def violation(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint."""
+        worst = 0.0
+        for term in self.constraints:
+            term.update(xs, us)
+            worst = max(worst, float(term.violation().max(initial=0.0)))
+        return worst
+
+    def update_multipliers(self, xs: Matrix, us: Matrix) -> None:
+        """l <- l + rho r (kept >= 0 for inequalities); rho grows where the violation fell too little."""
+        options = self._options
+        now = []
+        for i, term in enumerate(self.constraints):
+            term.update(xs, us)
+            term.slope += 2.0 * term.weight * term.residual
+            if term.one_sided:
+                np.maximum(term.slope, 0.0, out=term.slope)
+            violation = term.violation()
+            now.append(violation)
+            if self._last:
+                slow = (violation > options.sufficient * self._last[i]) & (violation > 0.1 * options.violation)
+                term.weight[slow] = np.minimum(term.weight[slow] * options.penalty_growth, 0.5 * options.penalty_max)
+        self._last = now

@@ -1,0 +1,71 @@
+"""Settings of `ilqr`, and the stages of its continuation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+__all__ = ["CONTINUATION", "Options", "Stage"]
+
+
+class Stage(NamedTuple):
+    """One stage of the continuation: smoothing of the rollouts and of the derivatives [N s m], and when to go on."""
+
+    kappa_eval: float
+    kappa_grad: float
+    decrease: float = 3e-2  # ends when an iteration promises or brings less than this share of the merit
+    iterations: int = 100  # ends after this many
+
+
+# Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
+CONTINUATION = (
+    Stage(3e-2, 3e-2),
+    Stage(3e-3, 3e-3),
+    Stage(1e-6, 1e-4),
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of `ilqr`. The last stage is repeated, with multiplier updates, until the constraints hold."""
+
+    stages: tuple[Stage, ...] = CONTINUATION
+    reopen: str = "feedback"  # at a change of kappa: "feedback" rolls out with the gains, "gaps" keeps the states
+    follow: float = 1.0  # a rollout that raises the merit by more than this share of it has lost the trajectory
+    bisections: int = 3  # of a step of kappa in which the rollout loses the trajectory
+    tolerance: float = 1e-3  # the last stage ends when an iteration brings less than this share of the merit
+    max_iterations: int = 300  # all of them, rejected ones included
+    max_updates: int = 20  # multiplier updates before the constraints count as infeasible
+    violation: float = 1e-3  # largest violation of a plan that counts as solved
+    gap: float = 1e-8  # largest gap of a trajectory that counts as consistent
+    penalty: float = 100.0  # first penalty of every constraint: high, so that a goal is worth the effort of reaching it
+    penalty_growth: float = 10.0
+    penalty_max: float = 1e8
+    sufficient: float = 0.25  # the penalty of an entry grows when its violation fell to more than this share
+    regularization: float = 0.0  # first; in units of the mean control weight
+    regularization_max: float = 1e6
+    value_regularization: float = 0.0  # share of the regularisation that goes to V_xx, in units of 1
+    armijo: float = 1e-2  # share of the predicted decrease that a step has to bring
+    ascent: float = 2.0  # with open gaps: allowed multiple of a predicted increase
+    halvings: int = 6  # of the step size
+    rejections: int = 2  # failed line searches in a row before gaps are closed by force or derivatives sharpened
+    time_limit: float = float("inf")  # [s]
+    callback: Callable[[dict[str, Any]], None] | None = None  # once per iteration; may raise StopIteration
+    verbose: bool = False
+    stream: Any = None  # where the table goes, standard output by default
+
+    def __post_init__(self) -> None:
+        if self.reopen not in ("feedback", "gaps"):
+            raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
+        if len(self.stages) == 0:
+            raise ValueError("ilqr(stages=...): expected at least one stage")
+        stages = tuple(Stage(*stage) for stage in self.stages)
+        object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
+        for stage in self.stages:
+            if not (stage.kappa_eval > 0.0 and stage.kappa_grad > 0.0):
+                raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, int | float) and not isinstance(value, bool) and not value >= 0:
+                raise ValueError(f"ilqr({field.name}=...): expected a number >= 0, got {value}")

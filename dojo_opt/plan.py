@@ -1,0 +1,101 @@
+"""Plan: what `ilqr` returns."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+__all__ = ["Plan"]
+
+COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha", "gap", "viol", "ms")
+_HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
+
+
+def table_line(record: dict[str, Any]) -> str:
+    """One aligned line of the table of iterations; alpha is "-" when the line search failed."""
+    r = record
+    alpha = f"{r['alpha']:8.2g}" if r["alpha"] > 0.0 else f"{'-':>8}"
+    return (
+        f"{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
+        f"{r['kappa_grad']:7.0e} {r['mu']:7.0e} {alpha} {r['gap']:7.0e} {r['violation']:7.0e} {r['milliseconds']:6.2f}"
+    )
+
+
+def table_header() -> str:
+    """Names of the columns of `table_line`."""
+    return _HEADER
+
+
+@dataclass
+class Plan:
+    """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
+
+        u(x) = u_t + K_t (x (-) x_t)
+    """
+
+    success: bool
+    status: Status
+    message: str
+    nit: int  # iterations, those whose line search failed included
+    fun: float  # cost, without the terms of the constraints
+    x: Matrix  # (T + 1, nx)
+    u: Matrix  # (T, nu) [N, N m]
+    K: Stack  # (T, nu, ndx)
+    k: Matrix  # (T, nu) the step the last backward pass still proposed
+    violation: float  # of the constraints, largest
+    gap: float  # of the dynamics, largest
+    seconds: float  # that the solve took
+    time_step: float  # [s]
+    substeps: int  # simulation steps per knot
+    history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
+    multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
+    penalties: list[Matrix] = field(default_factory=list)
+    problem: Any = None  # the Problem; not saved
+
+    @property
+    def time(self) -> Matrix:
+        """(T + 1,) times of the knots [s]."""
+        return self.time_step * self.substeps * np.arange(len(self.x))
+
+    def summary(self) -> str:
+        """The table of iterations and a closing line."""
+        lines = [_HEADER, *(table_line(r) for r in self.history)]
+        return "\n".join([*lines, self.closing_line()])
+
+    def closing_line(self) -> str:
+        """One line: how it ended."""
+        return (
+            f"{self.status.name}: {self.message} {self.nit} iterations, cost {self.fun:.6g}, violation "
+            f"{self.violation:.1e}, gap {self.gap:.1e}, {1e3 * self.seconds:.1f} ms"
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write all fields to an .npz file."""
+        arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
+        arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
+        arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
+        scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
+        meta = {name: getattr(self, name) for name in scalars} | {"status": int(self.status), "success": self.success}
+        np.savez(path, meta=json.dumps(meta), **arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Plan:
+        """Read what `save` wrote."""
+        with np.load(path) as data:
+            meta = json.loads(str(data["meta"]))
+            meta["status"] = Status(meta["status"])
+            count = sum(name.startswith("multiplier_") for name in data.files)
+            multipliers = [data[f"multiplier_{i}"] for i in range(count)]
+            penalties = [data[f"penalty_{i}"] for i in range(count)]
+            arrays = {name: data[name] for name in ("x", "u", "K", "k")}
+            return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties)

@@ -1,0 +1,112 @@
+"""Problem: a simulator, a start, a horizon, costs, constraints and limits, checked once and bound to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.cost import Spec
+from dojo_opt.manifold import tangent_layout
+from dojo_opt.term import table
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["Problem"]
+
+
+def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector, Vector] | None:
+    """Control limits as two (nu,) arrays, infinite where free."""
+    if limits is None:
+        return None
+    lo, hi = (np.asarray(b, dtype=float) for b in limits)
+    for side, bound in (("lower", lo), ("upper", hi)):
+        if bound.shape not in ((), (nu,)) or np.any(np.isnan(bound)):
+            raise ValueError(
+                f"Problem(control_limits=...): expected a number or shape ({nu},) without NaN as {side} limit, got "
+                f"shape {bound.shape}: {bound}"
+            )
+    lo, hi = (np.broadcast_to(b, (nu,)).copy() for b in (lo, hi))
+    if np.any(lo > hi):
+        i = int(np.argmax(lo > hi))
+        raise ValueError(f"Problem(control_limits=...): expected lower <= upper, got [{lo[i]}, {hi[i]}] of control {i}")
+    return lo, hi
+
+
+class Problem:
+    """min sum of costs over x (T + 1, nx), u (T, nu) with x_0 = start, the simulator's motion, constraints and limits.
+
+    A knot spans `substeps` steps of `sim.time_step` with u held. `controls0` (T, nu) and `states0` (T + 1, nx) are the
+    guesses that `ilqr` starts from: with states, the trajectory need not be consistent and its gaps are closed on the
+    way; without, it is the rollout of the controls (zero by default).
+    """
+
+    def __init__(
+        self,
+        sim: Any,
+        start: ArrayLike,
+        horizon: int,
+        *,
+        cost: Sequence[Spec] = (),
+        constraints: Sequence[Spec] = (),
+        control_limits: tuple[ArrayLike, ArrayLike] | None = None,
+        substeps: int = 1,
+        controls0: ArrayLike | None = None,
+        states0: ArrayLike | None = None,
+    ) -> None:
+        if int(horizon) != horizon or horizon < 1:
+            raise ValueError(f"Problem(horizon=...): expected a positive number of knots, got {horizon}")
+        if int(substeps) != substeps or substeps < 1:
+            raise ValueError(f"Problem(substeps=...): expected a positive number of steps per knot, got {substeps}")
+        self.sim = sim
+        self.horizon = int(horizon)
+        self.substeps = int(substeps)
+        start = np.asarray(start, dtype=float)
+        if start.shape != (sim.nx,):
+            raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
+        self.start: Vector = table("Problem(start=...)", start, 1, sim.nx)[0]
+        self.layout = tangent_layout(sim, self.start)
+        self.specs = (tuple(cost), tuple(constraints))
+        for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
+            for i, spec in enumerate(specs):
+                if not hasattr(spec, "bind"):
+                    raise TypeError(f"Problem({argument}=...): entry {i} is a {type(spec).__name__}, not a term")
+        self.costs = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[0]]
+        self.constraints = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[1]]
+        self.control_limits = _limits(control_limits, sim.nu)
+        self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
+        self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    @property
+    def knot_time(self) -> float:
+        """Length of a knot [s]."""
+        return float(self.sim.time_step * self.substeps)
+
+    def check_controls(self, call: str, controls: ArrayLike) -> Matrix:
+        """A finite (T, nu) copy of `controls`, or an error that names `call`."""
+        if np.ndim(controls) == 2 and np.shape(controls) != (self.horizon, self.sim.nu):
+            raise ValueError(f"{call}: expected shape ({self.horizon}, {self.sim.nu}), got {np.shape(controls)}")
+        return table(call, controls, self.horizon, self.sim.nu)
+
+    def check_states(self, call: str, states: ArrayLike) -> Matrix:
+        """A finite (T + 1, nx) copy of `states` with the start in its first row, or an error that names `call`."""
+        if np.shape(states) != (self.horizon + 1, self.sim.nx):
+            raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {np.shape(states)}")
+        checked = table(call, states, self.horizon + 1, self.sim.nx)
+        checked[0] = self.start
+        return checked
+
+    def cost(self, xs: Matrix, us: Matrix) -> float:
+        """Sum of the costs at (xs, us), without constraints."""
+        return sum(term.value(xs, us) for term in self.costs)
+
+    def violation(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint at (xs, us)."""
+        worst = 0.0
+        for term in self.constraints:
+            term.update(xs, us)
+            worst = max(worst, float(term.violation().max(initial=0.0)))
+        return worst

@@ -1,0 +1,147 @@
+"""Term: one cost or constraint bound to a simulator and a horizon, with its residuals, weights and multipliers."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.manifold import state_residual
+from dojo_opt.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
+from dojo_opt.residual import ResidualKernels
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Term:
+    """Residual r (m, d) at `knots` (m,), weight and slope (m, d); see `dojo_opt.penalty` for what it adds.
+
+    A cost keeps its weights; of a constraint, slope is the multiplier and weight half the penalty.
+    """
+
+    def __init__(self, name: str, knots: Integers, weight: Matrix, one_sided: bool = False) -> None:
+        self.name = name
+        self.knots = knots
+        self.weight = weight
+        self.mask = (weight > 0.0).astype(float)  # entries that take part
+        self.slope = np.zeros_like(weight)
+        self.one_sided = one_sided
+        self.residual = np.zeros_like(weight)
+        self._first = np.empty_like(weight)
+        self._second = np.empty_like(weight)
+
+    def update(self, xs: Matrix, us: Matrix) -> None:
+        """Fill `residual`."""
+        raise NotImplementedError
+
+    def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
+        raise NotImplementedError
+
+    def value(self, xs: Matrix, us: Matrix) -> float:
+        """What the term adds to the objective at (xs, us)."""
+        self.update(xs, us)
+        return float(penalty(self.residual, self.weight, self.slope, self.one_sided))
+
+    def expand(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
+        """Add gradient and Gauss-Newton Hessian at (xs, us) to g (T + 1, ndx + nu) and H."""
+        self.update(xs, us)
+        penalty_derivatives(self.residual, self.weight, self.slope, self.one_sided, self._first, self._second)
+        self._add(xs, us, g, H)
+
+    def violation(self) -> Matrix:
+        """|r| of equalities, max(r, 0) of inequalities, at the last `update`; zero for entries that do not take part."""
+        size = np.maximum(self.residual, 0.0) if self.one_sided else np.abs(self.residual)
+        return np.multiply(size, self.mask, out=size)
+
+
+class StateTerm(Term):
+    """r = x (-) reference on all tangent components."""
+
+    def __init__(self, name: str, knots: Integers, weight: Matrix, reference: Matrix, layout: Integers) -> None:
+        super().__init__(name, knots, weight)
+        self.reference = reference
+        self._layout = layout
+        column = np.arange(layout.size)
+        first = (layout < 0) & (np.append(0, layout[:-1]) != layout)
+        self._column = np.where(first, -(column + 1), column)
+        self._sign = np.ones(layout.size)
+
+    def update(self, xs: Matrix, us: Matrix) -> None:
+        state_residual(self._layout, xs, self.knots, self.reference, self.residual)
+
+    def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
+        add_expansion(self.residual, self._first, self._second, self.knots, self._column, self._sign, g, H)
+
+
+class Pick(NamedTuple):
+    """Scalar components of x or of u."""
+
+    of_state: bool
+    address: Integers  # in x or in u
+    column: Integers  # in z = (dx, du)
+    sign: Vector
+
+
+class PickTerm(Term):
+    """r = sign * (component - reference) on chosen scalar components of x or of u."""
+
+    def __init__(
+        self, name: str, knots: Integers, weight: Matrix, reference: Matrix, pick: Pick, one_sided: bool = False
+    ) -> None:
+        super().__init__(name, knots, weight, one_sided)
+        self.reference = reference
+        self._of_state, self._address, self._column, self._sign = pick
+        self._whole = not self._of_state and np.array_equal(self._address, np.arange(weight.shape[1]))
+
+    def update(self, xs: Matrix, us: Matrix) -> None:
+        source = xs if self._of_state else us
+        rows = source[self.knots] if self._whole else source[self.knots[:, None], self._address]
+        np.subtract(rows, self.reference, out=self.residual)
+        self.residual *= self._sign
+
+    def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
+        add_expansion(self.residual, self._first, self._second, self.knots, self._column, self._sign, g, H)
+
+
+class ResidualTerm(Term):
+    """r = a user's compiled function of (x, u)."""
+
+    def __init__(
+        self, name: str, knots: Integers, weight: Matrix, one_sided: bool, kernels: ResidualKernels, layout: Integers
+    ) -> None:
+        super().__init__(name, knots, weight, one_sided)
+        self._kernels = kernels
+        self._layout = layout
+
+    def update(self, xs: Matrix, us: Matrix) -> None:
+        self._kernels.values(xs, us, self.knots, self.residual)
+
+    def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
+        jacobian = self._kernels.jacobians(self._layout, xs, us, self.knots, self.residual.shape[1])
+        add_dense_expansion(jacobian, self._first, self._second, self.knots, g, H)
+
+
+def table(call: str, value: ArrayLike, rows: int, columns: int) -> Matrix:
+    """Broadcast `value` to (rows, columns) and refuse anything that is not finite."""
+    array = np.asarray(value, dtype=float)
+    if array.shape not in ((), (columns,), (rows, columns), (1, columns), (rows, 1)):
+        raise ValueError(f"{call}: expected shape (), ({columns},) or ({rows}, {columns}), got {array.shape}")
+    if not np.all(np.isfinite(array)):
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{call}: expected finite numbers, got {array[index]} at index {index}")
+    return np.ascontiguousarray(np.broadcast_to(array, (rows, columns)), dtype=float).copy()
+
+
+def knot_list(call: str, knots: Any, horizon: int, last: bool) -> Integers:
+    """Knot numbers as an array; None means all, with the final one if `last`; negative ones count from the end."""
+    count = horizon + 1 if last else horizon
+    if knots is None:
+        return np.arange(count)
+    chosen = np.atleast_1d(np.asarray(knots, dtype=np.int64)).copy()
+    if chosen.ndim != 1 or chosen.size == 0 or np.any(chosen < -count) or np.any(chosen >= count):
+        raise ValueError(f"{call}: expected knots in [{-count}, {count}), got {chosen.tolist()}")
+    return np.where(chosen < 0, chosen + count, chosen)

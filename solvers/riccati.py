@@ -1,0 +1,207 @@
+"""Backward pass of iLQR on stacked arrays, with gaps, regularisation and control limits, and what it promises.
+
+With z = (dx, du), F = [A B] and n, m the sizes of dx and du:
+
+    dx_{t+1} = F_t z_t + gap_{t+1},   dx_0 = 0,        min  sum_t  g_t . z_t + 1/2 z_t^T H_t z_t
+
+gives du = k + K dx. A step size a scales k and the closed share of each gap, so z scales with a, and the predicted
+change of cost is a d0 + a^2/2 d1.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.boxqp import box_qp
+from solvers.dense import add_mul_tn_symmetric, cholesky_solve, dot, mul
+from solvers.jit import kernel
+from solvers.status import Status
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Quadratic(NamedTuple):
+    """Linear-quadratic model of a horizon of T knots; row T of `g` and `H` has no controls."""
+
+    A: Stack  # (T, n, n)
+    B: Stack  # (T, n, m)
+    g: Matrix  # (T + 1, n + m) gradient of the cost
+    H: Stack  # (T + 1, n + m, n + m) its Hessian, symmetric
+    gaps: Matrix  # (T + 1, n), first row unused
+    lo: Matrix  # (T, m) lower limit of du, -inf without one
+    hi: Matrix  # (T, m) upper limit of du, inf without one
+
+
+class Regularization(NamedTuple):
+    """What is added to the model while the gains are computed; the value function stays exact."""
+
+    control: float  # times diag(damping), added to Q_uu
+    value: float  # times I, added to V_xx inside Q_uu and Q_ux
+    damping: Vector  # (m,) unit of `control`
+
+
+class Promise(NamedTuple):
+    """Result of the backward pass."""
+
+    status: Status  # SOLVED, SINGULAR (Q_uu not positive definite) or NOT_FINITE
+    knot: int  # where it stopped
+    d0: float  # predicted change of cost per step size, first order
+    d1: float  # second order
+    gradient: float  # largest |Q_u| over controls that no limit holds
+
+
+def work_size(n: int, m: int) -> int:
+    """Floats of scratch that `backward` needs."""
+    p = n + m
+    return n * n + n + 2 * n * p + p * p + 2 * p + m * m + 2 * n * m + m + n + 2 * m * m + 3 * m
+
+
+@kernel
+def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: Matrix, q: Vector) -> None:
+    """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t.   FV: (2, n, n + m) scratch."""
+    n = v.shape[0]
+    F, VF = FV[0], FV[1]
+    for i in range(n):
+        for j in range(n):
+            F[i, j] = quad.A[t, i, j]
+            v[j] += V[i, j] * quad.gaps[t + 1, i]
+        for j in range(n, q.shape[0]):
+            F[i, j] = quad.B[t, i, j - n]
+    for i in range(q.shape[0]):
+        q[i] = quad.g[t, i]
+        for j in range(q.shape[0]):
+            Q[i, j] = quad.H[t, i, j]
+    mul(V, F, VF)
+    add_mul_tn_symmetric(F, VF, Q)
+    for i in range(n):
+        for j in range(q.shape[0]):
+            q[j] += v[i] * F[i, j]
+
+
+@kernel
+def _regularize(reg: Regularization, F: Matrix, Q: Matrix, Huu: Matrix, Z: Matrix) -> None:
+    """Huu = Q_uu + control diag(damping) + value B^T B,  Z = -(Q_ux + value B^T A)."""
+    m, n = Z.shape
+    for i in range(m):
+        for j in range(m):
+            Huu[i, j] = Q[n + i, n + j]
+        for j in range(n):
+            Z[i, j] = -Q[n + i, j]
+        Huu[i, i] += reg.control * reg.damping[i]
+        if reg.value > 0.0:
+            for k in range(n):
+                b = reg.value * F[k, n + i]
+                for j in range(m):
+                    Huu[i, j] += b * F[k, n + j]
+                for j in range(n):
+                    Z[i, j] -= b * F[k, j]
+
+
+@kernel
+def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> None:
+    """K = L^-T L^-1 Z on free rows, zero on the others; L packed (nfree, nfree) in `factor`. Z is used up."""
+    m, n = K.shape
+    for i in range(nfree):
+        for j in range(n):
+            Z[i, j] = Z[free[i], j]  # free is sorted, so no row is overwritten before it is read
+    cholesky_solve(factor[: nfree * nfree].reshape((nfree, nfree)), Z[:nfree])
+    for i in range(m):
+        for j in range(n):
+            K[i, j] = 0.0
+    for i in range(nfree):
+        for j in range(n):
+            K[free[i], j] = Z[i, j]
+
+
+@kernel
+def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, W: Matrix, w: Vector, V: Matrix, v: Vector) -> None:
+    """V = Q_xx + K^T (Q_uu K + Q_ux) + Q_xu K and v = q_x + K^T (Q_uu k + q_u) + Q_xu k: exact for any gains."""
+    m, n = K.shape
+    for r in range(m):
+        w[r] = q[n + r]
+        for j in range(n):
+            W[r, j] = Q[n + r, j]
+        for i in range(m):
+            a = Q[n + r, n + i]
+            w[r] += a * k[i]
+            for j in range(n):
+                W[r, j] += a * K[i, j]
+    for i in range(n):
+        v[i] = q[i]
+        for j in range(i, n):
+            V[i, j] = Q[i, j]
+        for r in range(m):
+            a, b = K[r, i], Q[n + r, i]
+            v[i] += a * w[r] + b * k[r]
+            for j in range(i, n):
+                V[i, j] += a * W[r, j] + b * K[r, j]
+    for i in range(n):
+        for j in range(i):
+            V[i, j] = V[j, i]
+
+
+@kernel
+def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, dx: Vector) -> tuple[float, float]:
+    """(d0, d1) from the linear rollout of the full step."""
+    T, m, n = K.shape
+    d0, d1 = 0.0, 0.0
+    for i in range(n):
+        dx[i] = 0.0
+    for t in range(T + 1):
+        for i in range(n):
+            z[i] = dx[i]
+        for i in range(m):
+            z[n + i] = k[t, i] + dot(K[t, i], dx) if t < T else 0.0
+        d0 += dot(quad.g[t], z)
+        for i in range(n + m):
+            if z[i] != 0.0:
+                d1 += z[i] * dot(quad.H[t, i], z)
+        if t < T:
+            for i in range(n):
+                dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], z) + dot(quad.B[t, i], z[n:])
+    return d0, d1
+
+
+@kernel
+def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
+    """Gains K (T, m, n), k (T, m) of the regularised model, and what the full step promises.
+
+    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),).
+    """
+    T, m, n = K.shape
+    p = n + m
+    a = n * n
+    b = a + 2 * n * p
+    c = b + p * p
+    d = c + 2 * m * n
+    e = d + m * m
+    f = e + 2 * n
+    h = f + 2 * p
+    V, FV, Q = buffer[:a].reshape((n, n)), buffer[a:b].reshape((2, n, p)), buffer[b:c].reshape((p, p))
+    ZW, Huu = buffer[c:d].reshape((2, m, n)), buffer[d:e].reshape((m, m))
+    v, dx, q, z = buffer[e : e + n], buffer[e + n : f], buffer[f : f + p], buffer[f + p : h]
+    w, box = buffer[h : h + m], buffer[h + m :]
+    for i in range(n):
+        v[i] = quad.g[T, i]
+        for j in range(n):
+            V[i, j] = quad.H[T, i, j]
+    gradient = 0.0
+    for t in range(T - 1, -1, -1):
+        _action_value(quad, t, V, v, FV, Q, q)
+        _regularize(reg, FV[0], Q, Huu, ZW[0])
+        status, nfree = box_qp(Huu, q[n:], quad.lo[t], quad.hi[t], k[t], free, box)
+        if status != Status.SOLVED:
+            return Promise(status, t, 0.0, 0.0, gradient)
+        for i in range(nfree):
+            gradient = max(gradient, abs(q[n + free[i]]))
+        _gains(ZW[0], free, nfree, box, K[t])
+        _value(K[t], k[t], Q, q, ZW[1], w, V, v)
+    d0, d1 = _predict(quad, K, k, z, dx)
+    finite = abs(d0) < np.inf and abs(d1) < np.inf
+    return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)
