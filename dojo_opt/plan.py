@@ -40,7 +40,7 @@ def table_header() -> str:
 class Plan:
     """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
 
-        u(x) = u_t + K_t (x (-) x_t)
+    u(x) = u_t + K_t (x (-) x_t)
     """
 
     success: bool

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import ControlBounds, Goal, StateBounds
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.ilqr import Solver, ilqr
+from dojo_opt.planner import Solver, ilqr
 from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
