@@ -3,9 +3,13 @@
 Columns of `cone` (and of its steps):
 
     0 s, 1 gamma                                     gap slack and normal impulse,        s gamma = kappa
-    NONLINEAR   2 psi, 3:5 eta, 5:7 beta             (mu gamma, beta) o (psi, eta) = kappa e,  eta = v_t
+    NONLINEAR   2:4 beta                             mu gamma v_t + psi beta = 0,
+                                                     psi = a + sqrt(a^2 + |v_t|^2), a = kappa / (2 mu gamma)
     LINEAR      2 psi, 3 s_psi, 4:8 beta, 8:12 s     psi s_psi = kappa, s_psi = mu gamma - sum beta,
                                                      beta_i s_i = kappa, s_i = d_i.v_t + psi, d = (t1, -t1, t2, -t2)
+
+The law of the exact cone is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma
+follows from it, so the cone is no constraint of the iteration and cannot jam it.
 
 A contact without friction has the first line only: the cone would be degenerate, and costs nothing when left out.
 """
@@ -15,7 +19,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact import contact_rate
-from sim.model import Law, Model, Work
+from sim.model import Goal, Law, Model, Work
 from solvers.cones import orthant_step
 from solvers.jit import kernel
 
@@ -47,6 +51,7 @@ def cone_slip(b0: float, x: float, y: float, kappa: float) -> tuple[float, float
 
 @kernel
 def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) -> None:
+    """Variables of contact c on the central path of kappa at its gap (at least `floor`) and slip: gamma = kappa / s."""
     z = work.cone[c]
     k = work.contact_kin[c]
     s = max(k[0], floor)
@@ -156,17 +161,31 @@ def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
 
 
 @kernel
-def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> float:
-    """Sum of the complementarity products after a step of length alpha."""
+def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tuple[float, float]:
+    """(sum, count) of the complementarity products after a step of length alpha."""
     z = work.cone[c]
     d = work.cone_step[c]
     total = (z[0] + alpha * d[0]) * (z[1] + alpha * d[1])
-    law = law_of(model, c)
-    if law == _LINEAR:
+    count = 1.0
+    if law_of(model, c) == _LINEAR:
+        count = 6.0
         total += (z[2] + alpha * d[2]) * (z[3] + alpha * d[3])
         for e in range(4):
             total += (z[4 + e] + alpha * d[4 + e]) * (z[8 + e] + alpha * d[8 + e])
-    return total
+    return total, count
+
+
+@kernel
+def keep_in_cone(model: Model, work: Work, c: int) -> None:
+    """Shorten the friction of the exact cone to mu gamma: after a shortened Newton step it may stick out."""
+    if law_of(model, c) != _NONLINEAR:
+        return
+    z = work.cone[c]
+    b0 = model.contact_friction[c] * z[1]
+    n = sqrt(z[2] * z[2] + z[3] * z[3])
+    if n > b0:
+        z[2] *= b0 / n
+        z[3] *= b0 / n
 
 
 @kernel
@@ -184,7 +203,13 @@ def contact_boundary(model: Model, work: Work, c: int) -> float:
 
 @kernel
 def condense_contact(model: Model, work: Work, c: int, kappa: float) -> None:
-    """W = d(impulse)/d(gap, slip) by the linearised law at kappa; fills contact_W and contact_scale."""
+    """W = d(impulse)/d(gap, slip) by the law linearised at kappa; fills contact_W and contact_scale.
+
+    normal       W_nn = -gamma/s
+    NONLINEAR    b = mu gamma, r = psi - a:  psi dbeta = -(b I + beta v_t^T/r) dv_t - (v_t + beta dpsi/db) db - residual
+    LINEAR       K = diag(k1 + k2, k3 + k4), k_i = beta_i/s_i, e = sum k_i d_i, g = psi/(s_psi + psi sum k_i)
+                 W_tt = -(K - g e e^T),  W_tn = -mu (gamma/s) g e
+    """
     z = work.cone[c]
     k = work.contact_kin[c]
     W = work.contact_W[c]
@@ -237,10 +262,10 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float) -> None:
 
 
 @kernel
-def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: bool, reduce: float) -> None:
-    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the target kappa.
+def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
+    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the goal.
 
-    `corrected` subtracts the second-order term of the affine step now in cone_step (Mehrotra).
+    `goal.corrected` subtracts the second-order term of the affine step now in cone_step (Mehrotra).
     """
     z = work.cone[c]
     d = work.cone_step[c]
@@ -248,10 +273,12 @@ def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: 
     w = work.contact_w[c]
     q = work.contact_scale[c]
     mu = model.contact_friction[c]
+    kappa = goal.kappa
+    share = goal.share
     r = kappa - z[0] * z[1]
-    if corrected:
+    if goal.corrected:
         r -= d[0] * d[1]
-    g0 = (r - z[1] * reduce * (k[0] - z[0])) / z[0]
+    g0 = (r - z[1] * share * (k[0] - z[0])) / z[0]
     w[0] = g0
     w[1] = 0.0
     w[2] = 0.0
@@ -264,21 +291,21 @@ def contact_constant(model: Model, work: Work, c: int, kappa: float, corrected: 
         total = 0.0
         for e in range(4):
             r = kappa - z[4 + e] * z[8 + e]
-            if corrected:
+            if goal.corrected:
                 r -= d[4 + e] * d[8 + e]
-            q[8 + e] = (r - z[4 + e] * reduce * (direction(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
+            q[8 + e] = (r - z[4 + e] * share * (direction(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
             total += q[8 + e]
         r = kappa - z[2] * z[3]
-        if corrected:
+        if goal.corrected:
             r -= d[2] * d[3]
-        q[7] = (r + z[2] * (total - reduce * _cap_error(model, work, c))) * q[6]
+        q[7] = (r + z[2] * (total - share * _cap_error(model, work, c))) * q[6]
         p = q[7] - z[2] * q[6] * mu * g0
         w[1] = q[8] - q[9] - q[4] * p
         w[2] = q[10] - q[11] - q[5] * p
 
 
 @kernel
-def recover_contact(model: Model, work: Work, h: float, c: int, reduce: float) -> None:
+def recover_contact(model: Model, work: Work, h: float, c: int, share: float) -> None:
     """cone_step of contact c from the body twists of the last solve."""
     z = work.cone[c]
     d = work.cone_step[c]
@@ -287,7 +314,7 @@ def recover_contact(model: Model, work: Work, h: float, c: int, reduce: float) -
     w = work.contact_w[c]
     q = work.contact_scale[c]
     a, x, y = contact_rate(model, work, h, c)
-    d[0] = a + reduce * (k[0] - z[0])
+    d[0] = a + share * (k[0] - z[0])
     d[1] = W[0] * a + w[0]
     law = law_of(model, c)
     mu = model.contact_friction[c]
@@ -301,6 +328,6 @@ def recover_contact(model: Model, work: Work, h: float, c: int, reduce: float) -
         for e in range(4):
             t = direction(e, x, y) + p
             d[4 + e] = q[8 + e] - q[e] * t
-            d[8 + e] = t + reduce * (direction(e, k[1], k[2]) + z[2] - z[8 + e])
+            d[8 + e] = t + share * (direction(e, k[1], k[2]) + z[2] - z[8 + e])
             total += d[4 + e]
-        d[3] = mu * d[1] - total + reduce * _cap_error(model, work, c)
+        d[3] = mu * d[1] - total + share * _cap_error(model, work, c)

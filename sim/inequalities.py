@@ -12,15 +12,19 @@ from sim.friction import (
     contact_impulse,
     contact_products,
     contact_products_ahead,
+    keep_in_cone,
     recover_contact,
     slip_violation,
     start_contact,
 )
-from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits, start_limits
-from sim.model import Matrix, Model, Work
+from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits
+from sim.model import Goal, Matrix, Model, Work
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
+
+_KAPPA_START = 1e-2  # [N s m]
+_LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, in the start only
 
 
 @kernel
@@ -31,11 +35,30 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def start_inequalities(model: Model, work: Work, kappa: float, floor: float) -> None:
-    """All cone variables on the central path of kappa at the present gaps and slips."""
+def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth: float) -> None:
+    """All cone variables on the central path of one kappa0, at the present gaps and slips.
+
+    kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h (the impulse m d/h that stops it, over the
+    distance), at least 0.01 N s m and kappa; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
+    """
+    k0 = max(kappa, _KAPPA_START * growth)
+    floor = 0.1 * k0**0.5
     for c in range(model.contact_body.shape[0]):
-        start_contact(model, work, c, kappa, floor)
-    start_limits(model, work, kappa, floor)
+        d = -work.contact_kin[c, 0]
+        if d > 0.0:
+            k0 = max(k0, growth * 0.3 * model.body_mass[model.contact_body[c]] * d * d / h)
+            floor = max(floor, 0.5 * d)
+    for j in range(model.limit_dof.shape[0]):
+        d = -work.bound_gap[j]
+        if d > 0.0:
+            k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
+            floor = max(floor, 0.5 * d)
+    for c in range(model.contact_body.shape[0]):
+        start_contact(model, work, c, k0, floor)
+    for j in range(model.limit_dof.shape[0]):
+        s = max(work.bound_gap[j], floor)
+        work.bound[j, 0] = s
+        work.bound[j, 1] = k0 / s
 
 
 @kernel
@@ -83,13 +106,13 @@ def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool, reduce: float) -> None:
-    """dnu += S2^T B^T w + limits, for the target kappa."""
+def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
+    """dnu += S2^T B^T w + limits, for the goal of this Newton step."""
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
     for c in range(model.contact_body.shape[0]):
-        contact_constant(model, work, c, kappa, corrected, reduce)
+        contact_constant(model, work, c, goal)
         w = work.contact_w[c]
         add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
@@ -97,50 +120,51 @@ def inequality_rhs(model: Model, work: Work, kappa: float, corrected: bool, redu
         a = work.S2[d]
         f = work.subtree[model.dof_body[d]]
         work.dnu[d] -= a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
-    limit_constants(model, work, kappa, corrected, reduce)
+    limit_constants(model, work, goal)
 
 
 @kernel
-def recover_inequalities(model: Model, work: Work, h: float, reduce: float) -> None:
+def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
     for c in range(model.contact_body.shape[0]):
-        recover_contact(model, work, h, c, reduce)
-    recover_limits(model, work, h, reduce)
+        recover_contact(model, work, h, c, share)
+    recover_limits(model, work, h, share)
 
 
 @kernel
-def products(model: Model, work: Work) -> tuple[float, float, float]:
-    """(mean, low, high) of all complementarity products."""
+def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
+    """Mean of all complementarity products, and the largest violation of a law of the central path of kappa."""
     total = 0.0
     count = 0.0
-    low = 1e300
-    high = 0.0
+    violation = 0.0
     for c in range(model.contact_body.shape[0]):
-        t, n, lo, hi = contact_products(model, work, c)
+        t, n, low, high = contact_products(model, work, c)
         total += t
         count += n
-        low = min(low, lo)
-        high = max(high, hi)
+        violation = max(violation, high - kappa, kappa - low, slip_violation(model, work, c, kappa))
     for k in range(model.limit_dof.shape[0]):
         t = work.bound[k, 0] * work.bound[k, 1]
         total += t
         count += 1.0
-        low = min(low, t)
-        high = max(high, t)
-    return total / count, low, high
+        violation = max(violation, abs(t - kappa))
+    return total / count, violation
 
 
 @kernel
 def products_ahead(model: Model, work: Work, alpha: float) -> float:
-    """Sum of the complementarity products after a step of length alpha."""
+    """Mean of the complementarity products after a step of length alpha."""
     total = 0.0
+    count = 0.0
     for c in range(model.contact_body.shape[0]):
-        total += contact_products_ahead(model, work, c, alpha)
+        t, n = contact_products_ahead(model, work, c, alpha)
+        total += t
+        count += n
     for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
         d = work.bound_step[k]
         total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
-    return total
+        count += 1.0
+    return total / count
 
 
 @kernel
@@ -173,17 +197,10 @@ def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     for c in range(model.contact_body.shape[0]):
         for k in range(12):
             work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
+        keep_in_cone(model, work, c)
     for k in range(model.limit_dof.shape[0]):
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
-
-
-@kernel
-def slip_error(model: Model, work: Work, kappa: float) -> float:
-    r = 0.0
-    for c in range(model.contact_body.shape[0]):
-        r = max(r, slip_violation(model, work, c, kappa))
-    return r
 
 
 @kernel

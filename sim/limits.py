@@ -5,7 +5,7 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 
 from __future__ import annotations
 
-from sim.model import Model, Work
+from sim.model import Goal, Model, Work
 from solvers.jit import kernel
 
 
@@ -15,15 +15,6 @@ def limit_gaps(model: Model, work: Work) -> None:
     for k in range(model.limit_dof.shape[0]):
         a = model.dof_qadr[model.limit_dof[k]]
         work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
-
-
-@kernel
-def start_limits(model: Model, work: Work, kappa: float, floor: float) -> None:
-    """Slacks at the present gap, at least `floor`, and impulses on the central path."""
-    for k in range(model.limit_dof.shape[0]):
-        s = max(work.bound_gap[k], floor)
-        work.bound[k, 0] = s
-        work.bound[k, 1] = kappa / s
 
 
 @kernel
@@ -38,24 +29,24 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def limit_constants(model: Model, work: Work, kappa: float, corrected: bool, reduce: float) -> None:
+def limit_constants(model: Model, work: Work, goal: Goal) -> None:
     """dnu += sign w, with d gamma = w - (gamma/s) sign h d nu; kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
         g = work.bound[k, 1]
-        r = kappa - s * g
-        if corrected:
+        r = goal.kappa - s * g
+        if goal.corrected:
             r -= work.bound_step[k, 0] * work.bound_step[k, 1]
-        w = (r - g * reduce * (work.bound_gap[k] - s)) / s
+        w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         work.dnu[model.limit_dof[k]] += model.limit_sign[k] * w
 
 
 @kernel
-def recover_limits(model: Model, work: Work, h: float, reduce: float) -> None:
+def recover_limits(model: Model, work: Work, h: float, share: float) -> None:
     """bound_step from dnu."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
         t = model.limit_sign[k] * h * work.dnu[model.limit_dof[k]]
-        work.bound_step[k, 0] = t + reduce * (work.bound_gap[k] - s)
+        work.bound_step[k, 0] = t + share * (work.bound_gap[k] - s)
         work.bound_step[k, 1] = work.bound_w[k] - work.bound[k, 1] / s * t

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.parts import WORLD, Body, Contact, Input, Joint
@@ -75,6 +76,13 @@ class Mechanism:
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts."""
         return tuple(c.name for c in self.contacts)
+
+    @cached_property
+    def contact_normals(self) -> NDArray[np.float64]:
+        """(ncontact, 3) outward normals of the ground at the contacts, world axes."""
+        out = np.array([np.asarray(c.normal) for c in self.contacts], dtype=np.float64).reshape(-1, 3)
+        out.flags.writeable = False
+        return out
 
     @property
     def input_names(self) -> tuple[str, ...]:

@@ -162,6 +162,14 @@ class Options(NamedTuple):
     max_iterations: int
 
 
+class Goal(NamedTuple):
+    """What a Newton step of the interior point aims at."""
+
+    kappa: float  # target of the complementarity products
+    share: float  # part of the equality residuals to remove
+    corrected: bool  # subtract the second-order term of the affine step in `cone_step`
+
+
 class Outcome(NamedTuple):
     """How a step ended."""
 

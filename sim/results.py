@@ -130,9 +130,8 @@ class Batch:
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     """Contacts from the rows (..., ncontact, 8) of a kernel."""
-    normals = np.array([np.asarray(c.normal) for c in mech.contacts]).reshape(-1, 3)
     parts = (rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
-    return Contacts(mech.contact_names, normals, time_step, *parts)
+    return Contacts(mech.contact_names, mech.contact_normals, time_step, *parts)
 
 
 def error_of(mech: Mechanism, where: str, report: Floats, tolerance: float) -> SimulationError:

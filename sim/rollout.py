@@ -3,7 +3,7 @@
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
     contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
-    hard       None for scenes without contacts and limits: their code is then not compiled
+    hard       None for scenes without contacts and limits: their code is then not compiled; otherwise `smooth` is None
 
 Every function takes the flat buffers of `layout.py`; every loop stops at the first step that is not SOLVED.
 """
@@ -29,10 +29,10 @@ def _options(settings: Vector) -> Options:
 
 @kernel
 def reported_step(
-    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, report: Vector, hard: int | None
+    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, report: Vector, hard: int | None, smooth: int | None
 ) -> bool:
     """One step and its report; True when SOLVED."""
-    r = step(model, work, options, x, u, out, hard)
+    r = step(model, work, options, x, u, out, hard, smooth)
     report[0] = r.status
     report[1] = r.iterations
     report[2] = r.residual
@@ -55,6 +55,7 @@ def roll(
     reports: Matrix,
     contacts: Cube,
     hard: int | None,
+    smooth: int | None,
 ) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
 
@@ -66,7 +67,7 @@ def roll(
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
     for t in range(us.shape[0]):
-        if not reported_step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard):
+        if not reported_step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard, smooth):
             return t
         if hard is not None:
             report_contacts(model, work, contacts[t])
@@ -84,6 +85,7 @@ def _knot(
     out: Vector,
     report: Vector,
     hard: int | None,
+    smooth: int | None,
 ) -> bool:
     """out = state after `substeps` steps with u held."""
     for k in range(x.shape[0]):
@@ -92,7 +94,7 @@ def _knot(
         a = work.step_x[0]
         for k in range(x.shape[0]):
             a[k] = out[k]
-        if not reported_step(model, work, options, a, u, out, report, hard):
+        if not reported_step(model, work, options, a, u, out, report, hard, smooth):
             return False
     return True
 
@@ -113,6 +115,7 @@ def closed_loop(
     u_out: Matrix,
     report: Vector,
     hard: int | None,
+    smooth: int | None,
 ) -> int:
     """Rollout under the policy (xs_ref, k, K, gaps) of a backward pass; returns the number of solved knots.
 
@@ -138,7 +141,7 @@ def closed_loop(
             for k in range(ndx):
                 a += K[k] * dx[k]
             u_out[t, j] = min(max(a, low[j]), high[j])
-        if not _knot(model, work, options, substeps, xs[t], u_out[t], xs[t + 1], report, hard):
+        if not _knot(model, work, options, substeps, xs[t], u_out[t], xs[t + 1], report, hard, smooth):
             return t
         if alpha < 1.0:
             for k in range(ndx):
@@ -192,6 +195,7 @@ def linearize(
     x_next: Vector,
     report: Vector,
     hard: int | None,
+    smooth: int | None,
 ) -> int:
     """A, B of one knot: the product of the derivatives of its steps.  Returns the Status."""
     model = model_view(floats, ints)
@@ -203,7 +207,7 @@ def linearize(
         a = work.step_x[0]
         for k in range(x.shape[0]):
             a[k] = x_next[k]
-        r = step_with_gradient(model, work, options, a, u, x_next, work.step_A, work.step_B, hard)
+        r = step_with_gradient(model, work, options, a, u, x_next, work.step_A, work.step_B, hard, smooth)
         report[0] = r.status
         report[1] = r.iterations
         report[2] = r.residual
@@ -238,6 +242,7 @@ def linearize_knots(
     x_next: Matrix,
     reports: Matrix,
     hard: int | None,
+    smooth: int | None,
 ) -> None:
     """`linearize` of every knot (xs[t], us[t]), spread over the threads: chunk c has the scratch buffers[c]."""
     n = us.shape[0]
@@ -245,7 +250,7 @@ def linearize_knots(
     for c in prange(chunks):
         for t in range(c * n // chunks, (c + 1) * n // chunks):
             linearize(
-                floats, ints, buffers[c], settings, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard
+                floats, ints, buffers[c], settings, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard, smooth
             )
 
 
@@ -259,6 +264,7 @@ def _roll_status(
     us: Matrix,
     xs: Matrix,
     hard: int | None,
+    smooth: int | None,
 ) -> tuple[int, int]:
     """A rollout that keeps its states only: (status, number of solved steps)."""
     model = model_view(floats, ints)
@@ -267,7 +273,7 @@ def _roll_status(
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
     for t in range(us.shape[0]):
-        r = step(model, work, options, xs[t], us[t], xs[t + 1], hard)
+        r = step(model, work, options, xs[t], us[t], xs[t + 1], hard, smooth)
         if r.status != _SOLVED:
             return r.status, t
     return _SOLVED, us.shape[0]
@@ -285,10 +291,11 @@ def roll_batch(
     status: Integers,
     knots: Integers,
     hard: int | None,
+    smooth: int | None,
 ) -> None:
     """Rollouts from x0s[i] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,)."""
     n = us.shape[0]
     chunks = buffers.shape[0]
     for c in prange(chunks):
         for i in range(c * n // chunks, (c + 1) * n // chunks):
-            status[i], knots[i] = _roll_status(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard)
+            status[i], knots[i] = _roll_status(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard, smooth)

@@ -18,11 +18,12 @@ _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 
 @kernel
 def step(
-    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, hard: int | None
+    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, hard: int | None, smooth: int | None
 ) -> Outcome:
     """out = state after one step from x = (q, v) under the input u.
 
-    `hard` is None for a scene without contacts and limits: then the interior point is not even compiled.
+    Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of scenes
+    with contacts or limits, Newton's method of scenes without.
     out holds the last iterate when the status is not SOLVED; nobody must use it.
     """
     nq = work.theta1.shape[0]
@@ -30,9 +31,10 @@ def step(
     v = x[nq:]
     if not begin_step(model, work, options.h, q, v, u):
         return Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
-    if hard is None:
+    result = Outcome(_NOT_FINITE, 0, 1e300, 0.0)
+    if smooth is not None:
         result = newton(model, work, options, q, v, u)
-    else:
+    if hard is not None:
         result = interior_point(model, work, options, q, v, u)
     total = 0.0
     for k in range(nq):
@@ -57,9 +59,10 @@ def step_with_gradient(
     A: Matrix,
     B: Matrix,
     hard: int | None,
+    smooth: int | None,
 ) -> Outcome:
     """`step`, then A = d(out)/dx (2 nv, 2 nv) and B = d(out)/du (2 nv, nu) in tangent coordinates."""
-    result = step(model, work, options, x, u, out, hard)
+    result = step(model, work, options, x, u, out, hard, smooth)
     if result.status != _SOLVED:
         return result
     nq = work.theta1.shape[0]

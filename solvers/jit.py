@@ -14,14 +14,15 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import prange
 
-__all__ = ["kernel", "parallel_kernel", "prange", "compiled_signatures", "cache_folder", "local_kernel"]
+__all__ = ["cache_folder", "compiled_signatures", "kernel", "local_kernel", "parallel_kernel", "prange", "threads"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -89,7 +90,7 @@ def _compile(func: F, cache: bool = True, **flags: Any) -> F:
     finally:
         numba.config.CACHE_DIR = users_folder
     _REGISTRY.append(compiled)
-    return compiled  # type: ignore[no-any-return]
+    return compiled
 
 
 def kernel(func: F) -> F:
@@ -98,7 +99,8 @@ def kernel(func: F) -> F:
     A kernel cannot allocate: it fails to compile if it tries. That removes the reference counting of every array in
     every call, which costs a third of a time step (`_nrt=False`; theory: one step of a 13-body tree, 103 to 61 us).
     """
-    return _compile(func, _nrt=False)
+    inner = not {"Model", "Work"}.isdisjoint(func.__annotations__.values())
+    return _compile(func, _nrt=False, no_cpython_wrapper=inner, no_cfunc_wrapper=True)
 
 
 def local_kernel(func: F) -> F:
@@ -120,3 +122,14 @@ def compiled_signatures() -> dict[str, int]:
         for k in _REGISTRY
         if getattr(k, "signatures", None)
     }
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Run `parallel_kernel` loops on `count` threads inside the block."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(count)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)

@@ -45,7 +45,7 @@ def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, 
     assert set(table) == set(stated)
     for name, shape in table.items():
         written = stated[name]
-        assert written is None or written == [str(n).replace("6nbody", "nbody6") for n in shape], name
+        assert written is None or written == [str(n).replace("nx", "nq+nv") for n in shape], name
 
 
 @pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
@@ -110,7 +110,7 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
     assert _mark_work(work, ints) == 1000 * width + sizes.nbody
     scratch = read_work(work, ints)
     np.testing.assert_array_equal(scratch.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
-    np.testing.assert_array_equal(scratch.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(width))
+    np.testing.assert_array_equal(scratch.panel, np.arange(6 * sizes.nbody + 6)[:, None] + 0.5 * np.arange(width))
 
 
 def test_short_buffer_has_no_derivative_rows() -> None:

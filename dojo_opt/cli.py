@@ -1,0 +1,149 @@
+"""Command line: run a reference problem, make a report, list the models, compile ahead of time.
+
+Every command returns its exit status: 0 on success, 1 when the work was done and did not succeed (a plan that did not
+converge, a bar that was missed with --strict), 2 for a command that cannot be understood.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import dojo_opt as dojo
+from dojo_opt.report import REPORTS, run_report
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dojo-opt", description="Plan motion through contact, and measure it.")
+    parser.add_argument("--version", action="version", version=f"dojo-opt {dojo.__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="plan a reference problem", description="Plan a reference problem.")
+    run.add_argument("name", metavar="NAME", help="a function of dojo_opt.problems, such as hop")
+    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem")
+    run.add_argument("--out", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
+    run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
+    run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
+
+    report = commands.add_parser("report", help="measure, and print a table", description="Measure, print a table.")
+    report.add_argument("name", choices=sorted(REPORTS), metavar="NAME", help=_listing(REPORTS))
+    report.add_argument("--json", action="store_true", help="print every number as JSON instead of the table")
+    report.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
+    report.add_argument("--out", type=Path, metavar="DIR", help="also write NAME.txt and NAME.json to this folder")
+    report.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
+
+    models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
+    models.add_argument("--json", action="store_true", help="print JSON")
+
+    warmup = commands.add_parser("warmup", help="compile ahead of time", description="Compile and cache every kernel.")
+    warmup.add_argument("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def _listing(names: dict[str, str]) -> str:
+    return "; ".join(f"{name}: {what}" for name, what in sorted(names.items()))
+
+
+def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
+    """`["goal=up", "target=(0.5, 0.5)"]` as keyword arguments; a value that is no Python literal stays a string."""
+    arguments: dict[str, Any] = {}
+    for pair in pairs:
+        key, equals, text = pair.partition("=")
+        if not equals or not key.isidentifier():
+            raise ValueError(f"--set: expected KEY=VALUE, got {pair!r}")
+        try:
+            arguments[key] = ast.literal_eval(text)
+        except (SyntaxError, ValueError):
+            arguments[key] = text
+    return arguments
+
+
+def _run(args: argparse.Namespace) -> int:
+    names = dojo.problems.__all__
+    if args.name not in names:
+        raise ValueError(f"run: no problem {args.name!r}; there are {', '.join(names)}")
+    problem = getattr(dojo.problems, args.name)(**_arguments(args.set))
+    start = time.perf_counter()
+    plan = dojo.ilqr(problem, verbose=not args.json)
+    seconds = time.perf_counter() - start
+    if args.out:
+        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+    if args.html:
+        dojo.viewer.save_html(plan, args.html)
+    if args.json:
+        numbers = {"problem": args.name, "success": bool(plan.success), "status": int(plan.status)}
+        numbers |= {"message": plan.message, "iterations": int(plan.nit), "cost": float(plan.fun)}
+        numbers |= {"violation": float(plan.violation), "seconds": seconds}
+        numbers |= {"x": plan.x.tolist(), "u": plan.u.tolist()}
+        print(json.dumps(numbers))
+    else:
+        print(f"{plan.message}  cost {plan.fun:.4g}, violation {plan.violation:.1e}, {seconds:.2f} s")
+    return 0 if plan.success else 1
+
+
+def _report(args: argparse.Namespace) -> int:
+    report = run_report(args.name, quick=args.quick)
+    text = report.as_json() if args.json else report.as_text()
+    print(text)
+    if args.out:
+        args.out.mkdir(parents=True, exist_ok=True)
+        (args.out / f"{args.name}.txt").write_text(report.as_text() + "\n")
+        (args.out / f"{args.name}.json").write_text(report.as_json() + "\n")
+    return 1 if args.strict and not report.met() else 0
+
+
+def _models(args: argparse.Namespace) -> int:
+    rows = []
+    for name in sorted(dojo.models.__all__):
+        model = getattr(dojo.models, name)
+        sim = dojo.Simulator(model(3) if name == "npendulum" else model(), time_step=0.01)
+        rows.append({"name": name, "bodies": sim.nbody, "nq": sim.nq, "nv": sim.nv, "nu": sim.nu})
+        rows[-1] |= {"contacts": sim.ncontact, "what": (model.__doc__ or "").split("\n")[0]}
+    if args.json:
+        print(json.dumps(rows))
+        return 0
+    print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}  what")
+    for row in rows:
+        sizes = "{bodies:>7}{nq:>4}{nv:>4}{nu:>4}{contacts:>9}".format(**row)
+        print(f"{row['name']:<18}{sizes}  {row['what']}")
+    return 0
+
+
+def _warmup(args: argparse.Namespace) -> int:
+    from solvers.jit import cache_folder, compiled_signatures
+
+    wall, cpu = time.perf_counter(), time.process_time()
+    plan = dojo.ilqr(dojo.problems.hop())
+    numbers = {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
+    numbers |= {"kernels": len(compiled_signatures()), "signatures": sum(compiled_signatures().values())}
+    folder = cache_folder()
+    if args.json:
+        print(json.dumps({**numbers, "cache": str(folder) if folder else None}))
+    else:
+        where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no folder can be written)"
+        print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)
+    return 0 if plan.success else 1
+
+
+_COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "run": _run,
+    "report": _report,
+    "models": _models,
+    "warmup": _warmup,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status."""
+    args = _parser().parse_args(arguments)
+    try:
+        return _COMMANDS[args.command](args)
+    except (ValueError, TypeError, OSError) as error:
+        print(f"dojo-opt {args.command}: {error}", file=sys.stderr)
+        return 2

@@ -1,0 +1,66 @@
+"""Motion: what plots and viewer show of a trajectory or a plan, in world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim.mechanism import Mechanism
+from sim.model import Vector
+from sim.shapes import rotation_matrix
+from sim.simulator import Simulator
+
+Array = Vector
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of the bodies and forces of the contacts over time."""
+
+    mechanism: Mechanism
+    time: Array  # (T + 1,) [s]
+    x: Array  # (T + 1, nx)
+    u: Array  # (T, nu) [N, N m]
+    position: Array  # (T + 1, nbody, 3) [m]
+    quaternion: Array  # (T + 1, nbody, 4)
+    contact_time: Array  # (N,) end of each simulation step [s]
+    normal_force: Array  # (N, ncontact) mean over the step [N]
+    friction_force: Array  # (N, ncontact) likewise, its size
+
+    def points(self, body: int, point: Any) -> Array:
+        """Path (T + 1, 3) of a point given in the axes of a body, from its centre of mass [m]."""
+        R = np.array([rotation_matrix(q) for q in self.quaternion[:, body]])
+        return np.asarray(self.position[:, body] + R @ np.asarray(point, dtype=np.float64))
+
+
+def motion(result: Any, simulator: Simulator | None = None) -> Motion:
+    """Motion of a Trajectory, or of a plan; the contact forces of a plan are those of its steps, solved once more.
+
+    simulator: the one the result was made with; only needed for a result that was read from a file.
+    """
+    sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
+    if sim is None:
+        raise ValueError(f"motion(simulator=...): this {type(result).__name__} does not know its simulator; give it")
+    x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
+    substeps = getattr(result, "substeps", 1)
+    normal, friction = _contact_forces(sim, x, u, substeps)
+    z = sim.maximal(x)
+    return Motion(
+        mechanism=sim.mechanism,
+        time=sim.time_step * substeps * np.arange(len(x)),
+        x=x,
+        u=u,
+        position=z[:, :, 0:3],
+        quaternion=z[:, :, 6:10],
+        contact_time=sim.time_step * np.arange(1, len(normal) + 1),
+        normal_force=normal,
+        friction_force=friction,
+    )
+
+
+def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, Array]:
+    """Mean normal and friction force of every simulation step; a knot spans `substeps` of them."""
+    knots = [sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts for t in range(len(u))]
+    return np.concatenate([c.normal_force for c in knots]), np.concatenate([c.friction_force for c in knots])

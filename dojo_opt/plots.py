@@ -1,0 +1,146 @@
+"""Figures. Every function takes the figure or axes to draw on, returns it, and shows nothing.
+
+matplotlib is imported when the first figure is made, without pyplot: no window, no global state.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from dojo_opt.motion import Motion, motion
+from sim.mechanism import Mechanism
+from sim.simulator import Simulator
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["contact_forces", "controls", "paths", "state", "trajectory", "velocities"]
+
+
+@overload
+def trajectory(result: Any, figure: None = None, *, simulator: Simulator | None = None) -> Figure: ...
+
+
+@overload
+def trajectory(result: Any, figure: SubFigure, *, simulator: Simulator | None = None) -> SubFigure: ...
+
+
+def trajectory(
+    result: Any, figure: Figure | SubFigure | None = None, *, simulator: Simulator | None = None
+) -> Figure | SubFigure:
+    """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot.
+
+    A mechanism without contacts shows its velocities instead of their forces.
+
+    figure: draw on this one. simulator: needed for a result that was read from a file.
+    """
+    if figure is None:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(10, 7.5), layout="constrained")
+    m = motion(result, simulator)
+    axes = np.ravel(figure.subplots(2, 2))
+    state(m, axes[0])
+    controls(m, axes[1])
+    (contact_forces if m.mechanism.contacts else velocities)(m, axes[2])
+    paths(m, axes[3])
+    return figure
+
+
+def state(m: Motion, ax: Axes) -> Axes:
+    """Coordinates over time; the orientation of a quaternion joint as its rotation vector."""
+    for label, values in _coordinates(m):
+        if np.ptp(values) > 1e-9 or len(m.mechanism.joints) == 1:
+            ax.plot(m.time, values, label=label)
+    return _finish(ax, "coordinates [m, rad]", "time [s]")
+
+
+def velocities(m: Motion, ax: Axes) -> Axes:
+    """Joint velocities over time, each the mean of the step that led to its knot."""
+    nq = m.mechanism.nq
+    for joint in m.mechanism.joints:
+        v = m.x[:, nq:][:, m.mechanism.v_slice(joint.name)]
+        for k in range(v.shape[1]):
+            ax.plot(m.time, v[:, k], label=joint.name if v.shape[1] == 1 else f"{joint.name} {k}")
+    return _finish(ax, "velocities [m/s, rad/s]", "time [s]")
+
+
+def controls(m: Motion, ax: Axes) -> Axes:
+    """Inputs over time, held over each knot."""
+    for k, name in enumerate(m.mechanism.input_names):
+        ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
+    return _finish(ax, "inputs [N, N m]", "time [s]")
+
+
+def contact_forces(m: Motion, ax: Axes) -> Axes:
+    """Mean normal force over each step of every contact that carries load, and the size of its friction force, dashed."""
+    edges = np.concatenate([[0.0], m.contact_time])
+    peak = m.normal_force.max(axis=0, initial=0.0)
+    for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
+        name = m.mechanism.contact_names[k]
+        line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=f"{name}, normal")
+        style = {"linestyle": "--", "color": line.get_edgecolor()}
+        ax.stairs(m.friction_force[:, k], edges, baseline=None, label=f"{name}, friction", **style)
+    return _finish(ax, "contact forces [N]", "time [s]")
+
+
+def paths(m: Motion, ax: Axes) -> Axes:
+    """Paths, in the vertical plane of the motion, of the first body and of the feet; without feet, of all bodies."""
+    side = int(np.ptp(m.position[:, :, 1], axis=0).max() > np.ptp(m.position[:, :, 0], axis=0).max())
+    names = m.mechanism.body_names
+    feet = [c for c in m.mechanism.contacts if c.body != names[0]]
+    drawn = [(names[0], m.position[:, 0])]
+    for foot in feet:
+        path = m.points(names.index(foot.body), foot.point)
+        drawn.append((f"{foot.name}, underside", path - foot.radius * np.asarray(foot.normal)))
+    if not feet:
+        drawn += [(name, m.position[:, k]) for k, name in enumerate(names[1:], start=1)]
+    for label, path in drawn:
+        (line,) = ax.plot(path[:, side], path[:, 2], marker=".", markersize=4, label=label)
+        ax.plot(path[-1, side], path[-1, 2], marker="o", color=line.get_color())
+    if any(np.allclose(c.normal, (0, 0, 1)) for c in m.mechanism.contacts):
+        ax.axhline(m.mechanism.contacts[0].height, color="0.6", linewidth=1)
+    ax.set_aspect("equal", adjustable="datalim")
+    return _finish(ax, "height [m]", f"{'xy'[side]} [m]")
+
+
+def _finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
+    """Labels, grid, and a legend as long as it can be read."""
+    ax.set_xlabel(xlabel)
+    ax.set_ylabel(ylabel)
+    ax.grid(alpha=0.3)
+    if 0 < len(ax.get_legend_handles_labels()[1]) <= 12:
+        ax.legend(fontsize="small", framealpha=0.6)
+    return ax
+
+
+def _coordinates(m: Motion) -> list[tuple[str, Any]]:
+    """(label, values over time) of every degree of freedom."""
+    rows = []
+    for joint in m.mechanism.joints:
+        q = m.x[:, m.mechanism.q_slice(joint.name)]
+        for k in range(joint.ntrans):
+            rows.append((_label(m.mechanism, joint.name, "xyz"[k] if joint.ntrans > 1 else ""), q[:, k]))
+        if joint.nrot == 1:
+            rows.append((_label(m.mechanism, joint.name, "angle" if joint.ntrans else ""), q[:, -1]))
+        elif joint.nrot == 3:
+            vectors = _rotation_vectors(q[:, -4:])
+            rows += [(_label(m.mechanism, joint.name, f"r{a}"), vectors[:, k]) for k, a in enumerate("xyz")]
+    return rows
+
+
+def _label(mechanism: Mechanism, joint: str, coordinate: str) -> str:
+    if len(mechanism.joints) == 1 and coordinate:
+        return coordinate
+    return f"{joint} {coordinate}".strip()
+
+
+def _rotation_vectors(quaternions: Any) -> Any:
+    """Axis times angle, (T, 3), of unit quaternions (w, x, y, z)."""
+    q = quaternions * np.where(quaternions[:, :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[:, :1])
+    return q[:, 1:] * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)

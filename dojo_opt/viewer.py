@@ -1,0 +1,120 @@
+"""An animation of a trajectory or a plan as one HTML file: opens in any browser, needs no server and no network.
+
+The drawing is MeshCat's: its scene commands and its viewer, put into the page.
+"""
+
+from __future__ import annotations
+
+import base64
+import warnings
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.motion import Motion, motion
+from sim import shapes
+from sim.simulator import Simulator
+
+__all__ = ["save_html"]
+
+FRAMES = 60  # per second of the animation
+
+_PAGE = """<!DOCTYPE html>
+<html>
+<head><meta charset="utf-8"><title>{title}</title>
+<style>body {{margin: 0}} #meshcat-pane {{width: 100vw; height: 100vh; overflow: hidden}}</style></head>
+<body><div id="meshcat-pane"></div>
+<script>{viewer}</script>
+<script>
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+for (const text of [{commands}])
+    viewer.handle_command_bytearray(Uint8Array.from(atob(text), c => c.charCodeAt(0)));
+</script></body></html>
+"""
+
+
+def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
+    """Write the animation of a Trajectory or a plan; returns the path. simulator: for a result read from a file."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
+        import meshcat  # noqa: F401
+    from umsgpack import packb
+
+    m = motion(result, simulator)
+    commands = [*_scene(m), _animation(m)]
+    encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
+    viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
+    page = _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded)
+    target = Path(path)
+    target.write_text(page, encoding="utf-8")
+    return target
+
+
+def _scene(m: Motion) -> list[Any]:
+    """Commands that draw every body at its first pose: its shape, and a ball for every contact."""
+    from meshcat import geometry
+    from meshcat.commands import SetObject, SetTransform
+    from meshcat.path import Path as Node
+
+    commands = []
+    steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
+    for k, body in enumerate(m.mechanism.bodies):
+        node = Node(("meshcat", "bodies", body.name))
+        for part, (solid, place) in enumerate(_solids(body)):
+            commands.append(SetObject(solid, steel, node.append(f"part{part}")))
+            commands.append(SetTransform(place, node.append(f"part{part}")))
+        for contact in m.mechanism.contacts:
+            if contact.body == body.name:
+                ball = node.append(f"contact {contact.name}")
+                commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), rubber, ball))
+                commands.append(SetTransform(_place(contact.point), ball))
+        commands.append(SetTransform(_place(m.position[0, k], m.quaternion[0, k]), node))
+    return commands
+
+
+def _solids(body: Any) -> list[tuple[Any, Any]]:
+    """(MeshCat geometry, placement in the body) of a body's shape; a body without one is a small ball."""
+    from meshcat import geometry
+
+    shape = body.shape
+    if shape is None:
+        return [(geometry.Sphere(0.02), np.eye(4))]
+    place = _place(shape.center, shape.orientation)
+    if isinstance(shape, shapes.Sphere):
+        return [(geometry.Sphere(shape.radius), place)]
+    if isinstance(shape, shapes.Box):
+        return [(geometry.Box([shape.x, shape.y, shape.z]), place)]
+    # MeshCat's cylinders stand along y, ours along z
+    upright = place @ _place((0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
+    solids = [(geometry.Cylinder(shape.length, shape.radius), upright)]
+    if isinstance(shape, shapes.Capsule):
+        ends = [place @ _place((0, 0, side * shape.length / 2)) for side in (-1, 1)]
+        solids += [(geometry.Sphere(shape.radius), end) for end in ends]
+    return solids
+
+
+def _place(position: Any, quaternion: Any = (1.0, 0.0, 0.0, 0.0)) -> Any:
+    """Homogeneous matrix (4, 4) of a pose."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = shapes.rotation_matrix(quaternion)
+    matrix[:3, 3] = position
+    return matrix
+
+
+def _animation(m: Motion) -> Any:
+    """One clip per body, a key at every knot; the browser interpolates."""
+    from meshcat.animation import Animation, AnimationClip
+    from meshcat.commands import SetAnimation
+    from meshcat.path import Path as Node
+
+    clips = {}
+    frames = [float(t * FRAMES) for t in m.time]
+    for k, body in enumerate(m.mechanism.bodies):
+        clip = AnimationClip(fps=FRAMES)
+        for frame, position, quaternion in zip(frames, m.position[:, k], m.quaternion[:, k], strict=True):
+            clip.set_property(frame, "position", "vector3", position.tolist())
+            clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
+        clips[Node(("meshcat", "bodies", body.name))] = clip
+    return SetAnimation(Animation(clips, default_framerate=FRAMES), play=True, repetitions=1000)

@@ -1,0 +1,159 @@
+"""A, B of one step against central differences of the solver at the same kappa.
+
+Figure of merit: the largest error over all entries relative to the largest entry, A and B apart, at most 1e-6.
+Every mechanism is put so that without contact its gap after the step would be `GAP[regime]`: far away, exactly
+touching (the middle of the smooth transition), or pressed, with much friction and little speed or the reverse.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from naive import rotation as rot
+from scenes import KINDS, LAWS, ball, block, chain, gaps, pendulum, random_state, slider
+from jacobians import check_jacobian
+
+import dojo_opt as dojo
+
+H = 0.02
+KAPPAS = (1e-2, 1e-4, 1e-6)
+GAP = {"flying": 0.3, "touching": 0.0, "sticking": -0.01, "sliding": -0.01}
+FRICTION = {"flying": 0.5, "touching": 0.5, "sticking": 3.0, "sliding": 0.1}
+
+
+def simulator(mech, kappa):
+    return dojo.Simulator(mech, time_step=H, kappa=kappa, tolerance=1e-12)
+
+
+def check(mech, x, u, kappa):
+    """Both Jacobians."""
+    sim = simulator(mech, kappa)
+    result = sim.step(x, u)
+    assert result.status == 0
+    A, B = sim.linearize(x, u, kappa=kappa)
+
+    def step(state, control):
+        stepped = sim.step(state, control)
+        if stepped.status != 0:
+            return np.full(sim.ndx, np.nan)
+        return sim.difference(stepped.x, result.x)
+
+    check_jacobian(lambda state: step(state, u), A, x, sim.integrate)
+    if sim.nu:
+        check_jacobian(lambda control: step(x, control), B, u, np.add)
+    return result
+
+
+def placed(mech, x, u, regime):
+    """The mechanism with the ground where its lowest contact would be GAP[regime] above it after a free step."""
+    far = dataclasses.replace(mech, contacts=[dataclasses.replace(c, height=-1e3) for c in mech.contacts])
+    sim = simulator(far, 1e-12)
+    lowest = gaps(sim, sim.step(x, u).x).min() - 1e3
+    contacts = [dataclasses.replace(c, height=lowest - GAP[regime], friction=FRICTION[regime]) for c in mech.contacts]
+    return dataclasses.replace(mech, contacts=contacts)
+
+
+def assert_regime(mech, result, regime, law, kappa):
+    """The contact with the largest impulse is where the name says, as far as kappa lets it."""
+    impulse = np.asarray(result.contacts.impulse)
+    impulse = impulse[np.argmax(impulse[:, 2])]
+    if kappa > 1e-4 or law != "nonlinear":
+        return
+    ratio = np.linalg.norm(impulse[:2]) / (FRICTION[regime] * impulse[2])
+    if regime == "flying":
+        assert impulse[2] < 1e-3
+    elif regime == "sticking":
+        assert ratio < 0.9 and impulse[2] > 1e-2, ratio
+    elif regime == "sliding":
+        assert ratio > 0.99 and impulse[2] > 1e-2, ratio
+
+
+@pytest.mark.parametrize("links", [1, 2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_joints(kind, links, rng):
+    """Every joint between free bodies: springs, dampers, gravity, inputs on every degree of freedom."""
+    mech = chain(kind, links, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)
+    sim = simulator(mech, 1e-6)
+    for speed in (0.5, 8.0):
+        check(mech, random_state(sim, rng, speed), rng.normal(size=sim.nu), 1e-6)
+
+
+@pytest.mark.parametrize("kind", [k for k in KINDS if k != "fixed"])
+def test_joints_to_the_world(kind, rng):
+    mech = chain(kind, 1, base=None, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)
+    sim = simulator(mech, 1e-6)
+    check(mech, random_state(sim, rng, 2.0), rng.normal(size=sim.nu), 1e-6)
+
+
+@pytest.mark.parametrize("regime", GAP)
+@pytest.mark.parametrize("kind", KINDS)
+def test_contact_behind_every_joint(kind, regime, rng):
+    mech = chain(kind, 1, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)
+    mech = dataclasses.replace(mech, contacts=[dojo.Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05)])
+    sim = simulator(mech, 1e-6)
+    speed = 2.0 if regime == "sliding" else 0.02
+    x, u = random_state(sim, rng, speed, spread=0.4), 0.1 * rng.normal(size=sim.nu)
+    mech = placed(mech, x, u, regime)
+    for kappa in KAPPAS:
+        assert_regime(mech, check(mech, x, u, kappa), regime, "nonlinear", kappa)
+
+
+MECHANISMS = {
+    "ball": lambda law: ball(law=law),
+    "block": lambda law: block(law=law),
+    "block on a slope": lambda law: block(law=law, normal=(0.3, -0.2, 0.9)),
+}
+
+
+@pytest.mark.parametrize("regime", GAP)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_contact_laws(name, law, regime, rng):
+    mech = MECHANISMS[name](law)
+    speed = np.array([2.0, 1.0, -0.5, 0.5, -1.0, 2.0]) * (1.0 if regime == "sliding" else 0.02)
+    u = 0.1 * rng.normal(size=simulator(mech, 1e-6).nu)
+    x = np.r_[0.0, 0.0, 0.0, rot.exp(np.array([0.2, 0.1, -0.4])), speed]
+    mech = placed(mech, x, u, regime)
+    for kappa in KAPPAS:
+        result = check(mech, x, u, kappa)
+        if name != "block on a slope":
+            assert_regime(mech, result, regime, law, kappa)
+
+
+@pytest.mark.parametrize("fast", [False, True])
+@pytest.mark.parametrize("push", [0.0, 1.0])
+def test_limits(push, fast, rng):
+    """Pressed against a limit, or arriving at it in this very step."""
+    for mech in (slider(limits=(-0.5, 0.5), spring=2.0), pendulum(2, limits=(-0.5, 0.5), damper=0.1),
+                 chain("planar_axis", 1, base=None, limits=[(-0.5, 0.5), None, (-0.5, 0.5)])):  # fmt: skip
+        nv = simulator(mech, 1e-6).nv
+        speed = 5.0 if fast else 0.1
+        x = np.r_[np.full(nv, 0.5 - H * speed * (1.0 - 0.3 * push)), np.full(nv, speed)]
+        for kappa in KAPPAS:
+            check(mech, x, push * rng.normal(size=nv), kappa)
+
+
+def test_fast_spin():
+    """A third of a turn in one step."""
+    mech = ball()
+    x = np.r_[0.0, 0.0, 0.3, rot.exp(np.array([0.3, 0.2, 0.1])), 1.0, 0.0, -3.0, 60.0, 50.0, -40.0]
+    for kappa in KAPPAS:
+        check(mech, x, np.zeros(6), kappa)
+
+
+def test_trajectory_linearization_agrees_with_single_steps(rng):
+    """linearize_trajectory gives the Jacobians of every knot, and chains them over substeps."""
+    sim = dojo.Simulator(block(), time_step=H, kappa=1e-4, tolerance=1e-12)
+    x0 = np.r_[0.0, 0.0, 0.4, rot.exp(np.array([0.2, 0.1, -0.4])), 1.0, 0.0, -1.0, 1.0, 2.0, 0.0]
+    us = np.zeros((8, sim.nu))
+    xs = sim.rollout(x0, us).x
+    out = sim.linearize_trajectory(xs, us)
+    assert np.all(np.asarray(out.status) == 0)
+    for t in range(8):
+        A, _ = sim.linearize(xs[t], us[t])
+        np.testing.assert_allclose(out.A[t], A, rtol=0, atol=1e-9 * np.abs(A).max())
+        np.testing.assert_allclose(sim.difference(out.x_next[t], xs[t + 1]), 0.0, atol=1e-9)
+    chained = sim.linearize_trajectory(xs[::2], us[::2], substeps=2)
+    for k in range(4):
+        expected = out.A[2 * k + 1] @ out.A[2 * k]
+        np.testing.assert_allclose(chained.A[k], expected, rtol=0, atol=1e-8 * np.abs(expected).max())

@@ -1,0 +1,171 @@
+"""Bad input is refused by an error that names the call and the culprit; nothing ever returns NaN."""
+
+import re
+
+import numpy as np
+import pytest
+from scenes import ball, block, chain, free_body, pendulum, run
+
+import dojo_opt as dojo
+
+BODY = dojo.Body("arm", 1.0, (1.0, 1.0, 1.0))
+HINGE = dojo.Joint("revolute", None, "arm", name="hinge")
+
+
+def other(name="leg"):
+    return dojo.Body(name, 1.0, (1.0, 1.0, 1.0))
+
+
+PARTS = {
+    "zero mass": (lambda: dojo.Body("arm", 0.0, (1, 1, 1)), "arm", "mass"),
+    "negative mass": (lambda: dojo.Body("arm", -1.0, (1, 1, 1)), "arm", "mass", "-1"),
+    "infinite mass": (lambda: dojo.Body("arm", np.inf, (1, 1, 1)), "arm", "mass", "inf"),
+    "nan mass": (lambda: dojo.Body("arm", np.nan, (1, 1, 1)), "arm", "mass", "nan"),
+    "zero inertia": (lambda: dojo.Body("arm", 1.0, (0, 0, 0)), "arm", "inertia"),
+    "inertia not positive": (lambda: dojo.Body("arm", 1.0, np.diag([1.0, -1.0, 1.0])), "arm", "inertia"),
+    "inertia not symmetric": (lambda: dojo.Body("arm", 1.0, [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "arm", "symmetric"),
+    "inertia of no body": (lambda: dojo.Body("arm", 1.0, (1, 1, 3)), "arm", "inertia", "exceeds"),
+    "inertia shape": (lambda: dojo.Body("arm", 1.0, (1, 2)), "arm", "inertia", "(3,)", "(2,)"),
+    "nan inertia": (lambda: dojo.Body("arm", 1.0, (1, np.nan, 1)), "arm", "inertia", "nan", "1"),
+    "no inertia": (lambda: dojo.Body("arm", 1.0), "arm", "inertia"),
+    "no name": (lambda: dojo.Body("", 1.0, (1, 1, 1)), "name"),
+    "unknown joint": (lambda: dojo.Joint("hinge", None, "arm"), "arm", "kind", "hinge", "revolute"),
+    "zero axis": (lambda: dojo.Joint("revolute", None, "arm", axis=(0, 0, 0)), "arm", "axis"),
+    "quaternion length": (lambda: dojo.Joint("revolute", None, "arm", orientation=(1, 1, 0, 0)), "arm", "orientation"),
+    "point shape": (lambda: dojo.Joint("revolute", None, "arm", parent_point=(1, 2)), "arm", "parent_point", "(2,)"),
+    "negative spring": (lambda: dojo.Joint("revolute", None, "arm", spring=-1.0), "arm", "spring", "-1"),
+    "nan damper": (lambda: dojo.Joint("revolute", None, "arm", damper=np.nan), "arm", "damper", "nan"),
+    "limits reversed": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, -1.0)), "arm", "limits"),
+    "limits equal": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, 1.0)), "arm", "limits"),
+    "limits of a ball joint": (lambda: dojo.Joint("spherical", None, "arm", limits=[(0, 1), None, None]), "arm", "limits"),
+    "number of limits": (lambda: dojo.Joint("planar", None, "arm", limits=[(0, 1)] * 3), "arm", "limits"),
+    "negative friction": (lambda: dojo.Contact("arm", friction=-0.1), "arm", "friction", "-0.1"),
+    "negative radius": (lambda: dojo.Contact("arm", radius=-0.1), "arm", "radius"),
+    "unknown law": (lambda: dojo.Contact("arm", law="coulomb"), "arm", "law", "coulomb", "nonlinear"),
+    "zero normal": (lambda: dojo.Contact("arm", normal=(0, 0, 0)), "arm", "normal"),
+    "input on nothing": (lambda: dojo.Input(), "joint", "body"),
+    "input on both": (lambda: dojo.Input("hinge", body="arm"), "joint", "body"),
+    "empty wrench": (lambda: dojo.Input(body="arm"), "arm", "force"),
+    "complex gravity": (lambda: dojo.Mechanism([BODY], [HINGE], gravity=(0, 0, 1j)), "gravity"),
+    "gravity shape": (lambda: dojo.Mechanism([BODY], [HINGE], gravity=-9.81), "gravity", "(3,)"),
+    "no bodies": (lambda: dojo.Mechanism([], []), "body"),
+    "no joints": (lambda: dojo.Mechanism([BODY], []), "arm", "no joint"),
+    "same name": (lambda: dojo.Mechanism([BODY, BODY], [HINGE]), "arm", "twice"),
+    "unknown child": (lambda: dojo.Mechanism([other()], [HINGE]), "hinge", "arm", "leg"),
+    "unknown parent": (lambda: dojo.Mechanism([BODY], [dojo.Joint("fixed", "torso", "arm")]), "arm", "torso", "world"),
+    "body without joint": (lambda: dojo.Mechanism([BODY, other()], [HINGE]), "leg"),
+    "two joints": (lambda: dojo.Mechanism([BODY], [HINGE, dojo.Joint("revolute", None, "arm", name="b")]), "arm", "hinge"),
+    "cycle": (lambda: dojo.Mechanism([BODY, other()], [dojo.Joint("revolute", "leg", "arm", name="a"),
+                                                       dojo.Joint("revolute", "arm", "leg", name="b")]), "cycle", "a", "b"),
+    "own parent": (lambda: dojo.Mechanism([BODY], [dojo.Joint("revolute", "arm", "arm", name="a")]), "a"),
+    "unknown contact body": (lambda: dojo.Mechanism([BODY], [HINGE], [dojo.Contact("toe")]), "toe", "arm"),
+    "unknown input joint": (lambda: dojo.Mechanism([BODY], [HINGE], inputs=[dojo.Input("elbow")]), "elbow", "hinge"),
+    "input dof": (lambda: dojo.Mechanism([BODY], [HINGE], inputs=[dojo.Input("hinge", dof=1)]), "hinge", "1"),
+    "not a body": (lambda: dojo.Mechanism([HINGE], [HINGE]), "bodies", "Body"),
+    "nothing moves": (lambda: dojo.Mechanism([BODY], [dojo.Joint("fixed", None, "arm")]), "free to move"),
+    "neutral": (lambda: dojo.Mechanism([BODY], [HINGE], neutral={"elbow": 1.0}), "neutral", "elbow", "hinge"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PARTS)
+def test_mechanism(case):
+    build, *words = PARTS[case]
+    with pytest.raises(ValueError) as error:
+        build()
+    for word in words:
+        assert word in str(error.value), str(error.value)
+
+
+def hopper():
+    return dojo.Simulator(block(), time_step=0.01)
+
+
+def state(**changes):
+    """A good state of the block with some entries replaced."""
+    x = np.r_[0.0, 0.0, 0.5, 1.0, np.zeros(9)]
+    for index, value in changes.items():
+        x[int(index[1:])] = value
+    return x
+
+
+CALLS = {
+    "time step zero": (lambda: dojo.Simulator(block(), time_step=0.0), "time_step"),
+    "time step nan": (lambda: dojo.Simulator(block(), time_step=np.nan), "time_step", "nan"),
+    "kappa zero": (lambda: dojo.Simulator(block(), kappa=0.0), "kappa"),
+    "kappa negative": (lambda: dojo.Simulator(block(), kappa=-1e-6), "kappa"),
+    "tolerance zero": (lambda: dojo.Simulator(block(), tolerance=0.0), "tolerance"),
+    "not a mechanism": (lambda: dojo.Simulator("block"), "Mechanism"),
+    "unknown setting": (lambda: hopper().replace(timestep=0.1), "timestep"),
+    "state shape": (lambda: hopper().step(np.zeros(5), np.zeros(0)), "step", "(13,)", "(5,)"),
+    "input shape": (lambda: hopper().step(state(), np.zeros(3)), "step", "(0,)", "(3,)"),
+    "state nan": (lambda: hopper().step(state(_7=np.nan), np.zeros(0)), "step", "nan", "7"),
+    "state infinite": (lambda: hopper().step(state(_2=np.inf), np.zeros(0)), "step", "inf", "2"),
+    "state text": (lambda: hopper().step("zero", np.zeros(0)), "step"),
+    "state quaternion": (lambda: hopper().step(state(_3=0.0), np.zeros(0)), "step", "quaternion", "block"),
+    "input nan": (lambda: dojo.Simulator(ball()).step(state(), np.r_[0, np.nan, 0, 0, 0, 0]), "step", "nan", "1"),
+    "rollout shape": (lambda: dojo.Simulator(ball()).rollout(state(), np.zeros((10, 2))), "rollout", "6", "(10, 2)"),
+    "rollout nan": (lambda: dojo.Simulator(ball()).rollout(state(), np.full((4, 6), np.nan)), "rollout", "nan"),
+    "linearize shape": (lambda: hopper().linearize(np.zeros(12), np.zeros(0)), "linearize", "(13,)", "(12,)"),
+    "linearize kappa": (lambda: hopper().linearize(state(), np.zeros(0), kappa=0.0), "linearize", "kappa"),
+    "start shape": (lambda: hopper().start(np.zeros(7), np.zeros(5)), "start", "(6,)", "(5,)"),
+    "maximal shape": (lambda: hopper().maximal(np.zeros(3)), "maximal", "(13,)", "(3,)"),
+    "minimal shape": (lambda: hopper().minimal(np.zeros((2, 13))), "minimal", "(1, 13)", "(2, 13)"),
+    "energy nan": (lambda: hopper().energy(state(_8=np.nan)), "energy", "nan"),
+}
+
+
+@pytest.mark.parametrize("case", CALLS)
+def test_simulator(case):
+    call, *words = CALLS[case]
+    with pytest.raises((ValueError, TypeError)) as error:
+        call()
+    for word in words:
+        assert word in str(error.value), str(error.value)
+
+
+@pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])
+def test_half_a_turn_per_step_is_refused(mech):
+    """State whose body turns by pi or more in one step: a Status with its reason, or an error; never a number."""
+    sim = dojo.Simulator(mech, time_step=0.1)
+    x = np.array(sim.neutral())
+    x[sim.nq + 3] = 32.0
+    result = sim.step(x, np.zeros(sim.nu))
+    assert dojo.Status(result.status).name == "ANGULAR_STEP"
+    trajectory = sim.rollout(x, np.zeros((3, sim.nu)))
+    assert trajectory.status == result.status and trajectory.knot == 0
+    with pytest.raises(Exception, match=re.compile("turn|angular", re.IGNORECASE)):
+        sim.rollout(x, np.zeros((3, sim.nu)), throw=True)
+
+
+def test_huge_numbers_do_not_become_nan():
+    """Overflow inside a step ends in a status; what is returned is finite."""
+    sim = dojo.Simulator(ball(), time_step=0.01)
+    for scale in (1e10, 1e100, 1e300):
+        for x, u in ((state(_9=-scale), np.zeros(6)), (state(), np.full(6, scale))):
+            try:
+                result = sim.step(x, u)
+            except ValueError:
+                continue
+            assert np.isfinite(result.x).all()
+            assert result.status != 0 or scale < 1e12
+
+
+def test_a_step_that_failed_is_not_used():
+    """A rollout stops at the first step that did not meet its tolerance."""
+    sim = dojo.Simulator(block(), time_step=0.01, max_iterations=1)
+    trajectory = sim.rollout(state(_2=0.26, _9=-5.0), np.zeros((50, 0)))
+    assert trajectory.status != 0 and 0 <= trajectory.knot < 50
+    assert np.isfinite(trajectory.x[: trajectory.knot + 1]).all()
+
+
+def test_deep_overlap_at_the_start_is_solved():
+    """A state below the ground is not an error: the step pushes it out."""
+    sim = dojo.Simulator(block(), time_step=0.01)
+    xs = run(sim, state(_2=-0.5), 3)
+    assert xs[1][2] > 0.25
+
+
+def test_pendulum_may_turn_by_any_angle():
+    """Angles of hinges are not wrapped."""
+    sim = dojo.Simulator(pendulum(1), time_step=0.01)
+    assert run(sim, np.array([50.0 * np.pi, 1.0]), 5)[-1][0] > 50.0 * np.pi
