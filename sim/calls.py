@@ -48,6 +48,7 @@ class Calls:
         self.nx, self.ndx = int(ints[NQ] + ints[NV]), 2 * int(ints[NV])
         self.nu, self.ncontact = int(ints[NU]), int(ints[NCONTACT])
         self.hard = 1 if ints[NCONTACT] + ints[NLIMIT] else None  # None: the interior point is not compiled
+        self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
         self._scratch = threading.local()
 
     def _work(self) -> Vector:
@@ -70,7 +71,7 @@ class Calls:
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.ncontact, CONTACT))
         knot = rollout.roll(
-            self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard
+            self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard, self.smooth
         )
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
@@ -104,6 +105,7 @@ class Calls:
             u_out,
             report,
             self.hard,
+            self.smooth,
         )
         if knot < len(us):
             np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
@@ -116,7 +118,7 @@ class Calls:
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         settings, works = self.settings.array(kappa), self._works(n)
         rollout.linearize_knots(
-            self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports, self.hard
+            self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports, self.hard, self.smooth
         )
         unsolved = reports[:, 0] != Status.SOLVED
         for out in (A, B, x_next):
@@ -128,7 +130,7 @@ class Calls:
         A, B = np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu))
         x_next, report = np.zeros(self.nx), np.zeros(REPORT)
         settings = self.settings.array(kappa)
-        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard)
+        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard, self.smooth)
         return A, B, x_next, report
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
@@ -137,7 +139,7 @@ class Calls:
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         settings, works = self.settings.array(), self._works(n)
-        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots, self.hard)
+        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
         return xs, status, knots
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:

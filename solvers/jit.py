@@ -99,7 +99,8 @@ def kernel(func: F) -> F:
     A kernel cannot allocate: it fails to compile if it tries. That removes the reference counting of every array in
     every call, which costs a third of a time step (`_nrt=False`; theory: one step of a 13-body tree, 103 to 61 us).
     """
-    return _compile(func, _nrt=False)
+    inner = not {"Model", "Work"}.isdisjoint(func.__annotations__.values())
+    return _compile(func, _nrt=False, no_cpython_wrapper=inner, no_cfunc_wrapper=True)
 
 
 def local_kernel(func: F) -> F:
