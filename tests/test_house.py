@@ -12,6 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import dojo_opt as dojo
@@ -249,7 +250,9 @@ def test_run_writes_plan_figure_and_animation(tmp_path: Path, capsys: pytest.Cap
 def test_a_missed_bar_exits_with_1_only_when_strict(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report = Report("title", "command", [Row("fast", 1.0, "us", 2.0), Row("slow", 3.0, "us", 2.0)])
+    report = Report(
+        "title", "command", [Row("fast", np.float64(1.0), "us", 2.0), Row("slow", np.float64(3.0), "us", 2.0)]
+    )
     monkeypatch.setattr(cli, "run_report", lambda name, quick: report)
     assert cli.main(["report", "timing", "--out", str(tmp_path)]) == 0
     assert cli.main(["report", "timing", "--strict", "--json"]) == 1
