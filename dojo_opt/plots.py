@@ -82,8 +82,8 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
     for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
         name = m.mechanism.contact_names[k]
         line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name)
-        style = {"linestyle": "--", "color": line.get_edgecolor()}
-        ax.stairs(m.friction_force[:, k], edges, baseline=None, **style)
+        friction = ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle="--")
+        friction.set_edgecolor(line.get_edgecolor())
     return _finish(ax, "contact forces [N] (dashed: friction)", "time [s]")
 
 
