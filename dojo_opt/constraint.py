@@ -52,7 +52,7 @@ def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: In
     columns = chosen.size
     with_inf = [np.broadcast_to(np.asarray(b, dtype=float), (rows, columns)) for b in (lower, upper)]
     if np.any(np.isnan(with_inf)) or np.any(with_inf[0] > with_inf[1]):
-        raise ValueError(f"{call}: expected lower <= upper, got lower {lower}, upper {upper}")
+        raise ValueError(f"{call}: expected lower <= upper, got lower {lower!r}, upper {upper!r}")
     keep = [np.any(np.isfinite(b), axis=0) for b in with_inf]
     reference = np.concatenate([b[:, k] for b, k in zip(with_inf, keep, strict=True)], axis=1)
     big = np.where(np.isfinite(reference), reference, np.sign(reference) * 1e100)
@@ -79,7 +79,9 @@ class StateBounds:
         reference, columns, sign = _bounds("StateBounds", self.lower, self.upper, knots.size, chosen)
         if np.any(layout[columns] < 0):
             bad = int(columns[layout[columns] < 0][0])
-            raise ValueError(f"StateBounds(components=...): component {bad} belongs to a quaternion, which has no bounds")
+            raise ValueError(
+                f"StateBounds(components=...): component {bad} belongs to a quaternion, which has no bounds"
+            )
         pick = Pick(True, layout[columns], columns, sign)
         return PickTerm("StateBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
 

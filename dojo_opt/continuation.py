@@ -111,6 +111,7 @@ class Continuation:
         status = self._enter(stage)
         if status != Status.SOLVED:
             return status
+        self._line_search.reset()
         rejected = slow = 0
         self._kappa_grad = stage.kappa_grad
         for _ in range(stage.iterations):

@@ -37,7 +37,7 @@ def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale:
 
 @dataclass(frozen=True)
 class Tracking:
-    """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, in the tangent space (rotations by their rotation vector).
+    """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, tangent to the manifold: rotation vectors.
 
     reference: (nx,), or one row per knot; weight: scalar, (ndx,), or one row per knot. knots: default all T + 1.
     """

@@ -78,7 +78,7 @@ class Descent:
         return status
 
     def gains(self, now: Iterate) -> Promise:
-        """K and k at the smallest regularisation, from the present one upwards, that makes every Q_uu positive definite."""
+        """K and k at the first regularisation, from now upwards, that leaves every Q_uu positive definite."""
         lo, hi = self._free_limits
         if self._problem.control_limits is not None:
             lo, hi = (bound - now.u for bound in self._problem.control_limits)

@@ -17,6 +17,9 @@ Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
 
+_LENGTHEN = 4.0  # the first trial, relative to the step that was last taken: a rollout costs as much as a linearisation
+
+
 class Iterate(NamedTuple):
     """A trajectory and how good it is."""
 
@@ -44,6 +47,11 @@ class LineSearch:
         self._problem = problem
         self._objective = objective
         self._options = options
+        self.reset()
+
+    def reset(self) -> None:
+        """Try the full step first again."""
+        self._first = 1.0
 
     def roll(self, now: Iterate, k: Matrix | None, K: Stack | None, alpha: float, kappa: float) -> Any:
         """One rollout from the start of the problem; the simulator stops at the first step that it cannot solve."""
@@ -69,8 +77,8 @@ class LineSearch:
     def search(self, now: Iterate, promise: Promise, k: Matrix, K: Stack, kappa: float) -> tuple[float, Iterate]:
         """(step size, new iterate), or (0, the old one) when no step size is good enough."""
         options = self._options
-        alpha = 1.0
-        for _ in range(options.halvings + 1):
+        alpha = self._first
+        while alpha >= 0.5**options.halvings:
             shot = self.roll(now, k, K, alpha, kappa)
             if shot.status == Status.SOLVED:
                 cost, merit = self._objective.evaluate(shot.x, shot.u)
@@ -80,7 +88,9 @@ class LineSearch:
                 else:
                     good = now.gaps is not None and merit - now.merit <= options.ascent * predicted
                 if good:
+                    self._first = min(1.0, _LENGTHEN * alpha)
                     gaps = None if now.gaps is None or alpha == 1.0 else (1.0 - alpha) * now.gaps
                     return alpha, Iterate(shot.x, shot.u, gaps, cost, merit)
             alpha *= 0.5
+        self.reset()
         return 0.0, now

@@ -78,7 +78,7 @@ def displace(layout: Integers, x: Vector, i: int, step: float, out: Vector) -> N
 
 @kernel
 def add_rotation_block(r: Vector, gradient: Vector, hessian: Vector, i: int, c: int, g: Vector, H: Matrix) -> None:
-    """g[c:c+3] += J^T gradient[i:i+3],  H[c:c+3, c:c+3] += J^T diag(hessian[i:i+3]) J,  J = d log(exp(r) exp(d))/d d."""
+    """g[c:c+3] += J^T gradient[i:i+3],  H[c:c+3, c:c+3] += J^T diag(hessian[i:i+3]) J,  J = d log(exp(r) exp(d))/dd."""
     J = inverse_right_jacobian(r[i], r[i + 1], r[i + 2])
     for k in range(3):
         for row in range(3):

@@ -1,4 +1,4 @@
-"""Objective: all terms of a problem, their quadratic model along a trajectory, and the multipliers of its constraints."""
+"""Objective: all terms of a problem, their quadratic model along a trajectory, the multipliers of its constraints."""
 
 from __future__ import annotations
 

@@ -37,7 +37,9 @@ def penalty(r: Matrix, weight: Matrix, slope: Matrix, one_sided: bool) -> float:
 
 
 @kernel
-def penalty_derivatives(r: Matrix, weight: Matrix, slope: Matrix, one_sided: bool, first: Matrix, second: Matrix) -> None:
+def penalty_derivatives(
+    r: Matrix, weight: Matrix, slope: Matrix, one_sided: bool, first: Matrix, second: Matrix
+) -> None:
     """first = d/dr, second = d^2/dr^2 of the contribution of each entry."""
     for row in range(r.shape[0]):
         for j in range(r.shape[1]):

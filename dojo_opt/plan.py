@@ -65,7 +65,7 @@ class Plan:
     @property
     def time(self) -> Matrix:
         """(T + 1,) times of the knots [s]."""
-        return self.time_step * self.substeps * np.arange(len(self.x))
+        return np.arange(float(len(self.x))) * (self.time_step * self.substeps)
 
     def summary(self) -> str:
         """The table of iterations and a closing line."""

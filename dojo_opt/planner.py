@@ -1,8 +1,9 @@
-"""Iterative LQR with gaps: single and multiple shooting in one code path, through a continuation of contact smoothing.
+"""`ilqr`: iterative LQR with gaps, single and multiple shooting in one code path, through contact that hardens.
 
-One iteration: differentiate the time steps along the trajectory, solve the linear-quadratic problem around it (Descent),
-and roll the gains out (LineSearch). Stages lower the smoothing; between them the trajectory is kept and its gaps are
-opened, or it is rolled out with the gains: never open loop, which an unstable robot does not survive.
+One iteration: differentiate the time steps along the trajectory, solve the linear-quadratic problem around it
+(`Descent`), and roll the gains out (`LineSearch`). Stages lower the smoothing; from one to the next the trajectory is
+rolled out with its gains, or its states are kept and its gaps opened: never open loop, which an unstable robot does not
+survive.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ def ilqr(
 ) -> Plan:
     """Plan a trajectory.
 
-    controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the same
-    problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
+    controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the
+    same problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
     """
     options = Options(**settings) if options is None else replace(options, **settings)
     return Solver(problem, options).solve(controls, states, warm_start)
@@ -95,7 +96,7 @@ class Solver:
         return Status.SOLVED, ""
 
     def _run(self) -> Status:
-        """Stages from smooth to hard; after each the multipliers are updated, and the last is repeated until they fit."""
+        """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit."""
         options = self.options
         last = len(options.stages) - 1
         for update in range(last + options.max_updates + 1):

@@ -62,8 +62,8 @@ def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Proble
     target = start.copy()
     target[:3] += shifts[goal]
     weight = np.array([1.0] * 3 + [0.25] * 3 + [1.0] * 6)
-    cost = [Tracking(target, weight, scale=0.5), Effort(1e-2, scale=0.5)]
-    return Problem(sim, start, 10, cost=cost, constraints=[Goal(target)])
+    terms = (Tracking(target, weight, scale=0.5), Effort(1e-2, scale=0.5))
+    return Problem(sim, start, 10, cost=terms, constraints=[Goal(target)])
 
 
 def swingup(name: str = "cartpole") -> Problem:
@@ -72,6 +72,7 @@ def swingup(name: str = "cartpole") -> Problem:
     pendulum: 51 states, 50 ms, |torque| <= 200 N m, weights .1 and .01. cartpole: 26 states, 100 ms, .1 and .001.
     acrobot: 51 states, 100 ms, .1 on the velocities and .1 on the torque.
     """
+    weight: ArrayLike
     if name == "pendulum":
         sim, horizon, upright = Simulator(models.pendulum(damper=1.0), time_step=0.05), 50, [np.pi]
         weight, effort, limits = 0.1, 0.01, (-200.0, 200.0)

@@ -86,7 +86,7 @@ class ResidualKernels:
         self._values(xs, us, self._idle, knots, out)
 
     def jacobians(self, layout: Integers, xs: Matrix, us: Matrix, knots: Integers, d: int) -> Stack:
-        """(m, d, ndx + nu) derivative with respect to the tangent state and the control; overwritten by the next call."""
+        """(m, d, ndx + nu) derivative by tangent state and control; overwritten by the next call."""
         if self._out is None or self._out.shape[:2] != (knots.size, d):
             self._out = np.zeros((knots.size, d, layout.size + us.shape[1]))
             self._scratch = np.empty((4, max(xs.shape[1], us.shape[1], d)))

@@ -53,7 +53,7 @@ class Term:
         self._add(xs, us, g, H)
 
     def violation(self) -> Matrix:
-        """|r| of equalities, max(r, 0) of inequalities, at the last `update`; zero for entries that do not take part."""
+        """|r| of equalities, max(r, 0) of inequalities, at the last `update`; zero where an entry takes no part."""
         size = np.maximum(self.residual, 0.0) if self.one_sided else np.abs(self.residual)
         return np.multiply(size, self.mask, out=size)
 

@@ -63,7 +63,8 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
     """Newton step dnu and the steps of all cones; returns the step to their boundary.
 
     predictor     full residual, products to kappa                      -> sigma = (mean ahead / mean)^3
-    corrector     full residual, products to max(kappa, sigma mean), second-order term        (Mehrotra 1992)
+    corrector     full residual, products to max(kappa, sigma mean), second-order term        (Mehrotra 1992);
+                  left out where the predictor already lands on kappa
     if short      half the residual, products to half the mean; then a tenth, to nine tenths
     """
     sigma = 0.0
@@ -84,6 +85,8 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
         alpha = boundary_step(model, work)
         if phase == 0:
             ahead = products_ahead(model, work, min(1.0, 0.95 * alpha))
+            if alpha > 1.06 and abs(ahead - kappa) < 0.1 * kappa:
+                break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3
     return alpha
 
@@ -99,6 +102,25 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
             return True
         share *= 0.7
     return False
+
+
+@kernel
+def start_on_path(
+    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, restarts: int
+) -> None:
+    """Start on the central path: of kappa itself where its impulses already balance better than those of a larger one.
+
+    The gap of a resting contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution.
+    """
+    first = 0
+    if restarts == 0:
+        start_inequalities(model, work, options.h, options.kappa, 0.0)
+        hard, _ = residuals(model, work, options.h, q, v, u)
+        start_inequalities(model, work, options.h, options.kappa, 1.0)
+        soft, _ = residuals(model, work, options.h, q, v, u)
+        if not hard < soft:
+            first = 1
+    start_inequalities(model, work, options.h, options.kappa, _RESTART_GROWTH**restarts if restarts + first else 0.0)
 
 
 @kernel
@@ -128,7 +150,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
                 status = _NOT_FINITE
                 break
             inequality_kinematics(model, work, h)
-            start_inequalities(model, work, h, kappa, _RESTART_GROWTH**restarts)
+            start_on_path(model, work, options, q, v, u, restarts)
             inside = True
         else:
             for d in range(v.shape[0]):

@@ -60,7 +60,7 @@ WORK_STEP_FIELDS = _shapes(
 WORK_DERIVATIVE_FIELDS = _shapes(
     """
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody+6 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx
+    panel 6nbody+6 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5
     """
 )
 
@@ -271,4 +271,5 @@ def work_view(work: Vector, ints: Integers) -> Work:
         step_B=_matrix(work, ints, _W.step_B)[0],
         chain=_matrix(work, ints, _W.chain)[0],
         step_x=_matrix(work, ints, _W.step_x)[0],
+        report=_vector(work, ints, _W.report)[0],
     )

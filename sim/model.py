@@ -151,6 +151,7 @@ class Work(NamedTuple):
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
     step_x: Matrix  # (2, nq + nv) states inside a knot
+    report: Vector  # (5,) of a step nobody asks about
 
 
 class Options(NamedTuple):

@@ -10,37 +10,23 @@ Every function takes the flat buffers of `layout.py`; every loop stops at the fi
 
 from __future__ import annotations
 
-from sim.inequalities import report_contacts, worst_contact
+from sim.gradients import gradient
+from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Model, Options, Vector, Work
 from sim.state import integrate_state, state_difference
-from sim.step import step, step_with_gradient
+from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
+_SINGULAR = int(Status.SINGULAR)
 Cube = Matrix  # (n, rows, columns)
 
 
 @kernel
 def _options(settings: Vector) -> Options:
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
-
-
-@kernel
-def reported_step(
-    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, report: Vector, hard: int | None, smooth: int | None
-) -> bool:
-    """One step and its report; True when SOLVED."""
-    r = step(model, work, options, x, u, out, hard, smooth)
-    report[0] = r.status
-    report[1] = r.iterations
-    report[2] = r.residual
-    report[3] = r.violation
-    report[4] = -1.0
-    if hard is not None and r.status != _SOLVED:
-        report[4] = worst_contact(model, work, options.kappa)
-    return r.status == _SOLVED
 
 
 @kernel
@@ -67,36 +53,11 @@ def roll(
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
     for t in range(us.shape[0]):
-        if not reported_step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard, smooth):
+        if step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard, smooth) != _SOLVED:
             return t
         if hard is not None:
             report_contacts(model, work, contacts[t])
     return us.shape[0]
-
-
-@kernel
-def _knot(
-    model: Model,
-    work: Work,
-    options: Options,
-    substeps: int,
-    x: Vector,
-    u: Vector,
-    out: Vector,
-    report: Vector,
-    hard: int | None,
-    smooth: int | None,
-) -> bool:
-    """out = state after `substeps` steps with u held."""
-    for k in range(x.shape[0]):
-        out[k] = x[k]
-    for _ in range(substeps):
-        a = work.step_x[0]
-        for k in range(x.shape[0]):
-            a[k] = out[k]
-        if not reported_step(model, work, options, a, u, out, report, hard, smooth):
-            return False
-    return True
 
 
 @kernel
@@ -136,20 +97,25 @@ def closed_loop(
     for t in range(us.shape[0]):
         state_difference(model, xs_ref[t], xs[t], dx[:ndx])
         for j in range(us.shape[1]):
-            a = us[t, j] + alpha * ks[t, j]
+            f = us[t, j] + alpha * ks[t, j]
             K = Ks[t, j]
             for k in range(ndx):
-                a += K[k] * dx[k]
-            u_out[t, j] = min(max(a, low[j]), high[j])
-        if not _knot(model, work, options, substeps, xs[t], u_out[t], xs[t + 1], report, hard, smooth):
-            return t
+                f += K[k] * dx[k]
+            u_out[t, j] = min(max(f, low[j]), high[j])
+        b = xs[t + 1]
+        for k in range(x.shape[0]):
+            b[k] = xs[t, k]
+        for _ in range(substeps):
+            for k in range(x.shape[0]):
+                work.step_x[0, k] = b[k]
+            if step(model, work, options, work.step_x[0], u_out[t], b, report, hard, smooth) != _SOLVED:
+                return t
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * gaps[t + 1, k]
-            a = work.step_x[0]
             for k in range(x.shape[0]):
-                a[k] = xs[t + 1, k]
-            integrate_state(model, a, dx[:ndx], xs[t + 1])
+                work.step_x[0, k] = b[k]
+            integrate_state(model, work.step_x[0], dx[:ndx], b)
     return us.shape[0]
 
 
@@ -203,20 +169,17 @@ def linearize(
     options = _options(settings)
     for k in range(x.shape[0]):
         x_next[k] = x[k]
+    nq = work.theta1.shape[0]
     for s in range(substeps):
         a = work.step_x[0]
         for k in range(x.shape[0]):
             a[k] = x_next[k]
-        r = step_with_gradient(model, work, options, a, u, x_next, work.step_A, work.step_B, hard, smooth)
-        report[0] = r.status
-        report[1] = r.iterations
-        report[2] = r.residual
-        report[3] = r.violation
-        report[4] = -1.0
-        if r.status != _SOLVED:
-            if hard is not None:
-                report[4] = worst_contact(model, work, options.kappa)
-            return r.status
+        status = step(model, work, options, a, u, x_next, report, hard, smooth)
+        if status != _SOLVED:
+            return status
+        if not gradient(model, work, options.h, options.kappa, a[:nq], a[nq:], work.step_A, work.step_B, hard):
+            report[0] = _SINGULAR
+            return _SINGULAR
         if s > 0:
             _chain(work, A, B)
             continue
@@ -255,7 +218,7 @@ def linearize_knots(
 
 
 @kernel
-def _roll_status(
+def _roll_one(
     floats: Vector,
     ints: Integers,
     buffer: Vector,
@@ -273,9 +236,9 @@ def _roll_status(
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
     for t in range(us.shape[0]):
-        r = step(model, work, options, xs[t], us[t], xs[t + 1], hard, smooth)
-        if r.status != _SOLVED:
-            return r.status, t
+        status = step(model, work, options, xs[t], us[t], xs[t + 1], work.report, hard, smooth)
+        if status != _SOLVED:
+            return status, t
     return _SOLVED, us.shape[0]
 
 
@@ -298,4 +261,4 @@ def roll_batch(
     chunks = buffers.shape[0]
     for c in prange(chunks):
         for i in range(c * n // chunks, (c + 1) * n // chunks):
-            status[i], knots[i] = _roll_status(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard, smooth)
+            status[i], knots[i] = _roll_one(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard, smooth)

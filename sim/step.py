@@ -1,41 +1,48 @@
-"""One time step, and the derivatives of one step. This is the table of contents of the physics."""
+"""One time step. This is the table of contents of the physics."""
 
 from __future__ import annotations
 
 from sim.dynamics import begin_step
-from sim.gradients import gradient
+from sim.inequalities import worst_contact
 from sim.interior_point import interior_point
-from sim.model import Matrix, Model, Options, Outcome, Vector, Work
-from sim.newton import newton
+from sim.model import Model, Options, Outcome, Vector, Work
+from sim.newton import newton, outruns_inertia
 from solvers.jit import kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
-_SINGULAR = int(Status.SINGULAR)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 
 
 @kernel
 def step(
-    model: Model, work: Work, options: Options, x: Vector, u: Vector, out: Vector, hard: int | None, smooth: int | None
-) -> Outcome:
-    """out = state after one step from x = (q, v) under the input u.
+    model: Model,
+    work: Work,
+    options: Options,
+    x: Vector,
+    u: Vector,
+    out: Vector,
+    report: Vector,
+    hard: int | None,
+    smooth: int | None,
+) -> int:
+    """out = state after one step from x = (q, v) under the input u; returns the Status.
 
+    report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
+    last iterate when the status is not SOLVED; nobody must use it.
     Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of scenes
     with contacts or limits, Newton's method of scenes without.
-    out holds the last iterate when the status is not SOLVED; nobody must use it.
     """
     nq = work.theta1.shape[0]
     q = x[:nq]
     v = x[nq:]
-    if not begin_step(model, work, options.h, q, v, u):
-        return Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
-    result = Outcome(_NOT_FINITE, 0, 1e300, 0.0)
-    if smooth is not None:
-        result = newton(model, work, options, q, v, u)
-    if hard is not None:
-        result = interior_point(model, work, options, q, v, u)
+    r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
+    if begin_step(model, work, options.h, q, v, u):
+        if smooth is not None:
+            r = newton(model, work, options, q, v, u)
+        if hard is not None:
+            r = interior_point(model, work, options, q, v, u)
     total = 0.0
     for k in range(nq):
         out[k] = work.theta3[k]
@@ -43,29 +50,17 @@ def step(
     for k in range(v.shape[0]):
         out[nq + k] = work.nu[k]
         total += out[nq + k]
-    if result.status == _SOLVED and not abs(total) < 1e300:
-        return Outcome(_NOT_FINITE, result.iterations, result.residual, result.violation)
-    return result
-
-
-@kernel
-def step_with_gradient(
-    model: Model,
-    work: Work,
-    options: Options,
-    x: Vector,
-    u: Vector,
-    out: Vector,
-    A: Matrix,
-    B: Matrix,
-    hard: int | None,
-    smooth: int | None,
-) -> Outcome:
-    """`step`, then A = d(out)/dx (2 nv, 2 nv) and B = d(out)/du (2 nv, nu) in tangent coordinates."""
-    result = step(model, work, options, x, u, out, hard, smooth)
-    if result.status != _SOLVED:
-        return result
-    nq = work.theta1.shape[0]
-    if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], A, B, hard):
-        return Outcome(_SINGULAR, result.iterations, result.residual, result.violation)
-    return result
+    status = r.status
+    if not abs(total) < 1e300:
+        status = _NOT_FINITE
+    report[1] = r.iterations
+    report[2] = r.residual
+    report[3] = r.violation
+    report[4] = -1.0
+    if status != _SOLVED and r.iterations > 0:
+        if hard is not None:
+            report[4] = worst_contact(model, work, options.kappa)
+        if outruns_inertia(model, work, options.h, q, v):
+            status = _ANGULAR_STEP
+    report[0] = status
+    return status

@@ -72,9 +72,7 @@ class System:
                 return None
         return x
 
-    def closed_loop(
-        self, x0, us, xs=None, ks=None, Ks=None, gaps=None, alpha=1.0, limits=None, substeps=1, kappa=None
-    ):
+    def closed_loop(self, x0, us, xs=None, ks=None, Ks=None, gaps=None, alpha=1.0, limits=None, substeps=1, kappa=None):
         T = len(us)
         x, u = np.full((T + 1, self.nx), np.nan), np.full((T, self.nu), np.nan)
         x[0] = x0

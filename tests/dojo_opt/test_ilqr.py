@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import ControlBounds, Goal, StateBounds
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.planner import Solver, ilqr
 from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
+from dojo_opt.planner import Solver, ilqr
 from dojo_opt.problem import Problem
 from solvers.status import MESSAGES, Status
 
@@ -86,7 +86,9 @@ def test_swing_up_with_goal_and_limits():
 
 
 def test_attitude_goal_is_reached_through_the_tangent_space():
-    target = np.concatenate([[1.0, 2.0, 3.0], Rotation.from_rotvec([1.0, -2.0, 0.5]).as_quat(scalar_first=True), np.zeros(6)])
+    target = np.concatenate(
+        [[1.0, 2.0, 3.0], Rotation.from_rotvec([1.0, -2.0, 0.5]).as_quat(scalar_first=True), np.zeros(6)]
+    )
     start = np.concatenate([np.zeros(3), [1.0, 0.0, 0.0, 0.0], np.zeros(6)])
     problem = Problem(FreeBody(), start, 8, cost=[Tracking(target, 1.0), Effort(0.01)], constraints=[Goal(target)])
     plan = ilqr(problem)

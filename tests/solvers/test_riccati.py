@@ -1,4 +1,4 @@
-"""The backward pass against a slow NumPy recursion, a dense solve of the whole horizon, and SciPy's Riccati solution."""
+"""The backward pass against a slow NumPy recursion, a dense solve of the horizon, and SciPy's Riccati solution."""
 
 import numpy as np
 import pytest
@@ -107,7 +107,9 @@ def test_gains_converge_to_the_riccati_solution():
     H[:, :n, :n] = Qx
     H[:T, n:, n:] = R
     free = np.full((T, m), np.inf)
-    model = Quadratic(np.tile(A, (T, 1, 1)), np.tile(B, (T, 1, 1)), np.zeros((T + 1, n + m)), H, np.zeros((T + 1, n)), -free, free)
+    model = Quadratic(
+        np.tile(A, (T, 1, 1)), np.tile(B, (T, 1, 1)), np.zeros((T + 1, n + m)), H, np.zeros((T + 1, n)), -free, free
+    )
     _, K, _ = run(model)
     P = solve_discrete_are(A, B, Qx, R)
     np.testing.assert_allclose(K[0], -np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A), rtol=1e-9, atol=1e-10)

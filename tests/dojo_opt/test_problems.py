@@ -1,0 +1,55 @@
+"""The reference problems with the default settings, held to the numbers that they are published with."""
+
+import numpy as np
+import pytest
+
+from dojo_opt import problems
+from dojo_opt.planner import ilqr
+
+pytestmark = pytest.mark.slow
+
+
+def replayed(problem, plan, kappa):
+    """The plan under its own gains on a harder contact."""
+    shot = problem.sim.closed_loop(problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=problem.substeps, kappa=kappa)
+    assert shot.status == 0
+    return problem.violation(shot.x, shot.u)
+
+
+@pytest.mark.parametrize("substeps, iterations, cost", [(1, 35, 5.6), (5, 50, 5.9)])
+def test_hop(substeps, iterations, cost):
+    problem = problems.hop(substeps=substeps)
+    plan = ilqr(problem)
+    assert plan.success, plan.summary()
+    assert plan.nit <= iterations and plan.fun <= cost
+    assert plan.violation <= 1e-3 and replayed(problem, plan, 1e-8) <= 2e-3
+    assert plan.x[:, 2].max() > 0.75
+
+
+def test_hop_to_random_targets():
+    targets = np.random.default_rng(42).uniform(-0.6, 0.6, size=(10, 2))
+    plans = [ilqr(problems.hop(target=target)) for target in targets]
+    assert all(plan.success for plan in plans), [plan.message for plan in plans]
+    assert np.median([plan.nit for plan in plans]) <= 26
+
+
+@pytest.mark.parametrize("goal, iterations, cost", [("right", 30, 9.1), ("up", 20, 14.0)])
+def test_block(goal, iterations, cost):
+    problem = problems.block(goal)
+    plan = ilqr(problem)
+    assert plan.success, plan.summary()
+    assert plan.nit <= iterations and plan.fun <= cost
+    assert plan.violation <= 1e-3 and replayed(problem, plan, 1e-8) <= 2e-3
+
+
+@pytest.mark.parametrize("name", ["pendulum", "cartpole", "acrobot"])
+def test_swingup(name):
+    plan = ilqr(problems.swingup(name))
+    assert plan.success and plan.violation <= 1e-3
+
+
+def test_unknown_names():
+    with pytest.raises(ValueError, match='expected "right" or "up", got \'left\''):
+        problems.block("left")
+    with pytest.raises(ValueError, match="expected .* got 'octopus'"):
+        problems.swingup("octopus")
