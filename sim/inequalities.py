@@ -38,8 +38,9 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
 def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth: float) -> float:
     """All cone variables on the central path of one kappa0, at the present gaps and slips; returns kappa0.
 
-    growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h (the impulse m d/h that stops it, over the
-    distance), at least 0.01 N s m and kappa; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
+    growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h
+    (the impulse m d/h that stops it, over the distance), at least 0.01 N s m and kappa; slacks start at the gaps, at
+    least d/2 and sqrt(kappa0)/10.
     """
     k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0

@@ -3,10 +3,12 @@
 Three things decide (20,000 random extreme states, `benchmarks/robustness.py`):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
-  beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay positive. Conic scalings jam on thin cones.
-* The start is on the central path, at a kappa that belongs to the predicted overlap.
+  beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
+  positive. Conic scalings jam on thin cones.
+* The start is on the central path: of kappa itself where that balances, else of a kappa0 fit for the predicted overlap.
 * When the boundary or the line search allow only a short step, or nothing has converged for a while, the method does
-  not creep: it starts again on the central path, at a larger kappa, from rest, half the incoming velocity, or all of it.
+  not creep: it starts again on the central path, at a larger kappa, from rest, half the incoming velocity, or all of
+  it.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ from sim.inequalities import (
     move_inequalities,
     products,
     products_ahead,
-    slip_error,
     recover_inequalities,
+    slip_error,
     start_inequalities,
 )
 from sim.joints import joint_blocks, joint_impulses
@@ -58,6 +60,16 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
     joint_impulses(model, work, h, q, v, u)
     apply_limits(model, work)
     return norm(work.residual), e
+
+
+@kernel
+def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float) -> bool:
+    """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular."""
+    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+    momentum_balance_jacobian(model, work, h, work.A)
+    joint_blocks(model, work, h, q, v)
+    condense_inequalities(model, work, h, smoothing)
+    return factor(model, work)
 
 
 @kernel
@@ -200,11 +212,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         last_r = r
         last_violation = violation
         iterations += 1
-        velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-        momentum_balance_jacobian(model, work, h, work.A)
-        joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing)
-        if not factor(model, work):
+        if not linearize_step(model, work, h, q, v, smoothing):
             status = _SINGULAR
             break
         alpha = direction(model, work, h, kappa, mean)

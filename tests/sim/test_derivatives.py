@@ -9,9 +9,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from jacobians import check_jacobian
 from naive import rotation as rot
 from scenes import KINDS, LAWS, ball, block, chain, gaps, pendulum, random_state, slider
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
 
