@@ -40,7 +40,7 @@ def ours(heights: Vector, kappa: float) -> tuple[Vector, Vector]:
     body = dojo.Body("ball", 1.0, inertia=np.full(3, 0.4 * RADIUS**2))
     contact = dojo.Contact("ball", radius=RADIUS)
     mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")], [contact])
-    sim = dojo.Simulator(mech, time_step=H, kappa=kappa)
+    sim = dojo.Simulator(mech, time_step=H, kappa=kappa, tolerance=1e-11)
     velocity, gradient = np.empty_like(heights), np.empty_like(heights)
     for i, height in enumerate(heights):
         x = np.r_[0.0, 0.0, RADIUS + height, 1.0, np.zeros(5), -SPEED, np.zeros(3)]
@@ -83,16 +83,21 @@ def draw(heights: Vector, curves: dict[str, tuple[Vector, Vector]], path: Path) 
             look = {"color": next(colours), "linewidth": 2.0, "zorder": 2}
         top.plot(1e3 * heights, velocity, label=label, **look)
         bottom.plot(1e3 * heights, gradient, label=label, **look)
+    reach = 1e3 * H * (SPEED + 9.81 * H)
     for axis in (top, bottom):
-        axis.axvline(1e3 * H * (SPEED + 9.81 * H), color="0.85", zorder=0)
+        axis.axvline(reach, color="0.8", zorder=0)
         axis.grid(alpha=0.25)
+    top.text(reach + 0.5, 0.6, "below this height\nthe step reaches\nthe ground", fontsize=9, color="0.35", va="top")
     top.set_ylabel("velocity after the step [m/s]")
     top.set_title(f"A ball falls at {SPEED:g} m/s; one step of {1e3 * H:g} ms", fontsize=11)
-    top.legend(fontsize=9)
     bottom.set_ylabel("d velocity / d height [1/s]")
     bottom.set_xlabel("height of the ball above the ground before the step [mm]")
-    hard = np.concatenate([g for label, (_, g) in curves.items() if not label.startswith("MuJoCo")])
-    bottom.set_ylim(1.3 * min(hard.min(), -1.0 / H), max(0.3 / H, 1.3 * hard.max()))
+    bottom.set_ylim(-1.3 / H, 0.2 / H)
+    bottom.legend(fontsize=9, loc="lower right")
+    cut = [f"{label}: {g.min():,.0f}" for label, (_, g) in curves.items() if g.min() < -1.3 / H]
+    if cut:
+        note = "outside the frame, lowest values\n" + "\n".join(cut)
+        bottom.text(0.8, -0.06 / H, note, fontsize=8, color="0.35", va="top")
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
@@ -104,7 +109,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--points", type=int, default=401)
     args = parser.parse_args(argv)
     heights = np.linspace(-0.01, 0.05, args.points)
-    curves = {f"kappa = {kappa:.0e}": ours(heights, kappa) for kappa in KAPPAS}
+    curves = {f"dojo-opt, kappa {kappa:g}": ours(heights, kappa) for kappa in KAPPAS}
     try:
         curves |= {label: mujoco_ball(heights, *options) for label, options in MUJOCO.items()}
     except ImportError:

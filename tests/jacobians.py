@@ -27,6 +27,7 @@ def differences(f: Callable[[Vector], Vector], n: int) -> tuple[Vector, Vector]:
     for direction in np.eye(n):
         ladder = [five_point(f, direction, step) for step in STEPS]
         change = [np.abs(b - a).max() for a, b in zip(ladder[:-1], ladder[1:], strict=True)]
+        assert not np.isnan(change).all(), "the function could not be evaluated around the point"
         best = int(np.nanargmin(change))
         columns.append(ladder[best + 1])
         doubts.append(change[best])

@@ -32,7 +32,9 @@ def block(side=0.5, mass=1.0, friction=0.5, law="nonlinear", gravity=(0.0, 0.0, 
 def ball(radius=0.1, mass=1.0, friction=0.5, law="nonlinear", gravity=(0.0, 0.0, -9.81)) -> dojo.Mechanism:
     """A solid sphere on the ground z = 0, pushed by a force and a torque at its centre."""
     body = dojo.Body("ball", mass, inertia=np.full(3, 0.4 * mass * radius**2))
-    inputs = [dojo.Input(body="ball", force=e) for e in np.eye(3)] + [dojo.Input(body="ball", torque=e) for e in np.eye(3)]
+    inputs = [dojo.Input(body="ball", force=e) for e in np.eye(3)] + [
+        dojo.Input(body="ball", torque=e) for e in np.eye(3)
+    ]
     return dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")],
                           [dojo.Contact("ball", radius=radius, friction=friction, law=law)], inputs, gravity)  # fmt: skip
 

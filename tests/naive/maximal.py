@@ -15,7 +15,14 @@ import numpy as np
 
 from naive import rotation as rot
 from naive.lagrangian import (
-    TINY, Poses, arriving_momentum, constraints, displacements, leaving_momentum, spring_impulse, varied,
+    TINY,
+    Poses,
+    arriving_momentum,
+    constraints,
+    displacements,
+    leaving_momentum,
+    spring_impulse,
+    varied,
 )  # fmt: skip
 from naive.rotation import Array
 from naive.scene import BODY, IMPACT, JOINT, LINEAR, Contact, Limit, Scene, advance, poses

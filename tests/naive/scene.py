@@ -169,7 +169,9 @@ def from_mechanism(mech: Any) -> Scene:
             limits += [Limit(dof[j.name] + k, s, b) for s, b in zip((1.0, -1.0), bounds, strict=True) if np.isfinite(b)]
     laws = {"impact": IMPACT, "linear": LINEAR, "nonlinear": NONLINEAR}
     contacts = [
-        Contact(names.index(c.body), np.array(c.point), c.radius, c.friction, laws[c.law], contact_frame(c.normal), c.height)
+        Contact(
+            names.index(c.body), np.array(c.point), c.radius, c.friction, laws[c.law], contact_frame(c.normal), c.height
+        )
         for c in mech.contacts
     ]
     inputs = []

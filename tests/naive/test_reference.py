@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+
 from naive import lagrangian as lag
 from naive import rotation as rot
 from naive import samples
 from naive.maximal import Step, jacobian, solve
 from naive.scene import IMPACT, LINEAR, NONLINEAR, Scene, advance, poses
-from scipy.integrate import solve_ivp
 
 
 def simulate(scene: Scene, q, v, h: float, steps: int, kappa: float = 1e-6):

@@ -26,7 +26,7 @@ def test_step_commutes_with_yaw_and_shift(rng):
             u = rng.normal(size=sim.nu)
             a = moved(sim.step(x, u).x, sim.nq, shift, 0.7)
             b = sim.step(moved(x, sim.nq, shift, 0.7), u).x
-            np.testing.assert_allclose(sim.difference(a, b), 0.0, atol=1e-8)
+            np.testing.assert_allclose(sim.difference(x1=a, x0=b), 0.0, atol=1e-8)
 
 
 def test_sign_of_a_quaternion_does_not_matter(rng):
@@ -36,4 +36,4 @@ def test_sign_of_a_quaternion_does_not_matter(rng):
     flipped[3:7] *= -1.0
     flipped[7:11] *= -1.0
     u = rng.normal(size=sim.nu)
-    np.testing.assert_allclose(sim.difference(sim.step(x, u).x, sim.step(flipped, u).x), 0.0, atol=1e-10)
+    np.testing.assert_allclose(sim.difference(x1=sim.step(x, u).x, x0=sim.step(flipped, u).x), 0.0, atol=1e-10)

@@ -75,7 +75,9 @@ def test_block(law, kappa, rng):
 def hopper(law="nonlinear"):
     """Body and foot on a sliding leg with spring, damper and limits; a force at the body, torques in its axes."""
     bodies = [dojo.Body("body", 4.18, np.full(3, 0.017)), dojo.Body("foot", 0.52, np.full(3, 5e-4))]
-    leg = dojo.Joint("prismatic", "body", "foot", axis=(0, 0, -1), spring=200.0, damper=0.1, rest=0.5, limits=(0.2, 0.6))
+    leg = dojo.Joint(
+        "prismatic", "body", "foot", axis=(0, 0, -1), spring=200.0, damper=0.1, rest=0.5, limits=(0.2, 0.6)
+    )
     contacts = [dojo.Contact("foot", radius=0.05, law=law), dojo.Contact("body", radius=0.1, law=law)]
     inputs = [dojo.Input("foot"), dojo.Input(body="body", torque=(1, 0, 0), frame="body"),
               dojo.Input(body="body", force=(0, 1, 0), torque=(0, 0, 0.3))]  # fmt: skip
