@@ -33,7 +33,9 @@ def test_stopping_distance(angle):
 
 
 def test_distance_converges_to_the_formula():
-    errors = [abs(np.linalg.norm(slide(0.3, h)[1][-1, :2]) - SPEED**2 / (2.0 * FRICTION * G)) for h in (0.02, 0.01, 0.005)]
+    errors = [
+        abs(np.linalg.norm(slide(0.3, h)[1][-1, :2]) - SPEED**2 / (2.0 * FRICTION * G)) for h in (0.02, 0.01, 0.005)
+    ]
     assert errors[0] > 1.8 * errors[1] > 3.2 * errors[2], errors
 
 
