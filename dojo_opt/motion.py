@@ -49,12 +49,12 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     z = sim.maximal(x)
     return Motion(
         mechanism=sim.mechanism,
-        time=sim.time_step * substeps * np.arange(len(x)),
+        time=sim.time_step * substeps * np.arange(len(x), dtype=np.float64),
         x=x,
         u=u,
         position=z[:, :, 0:3],
         quaternion=z[:, :, 6:10],
-        contact_time=sim.time_step * np.arange(1, len(normal) + 1),
+        contact_time=sim.time_step * np.arange(1, len(normal) + 1, dtype=np.float64),
         normal_force=normal,
         friction_force=friction,
     )

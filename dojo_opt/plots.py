@@ -51,9 +51,9 @@ def trajectory(
 
 
 def state(m: Motion, ax: Axes) -> Axes:
-    """Coordinates over time; the orientation of a quaternion joint as its rotation vector."""
+    """Coordinates that change, over time; the orientation of a quaternion joint as its rotation vector."""
     for label, values in _coordinates(m):
-        if np.ptp(values) > 1e-9 or len(m.mechanism.joints) == 1:
+        if np.ptp(values) > 1e-4 or m.mechanism.nv == 1:
             ax.plot(m.time, values, label=label)
     return _finish(ax, "coordinates [m, rad]", "time [s]")
 
@@ -76,15 +76,15 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Mean normal force over each step of every contact that carries load, and the size of its friction force, dashed."""
+    """Mean normal force over each step of every contact with load, and the size of its friction force, dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
     for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
         name = m.mechanism.contact_names[k]
-        line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=f"{name}, normal")
-        style = {"linestyle": "--", "color": line.get_edgecolor()}
-        ax.stairs(m.friction_force[:, k], edges, baseline=None, label=f"{name}, friction", **style)
-    return _finish(ax, "contact forces [N]", "time [s]")
+        line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name)
+        friction = ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle="--")
+        friction.set_edgecolor(line.get_edgecolor())
+    return _finish(ax, "contact forces [N] (dashed: friction)", "time [s]")
 
 
 def paths(m: Motion, ax: Axes) -> Axes:

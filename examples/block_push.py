@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import dojo_opt as dojo
 
-figure = Figure(figsize=(9, 7), layout="constrained")
+figure = Figure(figsize=(15, 6.5), layout="constrained")
 columns = figure.subfigures(1, 2)
 
 for goal, column in zip(("right", "up"), columns, strict=True):

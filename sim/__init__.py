@@ -1,0 +1,1 @@
+"""One mechanism, one time step, and the derivatives of that step. Imports `solvers` only."""

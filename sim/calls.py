@@ -71,7 +71,17 @@ class Calls:
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.ncontact, CONTACT))
         knot = rollout.roll(
-            self.floats, self.ints, self._work(), self.settings.array(), x, us, xs, reports, contacts, self.hard, self.smooth
+            self.floats,
+            self.ints,
+            self._work(),
+            self.settings.array(),
+            x,
+            us,
+            xs,
+            reports,
+            contacts,
+            self.hard,
+            self.smooth,
         )
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
@@ -130,7 +140,9 @@ class Calls:
         A, B = np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu))
         x_next, report = np.zeros(self.nx), np.zeros(REPORT)
         settings = self.settings.array(kappa)
-        rollout.linearize(self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard, self.smooth)
+        rollout.linearize(
+            self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard, self.smooth
+        )
         return A, B, x_next, report
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:

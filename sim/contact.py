@@ -6,8 +6,8 @@
 The impulse f = n gamma + T^T beta acts at r from the centre of mass, as the wrench (f, r x f) in world axes (expressing
 the torque in the frame of configuration 3, as Dojo does, breaks angular momentum at O(h |omega|)).
 
-Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, 9:18 rows of the Jacobian of (gap, slip) by the rotation about O.
-Its columns for the translation are n, T/h.
+Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, 9:18 rows of the Jacobian of (gap, slip) by the rotation
+about O. Its columns for the translation are n, T/h.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
 
 
 @kernel
-def add_contact_matrix(model: Model, work: Work, h: float, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+def add_contact_matrix(
+    model: Model, work: Work, h: float, c: int, fn: float, f1: float, f2: float, out: Matrix
+) -> None:
     """out[body] -= B^T W C + geometric term, about O (accumulated):
 
     C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench;

@@ -4,16 +4,16 @@ Discrete Lagrangian of one body over an interval with rotation (c, s), c = cos(a
 
     L_d = m |x3 - x2|^2 / (2 h) + (2/h) s.J s psi(c) - (h/2) (V(2) + V(3)),      psi(c) = 2/3 + 1/(3 c^2)
 
-psi = 1 is Dojo's Lagrangian (Howell et al. 2022), whose angular momentum J sin(angle)/h cannot exceed J/h, so that a fast
-body may have no next state; psi = 1/c^2 is the Cayley map's. The blend cancels their leading errors (rotation about a
-fixed axis is right to fourth order) and keeps the barrier at a half turn: every momentum has a next state.
+psi = 1 is Dojo's Lagrangian (Howell et al. 2022), whose angular momentum J sin(angle)/h cannot exceed J/h, so that a
+fast body may have no next state; psi = 1/c^2 is the Cayley map's. The blend cancels their leading errors (rotation
+about a fixed axis is right to fourth order) and keeps the barrier at a half turn: every momentum has a next state.
 """
 
 from __future__ import annotations
 
 from sim.kinematics import displace, tree_poses
 from sim.model import InputKind, Matrix, Model, Vector, Work
-from sim.rotation import Mat3, Vec3, cross, quat_turn, rotate
+from sim.rotation import Mat3, Vec3, quat_turn, rotate
 from solvers.jit import kernel
 
 _WORLD = int(InputKind.WORLD)
@@ -22,7 +22,9 @@ _JOINT = int(InputKind.JOINT)
 
 
 @kernel
-def spin(J: Matrix, i: int, c: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float, float, float]:
+def spin(
+    J: Matrix, i: int, c: float, x: float, y: float, z: float
+) -> tuple[float, float, float, float, float, float, float]:
     """m = c J s + s x J s,  k = s.J s  and J s, for s = (x, y, z): returns (m, J s, k) as seven numbers."""
     jx, jy, jz = rotate(J, i, x, y, z)
     k = x * jx + y * jy + z * jz
@@ -200,7 +202,11 @@ def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
         fx = m * (work.pos3[i, 0] - work.pos2[i, 0]) - work.momentum_in[i, 0]
         fy = m * (work.pos3[i, 1] - work.pos2[i, 1]) - work.momentum_in[i, 1]
         fz = m * (work.pos3[i, 2] - work.pos2[i, 2]) - work.momentum_in[i, 2]
-        dx, dy, dz = work.pos2[i, 0] - work.origin[0], work.pos2[i, 1] - work.origin[1], work.pos2[i, 2] - work.origin[2]
+        dx, dy, dz = (
+            work.pos2[i, 0] - work.origin[0],
+            work.pos2[i, 1] - work.origin[1],
+            work.pos2[i, 2] - work.origin[2],
+        )
         work.balance[i, 0] = fx
         work.balance[i, 1] = fy
         work.balance[i, 2] = fz

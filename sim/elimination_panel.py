@@ -51,27 +51,39 @@ def _apply_block(model: Model, work: Work, i: int, sign: float, rows: Matrix, fi
 
 
 @kernel
-def solve_panel(model: Model, work: Work) -> None:
-    """columns := H^-1 columns, as `solve` for one right-hand side."""
+def _clear_rows(P: Matrix, first: int, count: int) -> None:
+    """P[first + r] = 0, r < count."""
+    for r in range(first, first + count):
+        p = P[r]
+        for k in range(p.shape[0]):
+            p[k] = 0.0
+
+
+@kernel
+def _copy_rows(P: Matrix, first: int, count: int, source: Matrix, start: int) -> None:
+    """P[first + r] = source[start + r], r < count."""
+    for r in range(count):
+        p = P[first + r]
+        v = source[start + r]
+        for k in range(p.shape[0]):
+            p[k] = v[k]
+
+
+@kernel
+def _panel_up(model: Model, work: Work) -> None:
+    """From the leaves to the root: columns = D^-1 (columns - S2^T p), p_parent += p + U columns."""
     nbody = model.body_parent.shape[0]
     X = work.columns
     P = work.panel
     last = 6 * nbody
-    for r in range(last):
-        p = P[r]
-        for k in range(p.shape[0]):
-            p[k] = 0.0
+    _clear_rows(P, 0, last)
     for i in range(nbody - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         q = model.body_parent[i]
         for d in range(d0, d0 + n):
             _rows_minus(work.S2, d, P, 6 * i, X)
-        for a in range(n):
-            x = X[d0 + a]
-            s = P[last + a]
-            for k in range(x.shape[0]):
-                s[k] = x[k]
+        _copy_rows(P, last, n, X, d0)
         _apply_block(model, work, i, 1.0, P, last, False)
         if q >= 0:
             for d in range(d0, d0 + n):
@@ -81,33 +93,31 @@ def solve_panel(model: Model, work: Work) -> None:
                 s = P[6 * q + r]
                 for k in range(p.shape[0]):
                     s[k] += p[k]
+
+
+@kernel
+def solve_panel(model: Model, work: Work) -> None:
+    """columns := H^-1 columns, as `solve` for one right-hand side."""
+    _panel_up(model, work)
+    nbody = model.body_parent.shape[0]
+    P = work.panel
+    last = 6 * nbody
     for i in range(nbody):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         q = model.body_parent[i]
-        for r in range(6):
-            p = P[6 * i + r]
-            if q >= 0:
-                s = P[6 * q + r]
-                for k in range(p.shape[0]):
-                    p[k] = s[k]
-            else:
-                for k in range(p.shape[0]):
-                    p[k] = 0.0
-        if q >= 0:
+        if q < 0:
+            _clear_rows(P, 6 * i, 6)
+        else:
+            _copy_rows(P, 6 * i, 6, P, 6 * q)
+            _clear_rows(P, last, n)
             for a in range(n):
                 s = P[last + a]
-                for k in range(s.shape[0]):
-                    s[k] = 0.0
-            for a in range(n):
-                L = work.L[d0 + a]
-                s = P[last + a]
-                v = P[6 * i]
                 for r in range(6):
+                    g = work.L[d0 + a, r]
                     v = P[6 * i + r]
-                    g = L[r]
                     for k in range(s.shape[0]):
                         s[k] += g * v[k]
             _apply_block(model, work, i, -1.0, P, last, True)
         for d in range(d0, d0 + n):
-            _add_rows(work.S3nu, d, X, P, 6 * i)
+            _add_rows(work.S3nu, d, work.columns, P, 6 * i)

@@ -238,10 +238,6 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float) -> None:
         q[1] = -i * (k[2] + b2 * g)
         q[2] = i * (b0 * k[1] + psi * z[2])
         q[3] = i * (b0 * k[2] + psi * z[3])
-        g = i * (1.0 + a / r) / (2.0 * b0)  # dpsi/dkappa / psi
-        q[4] = g * z[2]
-        q[5] = g * z[3]
-        q[6] = kappa
         W[3] = mu * W[0] * q[0]
         W[6] = mu * W[0] * q[1]
     elif law == _LINEAR:
@@ -284,9 +280,8 @@ def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     w[2] = 0.0
     law = law_of(model, c)
     if law == _NONLINEAR:
-        t = kappa - q[6]
-        w[1] = mu * g0 * q[0] - q[2] - t * q[4]
-        w[2] = mu * g0 * q[1] - q[3] - t * q[5]
+        w[1] = mu * g0 * q[0] - q[2]
+        w[2] = mu * g0 * q[1] - q[3]
     elif law == _LINEAR:
         total = 0.0
         for e in range(4):

@@ -1,7 +1,7 @@
 """Derivatives of a step by the implicit function theorem: d(next state)/d(state, input) in tangent coordinates.
 
-The residual R(q2, v15, u, v25) = 0 of a converged step gives  dv25 = -H^-1 (R_q dq2 + R_v dv15 + R_u du).  On the central
-path the condensed contact matrices W are the exact derivatives of the impulses, so nothing but W is needed of contacts.
+The residual R(q2, v15, u, v25) = 0 of a converged step gives  dv25 = -H^-1 (R_q dq2 + R_v dv15 + R_u du).  On the
+central path the condensed contact matrices W are the exact derivatives of the impulses: nothing but W is needed.
 """
 
 from __future__ import annotations

@@ -35,11 +35,12 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth: float) -> None:
-    """All cone variables on the central path of one kappa0, at the present gaps and slips.
+def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth: float) -> float:
+    """All cone variables on the central path of one kappa0, at the present gaps and slips; returns kappa0.
 
-    growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h (the impulse m d/h that stops it, over the
-    distance), at least 0.01 N s m and kappa; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
+    growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h
+    (the impulse m d/h that stops it, over the distance), at least 0.01 N s m and kappa; slacks start at the gaps, at
+    least d/2 and sqrt(kappa0)/10.
     """
     k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
@@ -59,6 +60,7 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
         s = max(work.bound_gap[j], floor)
         work.bound[j, 0] = s
         work.bound[j, 1] = k0 / s
+    return k0
 
 
 @kernel
@@ -133,7 +135,7 @@ def recover_inequalities(model: Model, work: Work, h: float, share: float) -> No
 
 @kernel
 def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
-    """Mean of all complementarity products, and the largest violation of a law of the central path of kappa."""
+    """Mean of all complementarity products, and their largest distance from kappa."""
     total = 0.0
     count = 0.0
     violation = 0.0
@@ -141,13 +143,22 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
         t, n, low, high = contact_products(model, work, c)
         total += t
         count += n
-        violation = max(violation, high - kappa, kappa - low, slip_violation(model, work, c, kappa))
+        violation = max(violation, high - kappa, kappa - low)
     for k in range(model.limit_dof.shape[0]):
         t = work.bound[k, 0] * work.bound[k, 1]
         total += t
         count += 1.0
         violation = max(violation, abs(t - kappa))
     return total / count, violation
+
+
+@kernel
+def slip_error(model: Model, work: Work, kappa: float) -> float:
+    """Largest violation of the friction law of the central path of kappa, in units of kappa."""
+    e = 0.0
+    for c in range(model.contact_body.shape[0]):
+        e = max(e, slip_violation(model, work, c, kappa))
+    return e
 
 
 @kernel

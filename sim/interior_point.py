@@ -3,10 +3,12 @@
 Three things decide (20,000 random extreme states, `benchmarks/robustness.py`):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
-  beta by Newton (friction.py); only gaps and normal impulses have to stay positive. Conic scalings jam on thin cones.
-* The start is on the central path, at a kappa that belongs to the predicted overlap.
-* When the boundary or the line search allow only a short step, the method does not creep: it starts again on the
-  central path, at a larger kappa, from rest, then from half the incoming velocity, then from all of it.
+  beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
+  positive. Conic scalings jam on thin cones.
+* The start is on the central path: of kappa itself where that balances, else of a kappa0 fit for the predicted overlap.
+* When the boundary or the line search allow only a short step, or nothing has converged for a while, the method does
+  not creep: it starts again on the central path, at a larger kappa, from rest, half the incoming velocity, or all of
+  it.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from sim.inequalities import (
     products,
     products_ahead,
     recover_inequalities,
+    slip_error,
     start_inequalities,
 )
 from sim.joints import joint_blocks, joint_impulses
@@ -41,6 +44,7 @@ _SINGULAR = int(Status.SINGULAR)
 
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _RESTART_GROWTH = 3.0  # of the starting kappa, per restart
+_PATIENCE = 30  # iterations of one attempt
 _HALVINGS = 12  # of the line search, then the step is taken as it is and counts as short
 
 
@@ -56,6 +60,16 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
     joint_impulses(model, work, h, q, v, u)
     apply_limits(model, work)
     return norm(work.residual), e
+
+
+@kernel
+def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float) -> bool:
+    """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular."""
+    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+    momentum_balance_jacobian(model, work, h, work.A)
+    joint_blocks(model, work, h, q, v)
+    condense_inequalities(model, work, h, smoothing)
+    return factor(model, work)
 
 
 @kernel
@@ -105,22 +119,35 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
 
 
 @kernel
-def start_on_path(
-    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, restarts: int
-) -> None:
-    """Start on the central path: of kappa itself where its impulses already balance better than those of a larger one.
+def balances_at_kappa(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> bool:
+    """Whether the incoming motion balances better with the impulses of kappa itself than with those of a larger start.
 
     The gap of a resting contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution.
     """
-    first = 0
-    if restarts == 0:
-        start_inequalities(model, work, options.h, options.kappa, 0.0)
-        hard, _ = residuals(model, work, options.h, q, v, u)
-        start_inequalities(model, work, options.h, options.kappa, 1.0)
-        soft, _ = residuals(model, work, options.h, q, v, u)
-        if not hard < soft:
-            first = 1
-    start_inequalities(model, work, options.h, options.kappa, _RESTART_GROWTH**restarts if restarts + first else 0.0)
+    start_inequalities(model, work, options.h, options.kappa, 0.0)
+    hard, _ = residuals(model, work, options.h, q, v, u)
+    start_inequalities(model, work, options.h, options.kappa, 1.0)
+    soft, _ = residuals(model, work, options.h, q, v, u)
+    return hard < soft
+
+
+@kernel
+def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, attempt: int) -> float:
+    """Start on the central path: attempt 0 at kappa itself or the usual kappa0, 1 the usual one, then ever larger ones.
+
+    nu is the incoming velocity at first; from attempt 2 on rest, half of it, all of it in turn.
+    Returns the kappa of the start, 0 if there is none.
+    """
+    share = 1.0
+    if attempt >= 2:
+        share = 0.0 if attempt % 3 == 2 else (0.5 if attempt % 3 == 0 else 1.0)
+    if not place(model, work, options.h, q, v, share):
+        return 0.0
+    inequality_kinematics(model, work, options.h)
+    growth = _RESTART_GROWTH ** max(attempt - 1, 0)
+    if attempt == 0 and balances_at_kappa(model, work, options, q, v, u):
+        growth = 0.0
+    return start_inequalities(model, work, options.h, options.kappa, growth)
 
 
 @kernel
@@ -135,8 +162,10 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
     scale = residual_scale(work)
     status = _MAX_ITERATIONS
     iterations = 0
-    restarts = 0
+    attempt = 0
+    patience = 0
     halvings = 0
+    smoothing = kappa
     starting = True
     alpha = 1.0
     r = 1e300
@@ -145,13 +174,11 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
     last_violation = 1e300
     while True:
         if starting:
-            share = 1.0 if restarts % 3 == 0 else (0.0 if restarts % 3 == 1 else 0.5)
-            if not place(model, work, h, q, v, share):
-                status = _NOT_FINITE
-                break
-            inequality_kinematics(model, work, h)
-            start_on_path(model, work, options, q, v, u, restarts)
-            inside = True
+            smoothing = start(model, work, options, q, v, u, attempt)
+            inside = smoothing > 0.0
+            patience = iterations + _PATIENCE
+            last_r = 1e300
+            last_violation = 1e300
         else:
             for d in range(v.shape[0]):
                 work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
@@ -160,6 +187,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
             move_inequalities(model, work, alpha)
         rd, re = residuals(model, work, h, q, v, u)
         mean, violation = products(model, work, kappa)
+        violation = max(violation, slip_error(model, work, smoothing))
         r = max(rd / scale, re)
         if not (r < 1e300 and violation < 1e300):
             inside = False
@@ -172,7 +200,10 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         if not inside:
             status = _NOT_FINITE
             break
-        if r < options.tolerance and violation < spread:
+        if smoothing > kappa and slip_error(model, work, smoothing) < 0.3 * smoothing:
+            smoothing = max(kappa, 0.1 * smoothing)
+            violation = max(violation, slip_error(model, work, smoothing))
+        if r < options.tolerance and violation < spread and smoothing <= kappa:
             status = _SOLVED
             break
         if iterations >= options.max_iterations:
@@ -181,20 +212,14 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         last_r = r
         last_violation = violation
         iterations += 1
-        velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-        momentum_balance_jacobian(model, work, h, work.A)
-        joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h, max(kappa, mean))
-        if not factor(model, work):
+        if not linearize_step(model, work, h, q, v, smoothing):
             status = _SINGULAR
             break
         alpha = direction(model, work, h, kappa, mean)
-        if alpha < _SHORT or halvings > 3:
-            restarts += 1
+        if alpha < _SHORT or halvings > 3 or iterations >= patience:
+            attempt += 1
             halvings = 0
             starting = True
-            last_r = 1e300
-            last_violation = 1e300
             continue
         halvings = 0
         alpha = min(1.0, (0.95 if max(r, violation) > 1e-3 else 0.99) * alpha)

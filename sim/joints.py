@@ -1,8 +1,8 @@
 """Joint-space terms of a step: springs, dampers and inputs, in the generalized residual and on the joint blocks.
 
-A spring is integrated at the midpoint of each interval, V_d = (h/2) k |(r(2) + r(3))/2|^2: as implicit as the trapezoidal
-rule, so stable for every k, and as conservative, so that a vibration keeps its amplitude. A damper acts on the unknown
-velocity, implicit and dissipative for every coefficient.
+A spring is integrated at the midpoint of each interval, V_d = (h/2) k |(r(2) + r(3))/2|^2: as implicit as the
+trapezoidal rule, so stable for every k, and as conservative, so that a vibration keeps its amplitude. A damper acts on
+the unknown velocity, implicit and dissipative for every coefficient.
 """
 
 from __future__ import annotations
@@ -91,7 +91,10 @@ def turn_product(a: Quat, b: Quat) -> Mat3:
 
 @kernel
 def joint_blocks(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
-    """joint_block[i] = d(joint impulses)/d(nu), n x n row-major: h d + h^2 k/4 on the diagonal, springs of quaternion joints."""
+    """joint_block[i] = d(joint impulses)/d(nu), n x n row-major.
+
+    h d + h^2 k/4 on the diagonal, and the springs of quaternion joints.
+    """
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d
@@ -119,7 +122,7 @@ def add_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vec
     """dR_dq, dR_dv += springs; dR_dv in unit columns, to be multiplied by -h and -h J(h v)^T like all others.
 
     scalar        h k and h k/4
-    quaternion    with M = c2 I - [s2], y = s1 + 2 s2 + s3 and ds = (c I + [s])/2 (right rotation) for each of s1, s2, s3,
+    quaternion    with M = c2 I - [s2], y = s1 + 2 s2 + s3 and ds = (c I + [s])/2 (right rotation) for each s,
                   d(M y) = M dy - (s2.e) y/2 + y x ds2; the turns R1, R3 carry a rotation e of q2 to configurations 1, 3
     """
     for i in range(model.body_parent.shape[0]):
@@ -133,9 +136,7 @@ def add_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vec
 
 
 @kernel
-def _quaternion_spring_derivatives(
-    model: Model, work: Work, h: float, q: Vector, v: Vector, i: int, e: int
-) -> None:
+def _quaternion_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int, e: int) -> None:
     """The quaternion part of `add_spring_derivatives`, rotational dofs e .. e + 2 of joint i."""
     r1, r2, r3 = spring_turns(model, work, h, q, v, i)
     g = h * model.dof_spring[e]

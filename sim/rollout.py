@@ -13,7 +13,7 @@ from __future__ import annotations
 from sim.gradients import gradient
 from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Options, Vector, Work
+from sim.model import Integers, Matrix, Options, Vector, Work
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
@@ -213,7 +213,19 @@ def linearize_knots(
     for c in prange(chunks):
         for t in range(c * n // chunks, (c + 1) * n // chunks):
             linearize(
-                floats, ints, buffers[c], settings, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard, smooth
+                floats,
+                ints,
+                buffers[c],
+                settings,
+                xs[t],
+                us[t],
+                substeps,
+                A[t],
+                B[t],
+                x_next[t],
+                reports[t],
+                hard,
+                smooth,
             )
 
 

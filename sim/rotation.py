@@ -114,7 +114,9 @@ def so3_coefficients(t2: float) -> Vec3:
 
 @kernel
 def left_jacobian(x: float, y: float, z: float) -> Mat3:
-    """J(t) = sin t/t I + (1 - cos t)/t^2 [t] + (t - sin t)/t^3 t t^T, the left Jacobian of exp: exp(t + d) = exp(J d) exp(t).
+    """J(t) = sin t/t I + (1 - cos t)/t^2 [t] + (t - sin t)/t^3 t t^T, the left Jacobian of exp.
+
+    exp(t + d) = exp(J d) exp(t).
 
     Its transpose is the right Jacobian: exp(t + d) = exp(t) exp(J^T d).   Chirikjian, Stochastic Models 2, eq. 10.86.
     """

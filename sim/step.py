@@ -31,8 +31,8 @@ def step(
 
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
     last iterate when the status is not SOLVED; nobody must use it.
-    Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of scenes
-    with contacts or limits, Newton's method of scenes without.
+    Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of
+    scenes with contacts or limits, Newton's method of scenes without.
     """
     nq = work.theta1.shape[0]
     q = x[:nq]

@@ -53,8 +53,8 @@ def quadruped(
 
     All angles zero is legs straight down; a positive thigh moves the knee back, the calf is bent at negative angles.
     damper [N m s/rad] and spring [N m/rad] of every hinge; contacts: "feet" (4 balls) or "all" (12: feet,
-    knees, shoulders); limits: whether hinges have stops (24); stance: thigh and calf angle of the neutral state; law: see
-    Contact.
+    knees, shoulders); limits: whether hinges have stops (24); stance: thigh and calf angle of the neutral state;
+    law: see Contact.
     """
     checks.one_of("quadruped(contacts=...)", contacts, ("feet", "all"))
     thigh, calf = checks.vector("quadruped(stance=...)", stance, 2)

@@ -28,7 +28,7 @@ class Row:
         """Whether the bar is met; None without a bar."""
         if self.bar is None:
             return None
-        return self.value >= self.bar if self.at_least else self.value <= self.bar
+        return bool(self.value >= self.bar if self.at_least else self.value <= self.bar)
 
 
 @dataclass
@@ -49,7 +49,7 @@ class Report:
     def as_json(self) -> str:
         """Everything, raw numbers included."""
         rows = [{**asdict(row), "met": row.met} for row in self.rows]
-        return json.dumps({**asdict(self), "rows": rows, "met": self.met()}, indent=1)
+        return json.dumps({**asdict(self), "rows": rows, "met": self.met()}, indent=1, default=float)
 
     def as_text(self) -> str:
         """The aligned table."""
