@@ -34,8 +34,13 @@ def differences(f: Callable[[Vector], Vector], n: int) -> tuple[Vector, Vector]:
     return np.array(columns).T, np.array(doubts)
 
 
-def check_jacobian(f: Callable[[Vector], Vector], J: Vector, x: Vector,
-                   retract: Callable[[Vector, Vector], Vector], tolerance: float = 1e-6) -> None:  # fmt: skip
+def check_jacobian(
+    f: Callable[[Vector], Vector],
+    J: Vector,
+    x: Vector,
+    retract: Callable[[Vector, Vector], Vector],
+    tolerance: float = 1e-6,
+) -> None:
     """Largest |J - J_differences| over largest |J_differences| <= tolerance; f(x) in tangent coordinates at f(x)."""
     expected, doubt = differences(lambda dx: f(retract(x, dx)), J.shape[1])
     scale = max(np.abs(expected).max(), 1e-12)
@@ -44,5 +49,5 @@ def check_jacobian(f: Callable[[Vector], Vector], J: Vector, x: Vector,
     row, column = np.unravel_index(np.argmax(error), error.shape)
     assert error[row, column] <= tolerance, (
         f"relative error {error[row, column]:.1e} > {tolerance:.0e} in row {row}, column {column}: "
-        f"{J[row, column]:.9g}, differences {expected[row, column]:.9g} +- {doubt[column]:.1e}, largest entry {scale:.3g}"
+        f"{J[row, column]:.9g}, differences {expected[row, column]:.9g} +- {doubt[column]:.1e}, scale {scale:.3g}"
     )

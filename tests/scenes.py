@@ -10,9 +10,19 @@ from naive import rotation as rot
 import dojo_opt as dojo
 
 KINDS = (
-    "fixed", "prismatic", "planar", "fixed_orientation", "revolute", "cylindrical", "planar_axis", "free_revolute",
-    "spherical", "cylindrical_free", "planar_free", "floating",
-)  # fmt: skip
+    "fixed",
+    "prismatic",
+    "planar",
+    "fixed_orientation",
+    "revolute",
+    "cylindrical",
+    "planar_axis",
+    "free_revolute",
+    "spherical",
+    "cylindrical_free",
+    "planar_free",
+    "floating",
+)
 LAWS = ("impact", "linear", "nonlinear")
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
@@ -35,19 +45,25 @@ def ball(radius=0.1, mass=1.0, friction=0.5, law="nonlinear", gravity=(0.0, 0.0,
     inputs = [dojo.Input(body="ball", force=e) for e in np.eye(3)] + [
         dojo.Input(body="ball", torque=e) for e in np.eye(3)
     ]
-    return dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")],
-                          [dojo.Contact("ball", radius=radius, friction=friction, law=law)], inputs, gravity)  # fmt: skip
+    return dojo.Mechanism(
+        [body],
+        [dojo.Joint("floating", None, "ball")],
+        [dojo.Contact("ball", radius=radius, friction=friction, law=law)],
+        inputs,
+        gravity,
+    )
 
 
 def free_body(inertia=(0.1, 0.2, 0.3)) -> dojo.Mechanism:
     """One body in space, pushed by a wrench in body axes."""
     inputs = [dojo.Input(body="body", torque=e, frame="body") for e in np.eye(3)]
-    return dojo.Mechanism([dojo.Body("body", 1.0, inertia)], [dojo.Joint("floating", None, "body")], inputs=inputs,
-                          gravity=np.zeros(3))  # fmt: skip
+    return dojo.Mechanism(
+        [dojo.Body("body", 1.0, inertia)], [dojo.Joint("floating", None, "body")], inputs=inputs, gravity=np.zeros(3)
+    )
 
 
 def chain(kind: str, links: int = 1, gravity=(0.0, 0.0, 0.0), base="floating", **options) -> dojo.Mechanism:
-    """Asymmetric bodies: the base (floating, or `kind` itself if base is None), then `links` joints of the given kind."""
+    """Asymmetric bodies: the base (floating, or `kind` itself if base is None), then `links` joints of it."""
     rng = np.random.default_rng(5)
     bodies, joints = [], []
     for i in range(links + 1):
@@ -60,8 +76,18 @@ def chain(kind: str, links: int = 1, gravity=(0.0, 0.0, 0.0), base="floating", *
             continue
         offset = rot.exp(rng.normal(size=3))
         axis = rng.normal(size=3)
-        joints.append(dojo.Joint(kind, f"body{i - 1}" if i else None, f"body{i}", parent_point=rng.normal(size=3) / 4,
-                                 child_point=rng.normal(size=3) / 4, axis=axis, orientation=offset, **options))  # fmt: skip
+        joints.append(
+            dojo.Joint(
+                kind,
+                f"body{i - 1}" if i else None,
+                f"body{i}",
+                parent_point=rng.normal(size=3) / 4,
+                child_point=rng.normal(size=3) / 4,
+                axis=axis,
+                orientation=offset,
+                **options,
+            )
+        )
     inputs = [dojo.Input(j.name, dof=d) for j in joints[0 if base is None else 1 :] for d in range(j.nv)]
     return dojo.Mechanism(bodies, joints, inputs=inputs, gravity=gravity)
 
@@ -71,8 +97,18 @@ def pendulum(links: int = 1, length=1.0, mass=1.0, **joint) -> dojo.Mechanism:
     inertia = mass * length**2 / 12.0 * np.array([1.0, 1.0, 0.01])
     up = np.array([0.0, 0.0, 0.5 * length])
     bodies = [dojo.Body(f"rod{i}", mass, inertia) for i in range(links)]
-    joints = [dojo.Joint("revolute", f"rod{i - 1}" if i else None, f"rod{i}", axis=(1, 0, 0), child_point=up,
-                         parent_point=-up if i else (0, 0, 0), **joint) for i in range(links)]  # fmt: skip
+    joints = [
+        dojo.Joint(
+            "revolute",
+            f"rod{i - 1}" if i else None,
+            f"rod{i}",
+            axis=(1, 0, 0),
+            child_point=up,
+            parent_point=-up if i else (0, 0, 0),
+            **joint,
+        )
+        for i in range(links)
+    ]
     return dojo.Mechanism(bodies, joints)
 
 

@@ -16,6 +16,7 @@ def other(name="leg"):
     return dojo.Body(name, 1.0, (1.0, 1.0, 1.0))
 
 
+# fmt: off
 PARTS = {
     "zero mass": (lambda: dojo.Body("arm", 0.0, (1, 1, 1)), "arm", "mass"),
     "negative mass": (lambda: dojo.Body("arm", -1.0, (1, 1, 1)), "arm", "mass", "-1"),
@@ -37,7 +38,7 @@ PARTS = {
     "nan damper": (lambda: dojo.Joint("revolute", None, "arm", damper=np.nan), "arm", "damper", "nan"),
     "limits reversed": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, -1.0)), "arm", "limits"),
     "limits equal": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, 1.0)), "arm", "limits"),
-    "limits of a ball joint": (lambda: dojo.Joint("spherical", None, "arm", limits=[(0, 1), None, None]), "arm", "limits"),
+    "limits of a ball joint": (lambda: dojo.Joint("spherical", None, "arm", limits=[(0, 1), None, None]), "limits"),
     "number of limits": (lambda: dojo.Joint("planar", None, "arm", limits=[(0, 1)] * 3), "arm", "limits"),
     "negative friction": (lambda: dojo.Contact("arm", friction=-0.1), "arm", "friction", "-0.1"),
     "negative radius": (lambda: dojo.Contact("arm", radius=-0.1), "arm", "radius"),
@@ -54,9 +55,10 @@ PARTS = {
     "unknown child": (lambda: dojo.Mechanism([other()], [HINGE]), "hinge", "arm", "leg"),
     "unknown parent": (lambda: dojo.Mechanism([BODY], [dojo.Joint("fixed", "torso", "arm")]), "arm", "torso", "world"),
     "body without joint": (lambda: dojo.Mechanism([BODY, other()], [HINGE]), "leg"),
-    "two joints": (lambda: dojo.Mechanism([BODY], [HINGE, dojo.Joint("revolute", None, "arm", name="b")]), "arm", "hinge"),
-    "cycle": (lambda: dojo.Mechanism([BODY, other()], [dojo.Joint("revolute", "leg", "arm", name="a"),
-                                                       dojo.Joint("revolute", "arm", "leg", name="b")]), "cycle", "a", "b"),
+    "two joints": (lambda: dojo.Mechanism([BODY], [HINGE, dojo.Joint("fixed", None, "arm", name="b")]), "arm", "hinge"),
+    "cycle": (lambda: dojo.Mechanism([BODY, other()], [dojo.Joint("revolute", "leg", "arm", name="to the arm"),
+                                                       dojo.Joint("revolute", "arm", "leg", name="to the leg")]),
+              "cycle", "to the arm", "to the leg"),
     "own parent": (lambda: dojo.Mechanism([BODY], [dojo.Joint("revolute", "arm", "arm", name="a")]), "a"),
     "unknown contact body": (lambda: dojo.Mechanism([BODY], [HINGE], [dojo.Contact("toe")]), "toe", "arm"),
     "unknown input joint": (lambda: dojo.Mechanism([BODY], [HINGE], inputs=[dojo.Input("elbow")]), "elbow", "hinge"),
@@ -64,7 +66,8 @@ PARTS = {
     "not a body": (lambda: dojo.Mechanism([HINGE], [HINGE]), "bodies", "Body"),
     "nothing moves": (lambda: dojo.Mechanism([BODY], [dojo.Joint("fixed", None, "arm")]), "free to move"),
     "neutral": (lambda: dojo.Mechanism([BODY], [HINGE], neutral={"elbow": 1.0}), "neutral", "elbow", "hinge"),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.mark.parametrize("case", PARTS)

@@ -216,7 +216,9 @@ def start(scene: Scene, q: Array, v: Array, h: float) -> Array:
         if np.abs(error).max() < 1e-13 * max(1.0, np.abs(target).max()):
             break
         step = 1e-6
-        columns = [S.T @ (node_momentum(scene, q, nu + step * e, h) - node_momentum(scene, q, nu - step * e, h)).ravel()
-                   for e in np.eye(scene.nv)]  # fmt: skip
+        columns = [
+            S.T @ (node_momentum(scene, q, nu + step * e, h) - node_momentum(scene, q, nu - step * e, h)).ravel()
+            for e in np.eye(scene.nv)
+        ]
         nu = nu - np.linalg.solve(np.array(columns).T / (2.0 * step), error)
     return nu

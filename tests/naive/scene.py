@@ -135,7 +135,7 @@ def advance(scene: Scene, q: Array, v: Array, h: float) -> Array:
 
 
 def translation_axes(joint: Any) -> Array:
-    """Free translations in the joint frame: along the axis, across it (x, y, z without the one nearest to it), or all."""
+    """Free translations in the joint frame: along the axis, across it (x, y, z without the nearest), or all."""
     if joint.ntrans != 2:
         return np.array([joint.axis]) if joint.ntrans == 1 else np.eye(3)[: joint.ntrans]
     axis, rows = np.asarray(joint.axis), []
@@ -163,8 +163,16 @@ def from_mechanism(mech: Any) -> Scene:
         parent = names.index(j.parent) if j.parent in names else -1
         dof[j.name] = sum(other.nv for other in joints)
         points = (np.array(j.parent_point), np.array(j.child_point), np.array(j.orientation))
-        joints.append(Joint(parent, translation_axes(j), j.nrot, np.array(j.axis), *points,
-                            *(np.array(value) for value in (j.spring, j.damper, j.rest))))  # fmt: skip
+        joints.append(
+            Joint(
+                parent,
+                translation_axes(j),
+                j.nrot,
+                np.array(j.axis),
+                *points,
+                *(np.array(value) for value in (j.spring, j.damper, j.rest)),
+            )
+        )
         for k, bounds in enumerate(j.limits):
             limits += [Limit(dof[j.name] + k, s, b) for s, b in zip((1.0, -1.0), bounds, strict=True) if np.isfinite(b)]
     laws = {"impact": IMPACT, "linear": LINEAR, "nonlinear": NONLINEAR}

@@ -7,7 +7,8 @@ from scipy.integrate import solve_ivp
 from naive import lagrangian as lag
 from naive import rotation as rot
 from naive import samples
-from naive.maximal import Step, jacobian, solve
+from naive.equations import Step
+from naive.maximal import jacobian, solve
 from naive.scene import IMPACT, LINEAR, NONLINEAR, Scene, advance, poses
 
 
@@ -62,8 +63,10 @@ def test_complex_step_jacobian(rng):
     step = Step(scene, q, rng.normal(size=7), np.zeros(3), 0.02)
     y = step.start(1e-2)
     for exact in (False, True):
-        differences = [(step.residual(y + 1e-6 * e, 1e-2, exact) - step.residual(y - 1e-6 * e, 1e-2, exact)) / 2e-6
-                       for e in np.eye(len(y))]  # fmt: skip
+        differences = [
+            (step.residual(y + 1e-6 * e, 1e-2, exact) - step.residual(y - 1e-6 * e, 1e-2, exact)) / 2e-6
+            for e in np.eye(len(y))
+        ]
         np.testing.assert_allclose(jacobian(step, y, 1e-2, exact), np.transpose(differences), atol=1e-6)
 
 
@@ -153,8 +156,10 @@ def test_limits_hold():
 
 def test_energy_of_a_spring_is_kept():
     scene = samples.spherical_chain()
-    joint = [type(j)(j.parent, j.trans_axes, j.nrot, j.axis, j.parent_point, j.child_point, j.offset, j.spring, 0.0, j.rest)
-             for j in scene.joints]  # fmt: skip
+    joint = [
+        type(j)(j.parent, j.trans_axes, j.nrot, j.axis, j.parent_point, j.child_point, j.offset, j.spring, 0.0, j.rest)
+        for j in scene.joints
+    ]
     scene = Scene(scene.bodies, joint)
     q = np.concatenate(([0.3], rot.exp(np.array([0.2, 0.1, -0.3])), [0.2, 0.1]))
     spread = []

@@ -19,7 +19,7 @@ def test_no_creep_in_ten_seconds(law):
 
 
 def test_creep_is_that_of_the_central_path():
-    """mu gamma v / (a + sqrt(a^2 + v^2)) = tangential load: v = 2 a r / (1 - r^2), a = gap/(2 mu), r = tan(angle)/mu."""
+    """mu gamma v / (a + sqrt(a^2 + v^2)) = tangential load: v = 2 a r / (1 - r^2), a = gap/(2 mu), r = tan/mu."""
     angle, kappa, h = np.deg2rad(15.0), 1e-6, 0.01
     sim = dojo.Simulator(ball(friction=0.8, gravity=tilted(angle)), time_step=h, kappa=kappa, tolerance=1e-12)
     hold = -0.1 * 9.81 * np.sin(angle)  # a torque that stops the ball from rolling

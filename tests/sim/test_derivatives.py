@@ -126,8 +126,11 @@ def test_contact_laws(name, law, regime, rng):
 @pytest.mark.parametrize("push", [0.0, 1.0])
 def test_limits(push, fast, rng):
     """Pressed against a limit, or arriving at it in this very step."""
-    for mech in (slider(limits=(-0.5, 0.5), spring=2.0), pendulum(2, limits=(-0.5, 0.5), damper=0.1),
-                 chain("planar_axis", 1, base=None, limits=[(-0.5, 0.5), None, (-0.5, 0.5)])):  # fmt: skip
+    for mech in (
+        slider(limits=(-0.5, 0.5), spring=2.0),
+        pendulum(2, limits=(-0.5, 0.5), damper=0.1),
+        chain("planar_axis", 1, base=None, limits=[(-0.5, 0.5), None, (-0.5, 0.5)]),
+    ):
         nv = simulator(mech, 1e-6).nv
         speed = 5.0 if fast else 0.1
         x = np.r_[np.full(nv, 0.5 - H * speed * (1.0 - 0.3 * push)), np.full(nv, speed)]

@@ -79,8 +79,11 @@ def hopper(law="nonlinear"):
         "prismatic", "body", "foot", axis=(0, 0, -1), spring=200.0, damper=0.1, rest=0.5, limits=(0.2, 0.6)
     )
     contacts = [dojo.Contact("foot", radius=0.05, law=law), dojo.Contact("body", radius=0.1, law=law)]
-    inputs = [dojo.Input("foot"), dojo.Input(body="body", torque=(1, 0, 0), frame="body"),
-              dojo.Input(body="body", force=(0, 1, 0), torque=(0, 0, 0.3))]  # fmt: skip
+    inputs = [
+        dojo.Input("foot"),
+        dojo.Input(body="body", torque=(1, 0, 0), frame="body"),
+        dojo.Input(body="body", force=(0, 1, 0), torque=(0, 0, 0.3)),
+    ]
     return dojo.Mechanism(bodies, [dojo.Joint("floating", None, "body"), leg], contacts, inputs)
 
 
@@ -100,17 +103,45 @@ def quadruped(law="nonlinear", friction=0.8):
     bodies, contacts = [dojo.Body("trunk", 6.0, np.array([0.025, 0.07, 0.085]))], []
     joints = [dojo.Joint("floating", None, "trunk")]
     for name, sx, sy in (("fr", 1, -1), ("fl", 1, 1), ("rr", -1, -1), ("rl", -1, 1)):
-        bodies += [dojo.Body(f"{name}_hip", 0.7, np.full(3, 7e-4)), dojo.Body(f"{name}_thigh", 1.0, (3.5e-3, 3.5e-3, 4e-4)),
-                   dojo.Body(f"{name}_calf", 0.17, (6e-4, 6e-4, 3e-5))]  # fmt: skip
+        bodies += [
+            dojo.Body(f"{name}_hip", 0.7, np.full(3, 7e-4)),
+            dojo.Body(f"{name}_thigh", 1.0, (3.5e-3, 3.5e-3, 4e-4)),
+            dojo.Body(f"{name}_calf", 0.17, (6e-4, 6e-4, 3e-5)),
+        ]
         soft = {"spring": 3.0, "damper": 0.1}
         joints += [
-            dojo.Joint("revolute", "trunk", f"{name}_hip", axis=(1, 0, 0), parent_point=(0.18 * sx, 0.05 * sy, 0.0),
-                       limits=(-0.6, 0.6), **soft),
-            dojo.Joint("revolute", f"{name}_hip", f"{name}_thigh", axis=(0, 1, 0), parent_point=(0, 0.08 * sy, 0),
-                       child_point=(0, 0, 0.1), rest=0.8, limits=(-0.6, 1.6), **soft),
-            dojo.Joint("revolute", f"{name}_thigh", f"{name}_calf", axis=(0, 1, 0), parent_point=(0, 0, -0.1),
-                       child_point=(0, 0, 0.1), rest=-1.5, limits=(-2.6, -0.6), **soft),
-        ]  # fmt: skip
+            dojo.Joint(
+                "revolute",
+                "trunk",
+                f"{name}_hip",
+                axis=(1, 0, 0),
+                parent_point=(0.18 * sx, 0.05 * sy, 0.0),
+                limits=(-0.6, 0.6),
+                **soft,
+            ),
+            dojo.Joint(
+                "revolute",
+                f"{name}_hip",
+                f"{name}_thigh",
+                axis=(0, 1, 0),
+                parent_point=(0, 0.08 * sy, 0),
+                child_point=(0, 0, 0.1),
+                rest=0.8,
+                limits=(-0.6, 1.6),
+                **soft,
+            ),
+            dojo.Joint(
+                "revolute",
+                f"{name}_thigh",
+                f"{name}_calf",
+                axis=(0, 1, 0),
+                parent_point=(0, 0, -0.1),
+                child_point=(0, 0, 0.1),
+                rest=-1.5,
+                limits=(-2.6, -0.6),
+                **soft,
+            ),
+        ]
         contacts.append(dojo.Contact(f"{name}_calf", point=(0, 0, -0.1), radius=0.02, friction=friction, law=law))
     return dojo.Mechanism(bodies, joints, contacts)
 

@@ -1,0 +1,70 @@
+"""Single steps that were hard: each was missed by some form of the interior point and is solved by the reference."""
+
+import sys
+from importlib import util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from naive import rotation as rot
+from scenes import ball, block, gaps
+
+import dojo_opt as dojo
+
+PATH = Path(__file__).parents[2] / "benchmarks" / "robustness.py"
+
+# cells of benchmarks/robustness.py at seed 0: mechanism, friction, time step, kappa, number of the state
+CELLS = (
+    ("block", 0.5, 0.02, 1e-8, 4),
+    ("block", 0.5, 0.05, 1e-8, 97),
+    ("block", 1.0, 0.05, 1e-8, 112),
+    ("block", 2.0, 0.02, 1e-8, 145),
+    ("block", 2.0, 0.05, 1e-4, 135),
+    ("block", 2.0, 0.05, 1e-8, 85),
+    ("hopper", 2.0, 0.05, 1e-4, 20),
+    ("quadruped", 0.0, 0.05, 1e-8, 90),
+    ("quadruped", 2.0, 0.05, 1e-4, 113),
+    ("quadruped12", 0.5, 0.05, 1e-8, 68),
+    ("quadruped12", 1.0, 0.05, 1e-4, 151),
+    ("quadruped12", 2.0, 0.05, 1e-4, 68),
+)
+
+
+@pytest.fixture(scope="module")
+def robustness():
+    spec = util.spec_from_file_location("robustness", PATH)
+    module = util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[spec.name]
+
+
+@pytest.mark.parametrize("cell", CELLS, ids=str)
+def test_extreme_state(robustness, cell):
+    name, friction, h, kappa, number = cell
+    sim = dojo.Simulator(robustness.MECHANISMS[name](friction), time_step=h, kappa=kappa)
+    rng = np.random.default_rng([0, list(robustness.MECHANISMS).index(name), round(1e4 * h)])
+    states = [robustness.random_state(sim, rng) for _ in range(number + 1)]
+    result = sim.step(states[-1], np.zeros(sim.nu))
+    assert result.status == 0, (result.status, result.residual, result.violation)
+
+
+@pytest.mark.parametrize("kappa", [1e-4, 1e-6, 1e-8, 1e-9])
+def test_ball_that_slides_and_rolls(kappa):
+    """One contact, a light rotation, a short time step: the friction impulse changes with the slip within microns."""
+    sim = dojo.Simulator(ball(radius=0.1), time_step=1e-3, kappa=kappa)
+    turn = [0.9999995822338908, -0.00040878650762314687, 0.0008175730152462937, 0.0]
+    twist = [0.9780642091129923, 0.4890321045564965, -7.6e-8, -0.2741973860875901, 0.5483947721751802, 0.0]
+    assert sim.step(np.r_[0.0, 0.0, 0.10000010194137329, turn, twist], np.zeros(6)).status == 0
+
+
+@pytest.mark.parametrize("kappa", [1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("time_step", [1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2])
+def test_tumbling_block_for_a_second(time_step, kappa):
+    """Every step of a block that is thrown and comes to rest."""
+    sim = dojo.Simulator(block(), time_step=time_step, kappa=kappa, tolerance=1e-9)
+    q = np.r_[0.0, 0.0, 1.0, rot.exp(np.array([0.4, -0.3, 0.8]))]
+    trajectory = sim.rollout(np.r_[q, 2.0, 1.0, -1.0, 3.0, -2.0, 1.0], np.zeros((round(1.0 / time_step), 0)))
+    assert trajectory.status == 0, trajectory.message
+    assert gaps(sim, trajectory.x[-1]).min() > -1e-8
