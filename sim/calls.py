@@ -24,7 +24,7 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 REPORT, CONTACT = 5, 8
-_WORTH_THREADS = 1000  # knots times tangent dimension; below, a sequential pass ends before the threads are awake
+_WORTH_THREADS = 1000  # knots times tangent dimension; below, one core is done before the threads are awake
 _CHUNKS = 4  # per core: evens out knots that take longer
 
 
