@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SEVERAL_SIGNATURES = {
     "dojo_opt.manifold.add_rotation_block",
     "sim.elimination_panel._apply_block",
-    "sim.interior_point.start_on_path",
+    "sim.interior_point.start",
     "sim.kinematics.displace",
     "sim.pose_jacobians.add_skew",
     "sim.state.integrate_state",
