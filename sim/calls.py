@@ -24,7 +24,7 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 REPORT, CONTACT = 5, 8
-_WORTH_THREADS = 1000  # knots times tangent dimension; below, one core is done before the threads are awake
+_WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 _CHUNKS = 4  # per core: evens out knots that take longer
 
 
@@ -123,7 +123,7 @@ class Calls:
         return int(knot), xs, u_out, report
 
     def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
-        """(A, B, next states, report of every knot) of all knots; in parallel where that is worth waking the threads."""
+        """(A, B, next states, report of every knot) of all knots; in parallel where that pays."""
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))

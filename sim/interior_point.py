@@ -44,7 +44,8 @@ _SINGULAR = int(Status.SINGULAR)
 
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _RESTART_GROWTH = 3.0  # of the starting kappa, per restart
-_PATIENCE = 30  # iterations of one attempt
+_HURRY = 12  # iterations of the first attempt, whose friction follows the normal impulses
+_PATIENCE = 30  # iterations of the others, whose friction is led down to kappa step by step
 _HALVINGS = 12  # of the line search, then the step is taken as it is and counts as short
 
 
@@ -103,6 +104,16 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
                 break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3
     return alpha
+
+
+@kernel
+def follow(model: Model, work: Work, kappa: float, smoothing: float) -> tuple[float, float]:
+    """The smoothing brought down towards kappa as far as the friction law holds on the way, and its violation there."""
+    slip = slip_error(model, work, smoothing)
+    while smoothing > kappa and slip < 0.3 * smoothing:
+        smoothing = max(kappa, 0.1 * smoothing)
+        slip = slip_error(model, work, smoothing)
+    return smoothing, slip
 
 
 @kernel
@@ -176,7 +187,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         if starting:
             smoothing = start(model, work, options, q, v, u, attempt)
             inside = smoothing > 0.0
-            patience = iterations + _PATIENCE
+            patience = iterations + (_PATIENCE if attempt > 0 else _HURRY)
             last_r = 1e300
             last_violation = 1e300
         else:
@@ -200,9 +211,8 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
         if not inside:
             status = _NOT_FINITE
             break
-        if smoothing > kappa and slip_error(model, work, smoothing) < 0.3 * smoothing:
-            smoothing = max(kappa, 0.1 * smoothing)
-            violation = max(violation, slip_error(model, work, smoothing))
+        smoothing, slip = follow(model, work, kappa, smoothing if attempt > 0 else max(kappa, min(mean, smoothing)))
+        violation = max(violation, slip)
         if r < options.tolerance and violation < spread and smoothing <= kappa:
             status = _SOLVED
             break

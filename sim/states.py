@@ -59,9 +59,9 @@ class States:
         xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
         return self._calls.integrate(xs, dxs).reshape(*lead, self.nx)
 
-    def difference(self, x0: ArrayLike, x1: ArrayLike) -> Floats:
+    def difference(self, x1: ArrayLike, x0: ArrayLike) -> Floats:
         """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
-        x0s, x1s, lead = self._border.paired("difference", ("x0", x0, self.nx), ("x1", x1, self.nx))
+        x1s, x0s, lead = self._border.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
         return self._calls.difference(x0s, x1s).reshape(*lead, self.ndx)
 
     def maximal(self, x: ArrayLike) -> Floats:

@@ -74,7 +74,7 @@ def apart(mechanism: Mechanism, time_step: float, duration: float) -> np.ndarray
     data.ctrl[:] = u
     mujoco.mj_step(model, data, steps)
     assert np.abs(sim.difference(ours.x[0], ours.x[-1])[: sim.nv]).max() > 0.05
-    return sim.difference(np.concatenate([data.qpos, np.zeros(sim.nv)]), ours.x[-1])[: sim.nv]
+    return sim.difference(ours.x[-1], np.concatenate([data.qpos, np.zeros(sim.nv)]))[: sim.nv]
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
