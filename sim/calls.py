@@ -24,6 +24,7 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 REPORT, CONTACT = 5, 8
+_WORTH_THREADS = 1000  # knots times tangent dimension; below, one core is done before the threads are awake
 _CHUNKS = 4  # per core: evens out knots that take longer
 
 
@@ -122,28 +123,25 @@ class Calls:
         return int(knot), xs, u_out, report
 
     def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
-        """(A, B, next states, report of every knot) of all knots, in parallel."""
+        """(A, B, next states, report of every knot) of all knots; in parallel where that is worth waking the threads."""
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        settings, works = self.settings.array(kappa), self._works(n)
-        rollout.linearize_knots(
-            self.floats, self.ints, works, settings, xs, us, substeps, A, B, x_next, reports, self.hard, self.smooth
-        )
+        settings = self.settings.array(kappa)
+        out = (xs, us, substeps, A, B, x_next, reports, self.hard, self.smooth)
+        if n * substeps * self.ndx < _WORTH_THREADS:
+            rollout.linearize(self.floats, self.ints, self._work(), settings, (0, n), *out)
+        else:
+            rollout.linearize_knots(self.floats, self.ints, self._works(n), settings, *out)
         unsolved = reports[:, 0] != Status.SOLVED
-        for out in (A, B, x_next):
-            out[unsolved] = 0.0
+        for array in (A, B, x_next):
+            array[unsolved] = 0.0
         return A, B, x_next, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
-        """(A, B, next state, report) of one step, without the threads."""
-        A, B = np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu))
-        x_next, report = np.zeros(self.nx), np.zeros(REPORT)
-        settings = self.settings.array(kappa)
-        rollout.linearize(
-            self.floats, self.ints, self._work(), settings, x, u, 1, A, B, x_next, report, self.hard, self.smooth
-        )
-        return A, B, x_next, report
+        """(A, B, next state, report) of one step."""
+        A, B, x_next, reports = self.linearize(x[None], u[None], 1, kappa)
+        return A[0], B[0], x_next[0], reports[0]
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
         """(states, status and number of solved steps of every rollout), in parallel."""

@@ -18,18 +18,13 @@ def _rows_minus(S: Matrix, d: int, P: Matrix, r: int, out: Matrix) -> None:
 
 @kernel
 def _add_rows(S: Matrix, d: int, X: Matrix, P: Matrix, r: int) -> None:
-    """P[r : r + 6] += S[d] X[d]"""
-    a, b, c, e, f, g = S[d, 0], S[d, 1], S[d, 2], S[d, 3], S[d, 4], S[d, 5]
-    p0, p1, p2, p3, p4, p5 = P[r], P[r + 1], P[r + 2], P[r + 3], P[r + 4], P[r + 5]
+    """P[r : r + 6] += S[d] X[d], a row at a time: with more than one row written the loop does not vectorise."""
     x = X[d]
-    for k in range(x.shape[0]):
-        t = x[k]
-        p0[k] += a * t
-        p1[k] += b * t
-        p2[k] += c * t
-        p3[k] += e * t
-        p4[k] += f * t
-        p5[k] += g * t
+    for j in range(6):
+        a = S[d, j]
+        p = P[r + j]
+        for k in range(x.shape[0]):
+            p[k] += a * x[k]
 
 
 @kernel

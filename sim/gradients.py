@@ -68,7 +68,7 @@ def residual_derivatives(model: Model, work: Work, h: float) -> None:
             work.dR_dv[j, k] = 0.0
     for d in range(nv):
         i = model.dof_body[d]
-        _composite_products(work, d, i)
+        _composite_products(work, d, i, model.body_parent[i] < 0)
         F = work.F[d]
         G = work.G[d]
         rotational = d >= model.body_vadr[i] + model.joint_ntrans[i]
@@ -109,7 +109,7 @@ def residual_derivatives(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def _composite_products(work: Work, d: int, i: int) -> None:
+def _composite_products(work: Work, d: int, i: int, root: bool) -> None:
     """F[d] = (A3 S3 + A2 S2 + A1 S1, A1 S1, t), G[d] = (S2 A1, S2 A2 + t, S2 A3) with the composites of body i.
 
     t = (a x f, v x f + a x m): (S_k x S_d).r = S_k.t for S_d = (v, a), r = (f, m).
@@ -130,6 +130,15 @@ def _composite_products(work: Work, d: int, i: int) -> None:
             t += A2[6 * r + k] * s2[k] + A3[6 * r + k] * s3[k]
         F[r] = t + w
         F[6 + r] = w
+    f = work.subtree[i]
+    F[12] = s2[4] * f[2] - s2[5] * f[1]
+    F[13] = s2[5] * f[0] - s2[3] * f[2]
+    F[14] = s2[3] * f[1] - s2[4] * f[0]
+    F[15] = s2[1] * f[2] - s2[2] * f[1] + s2[4] * f[5] - s2[5] * f[4]
+    F[16] = s2[2] * f[0] - s2[0] * f[2] + s2[5] * f[3] - s2[3] * f[5]
+    F[17] = s2[0] * f[1] - s2[1] * f[0] + s2[3] * f[4] - s2[4] * f[3]
+    if root:  # no joint above, no row to pair with
+        return
     for k in range(6):
         g1 = 0.0
         g2 = 0.0
@@ -139,17 +148,8 @@ def _composite_products(work: Work, d: int, i: int) -> None:
             g2 += s2[r] * A2[6 * r + k]
             g3 += s2[r] * A3[6 * r + k]
         G[k] = g1
-        G[6 + k] = g2
+        G[6 + k] = g2 + F[12 + k]
         G[12 + k] = g3
-    f = work.subtree[i]
-    F[12] = s2[4] * f[2] - s2[5] * f[1]
-    F[13] = s2[5] * f[0] - s2[3] * f[2]
-    F[14] = s2[3] * f[1] - s2[4] * f[0]
-    F[15] = s2[1] * f[2] - s2[2] * f[1] + s2[4] * f[5] - s2[5] * f[4]
-    F[16] = s2[2] * f[0] - s2[0] * f[2] + s2[5] * f[3] - s2[3] * f[5]
-    F[17] = s2[0] * f[1] - s2[1] * f[0] + s2[3] * f[4] - s2[4] * f[3]
-    for k in range(6):
-        G[6 + k] += F[12 + k]
 
 
 @kernel

@@ -13,7 +13,7 @@ from __future__ import annotations
 from sim.gradients import gradient
 from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Options, Vector, Work
+from sim.model import Integers, Matrix, Model, Options, Vector, Work
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
@@ -148,11 +148,10 @@ def _chain(work: Work, A: Matrix, B: Matrix) -> None:
 
 
 @kernel
-def linearize(
-    floats: Vector,
-    ints: Integers,
-    buffer: Vector,
-    settings: Vector,
+def _linearize_knot(
+    model: Model,
+    work: Work,
+    options: Options,
     x: Vector,
     u: Vector,
     substeps: int,
@@ -162,33 +161,49 @@ def linearize(
     report: Vector,
     hard: int | None,
     smooth: int | None,
-) -> int:
-    """A, B of one knot: the product of the derivatives of its steps.  Returns the Status."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
-    options = _options(settings)
+) -> None:
+    """A, B of one knot: the product of the derivatives of its steps."""
+    nq = work.theta1.shape[0]
     for k in range(x.shape[0]):
         x_next[k] = x[k]
-    nq = work.theta1.shape[0]
     for s in range(substeps):
         a = work.step_x[0]
         for k in range(x.shape[0]):
             a[k] = x_next[k]
-        status = step(model, work, options, a, u, x_next, report, hard, smooth)
-        if status != _SOLVED:
-            return status
-        if not gradient(model, work, options.h, options.kappa, a[:nq], a[nq:], work.step_A, work.step_B, hard):
+        if step(model, work, options, a, u, x_next, report, hard, smooth) != _SOLVED:
+            return
+        Js = A if s == 0 else work.step_A
+        Ju = B if s == 0 else work.step_B
+        if not gradient(model, work, options.h, options.kappa, a[:nq], a[nq:], Js, Ju, hard):
             report[0] = _SINGULAR
-            return _SINGULAR
+            return
         if s > 0:
             _chain(work, A, B)
-            continue
-        for i in range(A.shape[0]):
-            for k in range(A.shape[0]):
-                A[i, k] = work.step_A[i, k]
-            for k in range(B.shape[1]):
-                B[i, k] = work.step_B[i, k]
-    return _SOLVED
+
+
+@kernel
+def linearize(
+    floats: Vector,
+    ints: Integers,
+    buffer: Vector,
+    settings: Vector,
+    knots: tuple[int, int],
+    xs: Matrix,
+    us: Matrix,
+    substeps: int,
+    A: Cube,
+    B: Cube,
+    x_next: Matrix,
+    reports: Matrix,
+    hard: int | None,
+    smooth: int | None,
+) -> None:
+    """A[t], B[t], x_next[t] of the knots (xs[t], us[t]) from knots[0] up to knots[1]."""
+    model = model_view(floats, ints)
+    work = work_view(buffer, ints)
+    options = _options(settings)
+    for t in range(knots[0], knots[1]):
+        _linearize_knot(model, work, options, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard, smooth)
 
 
 @parallel_kernel
@@ -207,26 +222,12 @@ def linearize_knots(
     hard: int | None,
     smooth: int | None,
 ) -> None:
-    """`linearize` of every knot (xs[t], us[t]), spread over the threads: chunk c has the scratch buffers[c]."""
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch buffers[c]."""
     n = us.shape[0]
     chunks = buffers.shape[0]
     for c in prange(chunks):
-        for t in range(c * n // chunks, (c + 1) * n // chunks):
-            linearize(
-                floats,
-                ints,
-                buffers[c],
-                settings,
-                xs[t],
-                us[t],
-                substeps,
-                A[t],
-                B[t],
-                x_next[t],
-                reports[t],
-                hard,
-                smooth,
-            )
+        knots = (c * n // chunks, (c + 1) * n // chunks)
+        linearize(floats, ints, buffers[c], settings, knots, xs, us, substeps, A, B, x_next, reports, hard, smooth)
 
 
 @kernel
