@@ -57,7 +57,7 @@ class Step:
     """The equations of one step from (q, v) under the input u."""
 
     def __init__(self, scene: Scene, q: Array, v: Array, u: Array, h: float) -> None:
-        self.scene, self.h, self.q2, self.v15, self.u = scene, h, q, v, u
+        self.scene, self.h, self.q2, self.u = scene, h, q, u
         self.q1 = advance(scene, q, -v, h)
         self.z1, self.z2 = poses(scene, self.q1), poses(scene, q)
         self.nbody = len(scene.bodies)
@@ -169,9 +169,9 @@ class Step:
             force = force + beta @ contact.frame[1:]
         return np.concatenate(rows, axis=-1), np.concatenate((force, rot.cross(arm, force)), axis=-1)
 
-    def start(self, kappa: float, v: Array | None = None) -> Array:
-        """Bodies as they moved before (or by the joint velocities v); cones on the central path there."""
-        z3 = poses(self.scene, advance(self.scene, self.q2, self.v15 if v is None else v, self.h))
+    def start(self, kappa: float, v: Array) -> Array:
+        """Bodies moved by the joint velocities v; cones on the central path there."""
+        z3 = poses(self.scene, advance(self.scene, self.q2, v, self.h))
         turned = rot.log(rot.mul(rot.conj(self.z2[1]), z3[1]))
         twist = np.concatenate((z3[0] - self.z2[0], turned), axis=-1) / self.h
         y = [twist.ravel(), np.zeros(len(self.G))]

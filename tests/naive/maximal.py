@@ -69,37 +69,43 @@ def interior(step: Step, y: Array) -> bool:
     return bool(np.all(inside))
 
 
-def solve(
-    scene: Scene,
-    q: Array,
-    v: Array,
-    u: Array,
-    h: float,
-    kappa: float,
-    *,
-    tolerance: float = 1e-13,
-    guess: Array | None = None,
-) -> Solution:
+def follow(step: Step, y: Array, k: float, kappa: float, tolerance: float) -> tuple[Array, bool, int]:
+    """Smoothed equations solved at k, then down to kappa by factors that shrink where Newton's method fails."""
+    rate, count, solved = 0.1, 0, False
+    good, k_good = y, k
+    while True:
+        goal = tolerance if k == kappa else 1e-2 * np.sqrt(k)
+        trial, error, n = newton(step, good, k, False, goal, 30)
+        count += n
+        if error < max(goal, 1e-10):
+            good, k_good, solved = trial, k, True
+            if k == kappa:
+                return good, True, count
+            rate = max(rate**1.5, 0.03)
+        elif not solved or rate > 0.95:
+            return good, False, count
+        else:
+            rate = np.sqrt(rate)
+        k = max(rate * k_good, kappa)
+
+
+def solve(scene: Scene, q: Array, v: Array, u: Array, h: float, kappa: float, *, tolerance: float = 1e-13) -> Solution:
     """Path following from a large kappa in the smoothed equations, then Newton on the bilinear ones."""
     step = Step(scene, q, v, u, h)
-    count, best = 0, np.inf
-    for first, shrink in ((1e-2, 0.1), (1.0, 0.3), (1e2, 0.5), (1e-4, 0.3)):
-        k = max(first, kappa) if scene.contacts or scene.limits else kappa
-        y = step.start(k, guess)
-        while True:
-            y, _, n = newton(step, y, k, False, tolerance if k == kappa else 1e-2 * np.sqrt(k), 60)
-            count += n
-            if k == kappa:
-                break
-            k = max(shrink * k, kappa)
+    count, hard = 0, scene.contacts or scene.limits
+    for first, speed in ((1e-2, 1.0), (1.0, 1.0), (1e-2, 0.0), (1e2, 0.5), (1e4, 0.0), (kappa, 1.0)):
+        k = max(first, kappa) if hard else kappa
+        y, reached, n = follow(step, step.start(k, speed * v), k, kappa, tolerance)
+        count += n
+        if not reached:
+            continue
         polished, error, n = newton(step, y, kappa, True, tolerance, 60)
         count += n
         if not interior(step, polished):  # the bilinear equations have other roots
             polished, error = y, float(np.abs(step.residual(y, kappa, True)).max())
         if error < 1e-10 and interior(step, polished):
             return solution(step, polished, error, count)
-        best = min(best, error)
-    raise RuntimeError(f"the reference did not solve its step: residual {best:.1e}")
+    raise RuntimeError(f"the reference did not solve its step in {count} iterations")
 
 
 def solution(step: Step, y: Array, error: float, count: int) -> Solution:

@@ -60,8 +60,9 @@ def test_spring_impulse_is_derivative_of_the_discrete_potential(rng):
 def test_complex_step_jacobian(rng):
     scene = samples.hopper()
     q = np.concatenate(([0.0, 0.0, 0.6], rot.exp(rng.normal(size=3)), [0.4]))
-    step = Step(scene, q, rng.normal(size=7), np.zeros(3), 0.02)
-    y = step.start(1e-2)
+    v = rng.normal(size=7)
+    step = Step(scene, q, v, np.zeros(3), 0.02)
+    y = step.start(1e-2, v)
     for exact in (False, True):
         differences = [
             (step.residual(y + 1e-6 * e, 1e-2, exact) - step.residual(y - 1e-6 * e, 1e-2, exact)) / 2e-6
