@@ -169,7 +169,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
     """
     h = options.h
     kappa = options.kappa
-    spread = kappa * min(1e-2, 1e6 * options.tolerance)
+    spread = kappa * min(1e-3, 1e5 * options.tolerance)
     scale = residual_scale(work)
     status = _MAX_ITERATIONS
     iterations = 0

@@ -95,30 +95,3 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
             work.rhs[d] = -work.residual[d]
         solve(model, work, work.rhs, work.dnu)
     return Outcome(status, iterations, r, 0.0)
-
-
-@kernel
-def outruns_inertia(model: Model, work: Work, h: float, q: Vector, v: Vector) -> bool:
-    """Whether the incoming motion, going on for one more step, turns the bodies out of reach of their own inertia.
-
-    The inertia that a step sees, S2^T A S3nu, pairs directions at configuration 2 with motions to configuration 3. A
-    motion of a radian or more, or of a limb's length, can make it lose its sign: the momentum then no longer determines
-    the motion, and the time step cannot represent the state. Tested on the pivots of the elimination without contacts.
-    """
-    for i in range(work.joint_block.shape[0]):
-        for k in range(36):
-            work.joint_block[i, k] = 0.0
-    for d in range(v.shape[0]):
-        work.nu[d] = v[d]
-    if not momentum_balance(model, work, h, q):
-        return True
-    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-    momentum_balance_jacobian(model, work, h, work.A)
-    if not factor(model, work):
-        return True
-    for i in range(model.body_parent.shape[0]):
-        n = model.body_vadr[i + 1] - model.body_vadr[i]
-        for a in range(n):  # entries of the inverse blocks, whose diagonal is positive for a positive definite block
-            if not work.D[i, a * n + a] > 0.0:
-                return True
-    return False

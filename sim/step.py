@@ -6,7 +6,7 @@ from sim.dynamics import begin_step
 from sim.inequalities import worst_contact
 from sim.interior_point import interior_point
 from sim.model import Model, Options, Outcome, Vector, Work
-from sim.newton import newton, outruns_inertia
+from sim.newton import newton
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -57,10 +57,7 @@ def step(
     report[2] = r.residual
     report[3] = r.violation
     report[4] = -1.0
-    if status != _SOLVED and r.iterations > 0:
-        if hard is not None:
-            report[4] = worst_contact(model, work, options.kappa)
-        if outruns_inertia(model, work, options.h, q, v):
-            status = _ANGULAR_STEP
+    if hard is not None and status != _SOLVED and r.iterations > 0:
+        report[4] = worst_contact(model, work, options.kappa)
     report[0] = status
     return status
