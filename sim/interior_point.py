@@ -42,6 +42,7 @@ _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
 
+_ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _RESTART_GROWTH = 3.0  # of the starting kappa, per restart
 _HURRY = 12  # iterations of the first attempt, whose friction follows the normal impulses
@@ -169,7 +170,7 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
     """
     h = options.h
     kappa = options.kappa
-    spread = kappa * min(1e-3, 1e5 * options.tolerance)
+    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = residual_scale(work)
     status = _MAX_ITERATIONS
     iterations = 0
