@@ -3,14 +3,14 @@
     H = sum over bodies of S2^T A S3nu + joint blocks        (only pairs of joints on one branch are coupled)
 
 H is not symmetric: rows are test directions at configuration 2, columns derivatives of configuration 3. Each joint is
-eliminated as one block of up to six unknowns, inverted with pivoting, as in Featherstone's articulated-body algorithm.
+eliminated as one block of up to six unknowns, with pivoting, as in Featherstone's articulated-body algorithm.
 """
 
 from __future__ import annotations
 
 from sim.model import Matrix, Model, Vector, Work
-from solvers.inverse import invert
 from solvers.jit import kernel
+from solvers.lu import lu_factor, lu_solve, lu_solve_rows
 
 
 @kernel
@@ -40,7 +40,7 @@ def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
 def factor(model: Model, work: Work) -> bool:
     """Eliminate the joints from the leaves to the root; work.A is overwritten by the articulated matrices.
 
-        U = A S3nu,   L = S2^T A,   D = S2^T U + joint block,      A_parent += A - U D^-1 L
+        U = A S3nu,   D = S2^T U + joint block,   L = D^-1 S2^T A,      A_parent += A - U L
 
     False when a joint block is singular.
     """
@@ -77,19 +77,24 @@ def factor(model: Model, work: Work) -> bool:
             if not abs(D[0]) > 1e-300:
                 return False
             D[0] = 1.0 / D[0]
-        elif n > 1 and not invert(D, n):
-            return False
+            for k in range(6):
+                work.L[d0, k] *= D[0]
+        elif n > 1:
+            swaps = lu_factor(D, n)
+            if swaps < 0:
+                return False
+            D[36] = float(swaps)
+            if p >= 0:
+                lu_solve_rows(D, n, swaps, work.L, d0)
         if p < 0:
             continue
         for a in range(n):
-            for b in range(n):
-                g = D[a * n + b]
-                U = work.U[d0 + a]
-                L = work.L[d0 + b]
-                for r in range(6):
-                    f = U[r] * g
-                    for k in range(6):
-                        Ai[6 * r + k] -= f * L[k]
+            U = work.U[d0 + a]
+            L = work.L[d0 + a]
+            for r in range(6):
+                f = U[r]
+                for k in range(6):
+                    Ai[6 * r + k] -= f * L[k]
         for k in range(36):
             A[p, k] += Ai[k]
     return True
@@ -100,7 +105,7 @@ def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
     """H out = b with the factors of `factor`; leaves the twists of configuration 3 in work.twist.  out may be b.
 
     up      p_i += U z,   z = D^-1 (b - S2^T p)
-    down    y = z - D^-1 L V_parent,   V_i = V_parent + S3nu y
+    down    y = z - L V_parent,   V_i = V_parent + S3nu y
     """
     n = model.body_parent.shape[0]
     p = work.subtree
@@ -112,16 +117,13 @@ def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
         d0 = model.body_vadr[i]
         m = model.body_vadr[i + 1] - d0
         pi = p[i]
-        for a in range(m):
-            t = work.S2[d0 + a]
-            work.rhs[d0 + a] = b[d0 + a] - (
-                t[0] * pi[0] + t[1] * pi[1] + t[2] * pi[2] + t[3] * pi[3] + t[4] * pi[4] + t[5] * pi[5]
-            )
-        for a in range(m):
-            z = 0.0
-            for e in range(m):
-                z += work.D[i, a * m + e] * work.rhs[d0 + e]
-            work.z[d0 + a] = z
+        for d in range(d0, d0 + m):
+            t = work.S2[d]
+            work.z[d] = b[d] - (t[0] * pi[0] + t[1] * pi[1] + t[2] * pi[2] + t[3] * pi[3] + t[4] * pi[4] + t[5] * pi[5])
+        if m == 1:
+            work.z[d0] *= work.D[i, 0]
+        elif m > 1:
+            lu_solve(work.D[i], m, int(work.D[i, 36]), work.z, d0)
         q = model.body_parent[i]
         if q < 0:
             continue
@@ -137,19 +139,13 @@ def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
         Vi = V[i]
         for k in range(6):
             Vi[k] = V[q, k] if q >= 0 else 0.0
-        if q >= 0:
-            for a in range(m):
-                L = work.L[d0 + a]
-                work.rhs[d0 + a] = (
-                    L[0] * Vi[0] + L[1] * Vi[1] + L[2] * Vi[2] + L[3] * Vi[3] + L[4] * Vi[4] + L[5] * Vi[5]
-                )
-        for a in range(m):
-            y = work.z[d0 + a]
+        for d in range(d0, d0 + m):
+            L = work.L[d]
+            y = work.z[d]
             if q >= 0:
-                for e in range(m):
-                    y -= work.D[i, a * m + e] * work.rhs[d0 + e]
-            out[d0 + a] = y
-        for a in range(m):
-            y = out[d0 + a]
+                y -= L[0] * Vi[0] + L[1] * Vi[1] + L[2] * Vi[2] + L[3] * Vi[3] + L[4] * Vi[4] + L[5] * Vi[5]
+            out[d] = y
+        for d in range(d0, d0 + m):
+            y = out[d]
             for k in range(6):
-                Vi[k] += work.S3nu[d0 + a, k] * y
+                Vi[k] += work.S3nu[d, k] * y

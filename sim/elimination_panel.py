@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.model import Matrix, Model, Work
 from solvers.jit import kernel
+from solvers.lu import lu_solve_rows
 
 
 @kernel
@@ -28,21 +29,11 @@ def _add_rows(S: Matrix, d: int, X: Matrix, P: Matrix, r: int) -> None:
 
 
 @kernel
-def _apply_block(model: Model, work: Work, i: int, sign: float, rows: Matrix, first: int, add: bool) -> None:
-    """columns[joint i] = [columns +] sign D^-1 rows[first ...]; scratch rows keep the aliasing safe."""
-    d = model.body_vadr[i]
-    n = model.body_vadr[i + 1] - d
-    D = work.D[i]
-    for a in range(n):
-        x = work.columns[d + a]
-        if not add:
-            for k in range(x.shape[0]):
-                x[k] = 0.0
-        for b in range(n):
-            g = sign * D[a * n + b]
-            y = rows[first + b]
-            for k in range(x.shape[0]):
-                x[k] += g * y[k]
+def _scale_row(X: Matrix, d: int, f: float) -> None:
+    """X[d] *= f"""
+    x = X[d]
+    for k in range(x.shape[0]):
+        x[k] *= f
 
 
 @kernel
@@ -70,16 +61,17 @@ def _panel_up(model: Model, work: Work) -> None:
     nbody = model.body_parent.shape[0]
     X = work.columns
     P = work.panel
-    last = 6 * nbody
-    _clear_rows(P, 0, last)
+    _clear_rows(P, 0, 6 * nbody)
     for i in range(nbody - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         q = model.body_parent[i]
         for d in range(d0, d0 + n):
             _rows_minus(work.S2, d, P, 6 * i, X)
-        _copy_rows(P, last, n, X, d0)
-        _apply_block(model, work, i, 1.0, P, last, False)
+        if n == 1:
+            _scale_row(X, d0, work.D[i, 0])
+        elif n > 1:
+            lu_solve_rows(work.D[i], n, int(work.D[i, 36]), X, d0)
         if q >= 0:
             for d in range(d0, d0 + n):
                 _add_rows(work.U, d, X, P, 6 * i)
@@ -94,10 +86,8 @@ def _panel_up(model: Model, work: Work) -> None:
 def solve_panel(model: Model, work: Work) -> None:
     """columns := H^-1 columns, as `solve` for one right-hand side."""
     _panel_up(model, work)
-    nbody = model.body_parent.shape[0]
     P = work.panel
-    last = 6 * nbody
-    for i in range(nbody):
+    for i in range(model.body_parent.shape[0]):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         q = model.body_parent[i]
@@ -105,14 +95,7 @@ def solve_panel(model: Model, work: Work) -> None:
             _clear_rows(P, 6 * i, 6)
         else:
             _copy_rows(P, 6 * i, 6, P, 6 * q)
-            _clear_rows(P, last, n)
-            for a in range(n):
-                s = P[last + a]
-                for r in range(6):
-                    g = work.L[d0 + a, r]
-                    v = P[6 * i + r]
-                    for k in range(s.shape[0]):
-                        s[k] += g * v[k]
-            _apply_block(model, work, i, -1.0, P, last, True)
+            for d in range(d0, d0 + n):
+                _rows_minus(work.L, d, P, 6 * i, work.columns)
         for d in range(d0, d0 + n):
             _add_rows(work.S3nu, d, work.columns, P, 6 * i)

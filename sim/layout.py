@@ -50,7 +50,7 @@ WORK_STEP_FIELDS = _shapes(
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
     S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, body_impulse nbody 6, turn_in nbody 4, turn nbody 4,
-    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 36,
+    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_gap nlimit, bound_w nlimit
@@ -60,7 +60,7 @@ WORK_STEP_FIELDS = _shapes(
 WORK_DERIVATIVE_FIELDS = _shapes(
     """
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody+6 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5
+    panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5
     """
 )
 
@@ -90,7 +90,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
-        "6nbody+6": 6 * sizes.nbody + 6,
+        "6nbody": 6 * sizes.nbody,
         "2nv+nu": 2 * sizes.nv + sizes.nu,
         "2nv": 2 * sizes.nv,
         "nx": sizes.nq + sizes.nv,

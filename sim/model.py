@@ -116,8 +116,8 @@ class Work(NamedTuple):
     # elimination
     A: Matrix  # (nbody, 36) articulated matrix of each subtree
     U: Matrix  # (nv, 6) columns A S3nu
-    L: Matrix  # (nv, 6) rows S2^T A
-    D: Matrix  # (nbody, 36) factorised joint blocks
+    L: Matrix  # (nv, 6) rows D^-1 S2^T A
+    D: Matrix  # (nbody, 37) LU factors of the joint blocks S2^T A S3nu + joint_block, and their row exchanges
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
@@ -144,7 +144,7 @@ class Work(NamedTuple):
     dR_dq: Matrix  # (nv, nv)
     dR_dv: Matrix  # (nv, nv)
     columns: Matrix  # (nv, 2 nv + nu) right-hand sides and solutions
-    panel: Matrix  # (6 nbody + 6, 2 nv + nu) wrenches, then twists, of all columns; six rows of scratch
+    panel: Matrix  # (6 nbody, 2 nv + nu) wrenches, then twists, of all columns
     step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before

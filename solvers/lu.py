@@ -1,0 +1,87 @@
+"""LU factors with row pivoting of small matrices: the blocks of one joint, up to 6 x 6.
+
+An explicit inverse would not do: next to a stiff contact its rounding, times the square of the stiffness, swamps the
+derivative of the step. Triangular solves keep the residual small, which is what the elimination needs.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.jit import kernel
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+@kernel
+def lu_factor(A: Vector, n: int) -> int:
+    """A := its LU factors; A holds n x n numbers row-major, n <= 15.
+
+    Returns the row exchanges, the pivot row of column k in bits 4k .. 4k+3, or -1 if a pivot vanishes or is not finite.
+    """
+    swaps = 0
+    for k in range(n):
+        best = abs(A[k * n + k])
+        row = k
+        for r in range(k + 1, n):
+            if abs(A[r * n + k]) > best:
+                best = abs(A[r * n + k])
+                row = r
+        if not (best > 1e-300 and best < 1e300):
+            return -1
+        swaps |= row << (4 * k)
+        if row != k:
+            for c in range(n):
+                A[k * n + c], A[row * n + c] = A[row * n + c], A[k * n + c]
+        for r in range(k + 1, n):
+            f = A[r * n + k] / A[k * n + k]
+            A[r * n + k] = f
+            for c in range(k + 1, n):
+                A[r * n + c] -= f * A[k * n + c]
+    return swaps
+
+
+@kernel
+def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
+    """b[first : first + n] := A^-1 b[first : first + n]."""
+    for k in range(n):
+        row = (swaps >> (4 * k)) & 15
+        if row != k:
+            b[first + k], b[first + row] = b[first + row], b[first + k]
+    for k in range(n):
+        for r in range(k + 1, n):
+            b[first + r] -= A[r * n + k] * b[first + k]
+    for k in range(n - 1, -1, -1):
+        for c in range(k + 1, n):
+            b[first + k] -= A[k * n + c] * b[first + c]
+        b[first + k] /= A[k * n + k]
+
+
+@kernel
+def lu_solve_rows(A: Vector, n: int, swaps: int, B: Matrix, first: int) -> None:
+    """B[first : first + n] := A^-1 B[first : first + n], all columns at once."""
+    m = B.shape[1]
+    for k in range(n):
+        row = (swaps >> (4 * k)) & 15
+        if row != k:
+            for c in range(m):
+                B[first + k, c], B[first + row, c] = B[first + row, c], B[first + k, c]
+    for k in range(n):
+        b = B[first + k]
+        for r in range(k + 1, n):
+            f = A[r * n + k]
+            x = B[first + r]
+            for c in range(m):
+                x[c] -= f * b[c]
+    for k in range(n - 1, -1, -1):
+        x = B[first + k]
+        for r in range(k + 1, n):
+            f = A[k * n + r]
+            b = B[first + r]
+            for c in range(m):
+                x[c] -= f * b[c]
+        f = 1.0 / A[k * n + k]
+        for c in range(m):
+            x[c] *= f
