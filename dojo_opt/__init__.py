@@ -34,9 +34,13 @@ __all__ = [
     "Sphere",
     "Status",
     "Trajectory",
+    "UrdfError",
+    "UrdfMechanism",
+    "UrdfWarning",
     "constraint",
     "cost",
     "ilqr",
+    "load_urdf",
     "models",
     "plots",
     "problems",
@@ -61,9 +65,13 @@ _HOME: dict[str, str | None] = {
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "Trajectory": "sim.results",
+    "UrdfError": "sim.urdf",
+    "UrdfMechanism": "sim.urdf",
+    "UrdfWarning": "sim.urdf",
     "constraint": None,
     "cost": None,
     "ilqr": "dojo_opt.planner",
+    "load_urdf": "sim.urdf",
     "models": None,
     "plots": None,
     "problems": None,
@@ -80,6 +88,7 @@ if TYPE_CHECKING:
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, Sphere
     from sim.simulator import Simulator
+    from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status
 
 

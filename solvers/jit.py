@@ -32,9 +32,9 @@ _REGISTRY: list[Any] = []
 
 
 def _sources() -> list[Path]:
-    """Every file whose text can end up inside a compiled kernel."""
+    """Every file whose text can end up inside a compiled kernel; a loader of files (sim/urdf) is not among them."""
     root = Path(__file__).resolve().parent.parent
-    files = [*root.glob("solvers/**/*.py"), *root.glob("sim/**/*.py")]
+    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name != "urdf")]
     files += [f for f in root.glob("dojo_opt/**/*.py") if b"solvers.jit" in f.read_bytes()]
     return sorted(files)
 

@@ -1,0 +1,99 @@
+"""load_urdf: a Mechanism from a URDF file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim import checks
+from sim.parts import Contact
+from sim.urdf.assemble import Choices, assemble
+from sim.urdf.report import Notes, UrdfMechanism
+from sim.urdf.robot import read_robot
+from sim.urdf.xml import parse
+
+MIMIC = ("free", "locked")
+
+
+def load_urdf(
+    path: str | Path,
+    floating: bool = True,
+    ground: bool = True,
+    friction: float | None = None,
+    contacts: Sequence[str | Contact] | None = None,
+    merge_fixed: bool = True,
+    *,
+    locked: Collection[str] = (),
+    mimic: str = "free",
+    repair: bool = False,
+    neutral: Mapping[str, ArrayLike] | None = None,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    actuated: Sequence[str] | None = None,
+    law: str = "nonlinear",
+    rim_points: int = 4,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> UrdfMechanism:
+    """The robot of a URDF file.
+
+        floating      whether the root can move (joint "floating_base") or is fixed to the world; a root link called
+                      "world" is the world in either case
+        ground        whether collision shapes cannot enter the half-space z < 0
+        friction      coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
+        contacts      which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the
+                      frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder
+                      (points on both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make
+                      no contacts.
+        merge_fixed   whether links on fixed joints become one body; a link without mass always does
+        locked        joints that are held at their neutral coordinate, as if they were fixed
+        mimic         what becomes of joints that follow another one, which is not modelled: "free" or "locked"
+        repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
+                      more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
+        neutral       coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their
+                      range when zero is outside. The base then stands so high that the lowest contact touches.
+        position      of the root's frame when it is fixed [m]
+        actuated      joints with an input, in the order of u; None: all that move, but for floating ones
+        rim_points    points per rim of a cylinder
+
+    Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
+    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation as in Dojo). A body's frame has the
+    axes of its first link and its origin at the centre of mass; `mechanism.report.links` has the pose of every link in
+    its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented
+    (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a UrdfWarning.
+
+    Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
+    names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
+    """
+    file = Path(path)
+    notes = Notes()
+    robot = read_robot(parse(file), notes)
+    checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
+    if not isinstance(rim_points, int | np.integer) or rim_points < 3:
+        raise ValueError(f"load_urdf(rim_points=...): expected a whole number >= 3, got {rim_points!r}")
+    held = [locked] if isinstance(locked, str) else list(locked)
+    for call, names in (("locked", held), ("neutral", neutral or ()), ("actuated", actuated or ())):
+        for name in names:
+            if name != "floating_base":
+                checks.one_of(f"load_urdf({call}=...): joint", name, robot.joints)
+    if robot.mimics:
+        fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
+        notes.add(f"mimic joints are not modelled; these {fate}", robot.mimics, warn=True)
+        held += robot.mimics if mimic == "locked" else ()
+    choices = Choices(
+        file=file.name,
+        fixed_base=not floating,
+        merge=merge_fixed,
+        locked=frozenset(held),
+        repair=repair,
+        neutral=dict(neutral or {}),
+        position=checks.vector("load_urdf(position=...)", position, 3),
+        actuated=None if actuated is None else tuple(actuated),
+        contacts=(contacts if ground else ()),
+        friction=None if friction is None else checks.number("load_urdf(friction=...)", friction, at_least=0.0),
+        law=law,
+        rim_points=int(rim_points),
+        gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
+    )
+    return assemble(robot, choices, notes)
