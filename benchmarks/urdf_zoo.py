@@ -8,8 +8,9 @@
 Each file is loaded as it is, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
 then with both. Nothing drives the joints. A robot on a fixed base is put so high that its lowest contact starts 1 cm
 above the ground. `fine` means: every step was solved, no contact was deeper in the ground than 1e-6 m, and the energy
-never was higher than at the start by more than 1 % of the largest kinetic energy and kappa / h per contact, which is
-what the smoothing of the contacts lifts a resting body by. The table shows the first reason of a refusal.
+never was higher than at the start by more than 1 % of the largest kinetic energy and 3 kappa / h per contact, which is
+what the smoothing of the contacts lifts a resting body by. The time step is 5 ms; a robot that does not do well with it
+is tried with 1 ms, and the line says so. The table shows the first reason of a refusal.
 
 PyBullet's thousand random objects are one mesh each, with the same numbers but for the mass: one line for all.
 """
@@ -34,7 +35,7 @@ import dojo_opt as dojo
 
 PACKAGES = ("example-robot-data", "pybullet")
 DURATION = 2.0  # [s]
-TIME_STEP = 0.005  # [s]
+TIME_STEPS = (0.005, 0.001)  # [s]
 CLEARANCE = 0.01  # [m] of a robot on a fixed base
 DEPTH = 1e-6  # [m]
 GROWTH = 0.01  # of the largest kinetic energy
@@ -101,18 +102,26 @@ def run(path: Path) -> Outcome:
     name = "/".join(path.parts[-2:])
     if mech is None:
         return Outcome(name, "refused", reason=reason)
-    sim = dojo.Simulator(mech, time_step=TIME_STEP)
-    x = sim.neutral()
-    t = sim.rollout(x, np.zeros((round(DURATION / TIME_STEP), sim.nu)))
+    out = fall(Outcome(name, "fine", how, reason), mech, TIME_STEPS[0])
+    if out.verdict != "fine":
+        tried = f"{TIME_STEPS[1] * 1e3:g} ms; with {TIME_STEPS[0] * 1e3:g} ms: {out.verdict}"
+        out = fall(Outcome(name, "fine", ", ".join(filter(None, (how, tried))), reason), mech, TIME_STEPS[1])
+    return out
+
+
+def fall(out: Outcome, mech: Any, time_step: float) -> Outcome:
+    """Simulate without inputs, and fill in the outcome."""
+    sim = dojo.Simulator(mech, time_step=time_step)
+    t = sim.rollout(sim.neutral(), np.zeros((round(DURATION / time_step), sim.nu)))
     energy, kinetic = sim.energy(t.x), sim.kinetic_energy(t.x)
-    out = Outcome(name, "fine", how, reason, sim.nbody, sim.nv, sim.ncontact)
+    out.bodies, out.dofs, out.contacts = sim.nbody, sim.nv, sim.ncontact
     out.iterations = int(t.iterations.max(initial=0))
-    allowed = GROWTH * kinetic.max() + sim.ncontact * sim.kappa / sim.time_step + 1e-9
+    allowed = GROWTH * kinetic.max() + 3.0 * sim.ncontact * sim.kappa / time_step + 1e-9
     out.growth = float((energy - energy[0]).max() / allowed)
     out.depth = max(0.0, -float(t.contacts.gap.min(initial=0.0)))
     wrong = []
     if not t.success:
-        wrong.append(f"{t.status.name} at {t.knot * TIME_STEP:.2f} s")
+        wrong.append(f"{t.status.name} at {t.knot * time_step:.2f} s")
     if not out.growth <= 1.0:
         wrong.append("energy grows")
     if not out.depth <= DEPTH:
@@ -157,7 +166,8 @@ def counts(outcomes: list[Outcome]) -> Counter[str]:
     total: Counter[str] = Counter()
     for o in outcomes:
         kind = o.verdict if o.verdict in ("fine", "refused") else "not fine"
-        total[f"{kind}, {o.how}" if o.how else kind] += o.copies
+        how = o.how.partition("; ")[0]
+        total[f"{kind}, {how}" if how else kind] += o.copies
     return total
 
 
@@ -182,6 +192,8 @@ def main(argv: list[str] | None = None) -> int:
         print()
         for kind, number in counts(outcomes).most_common():
             print(f"{number:>5}  {kind}")
+        touching = sum(o.copies for o in outcomes if o.contacts)
+        print(f"{touching:>5}  can touch the ground; the others have meshes only, and fall freely, or are refused")
         print(f"{sum(o.copies for o in outcomes):>5}  files in {time.perf_counter() - begin:.0f} s")
     return 1 if any(o.verdict not in ("fine", "refused") for o in outcomes) else 0
 

@@ -129,6 +129,9 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
         file.write_text(file.read_text() + "\n# edited\n")
         seen.append(digest())
     assert len(set(seen)) == 3
+    loader = copy / "sim" / "urdf" / "load.py"  # a file that no kernel reads
+    loader.write_text(loader.read_text() + "\n# edited\n")
+    assert digest() == seen[-1]
 
 
 def test_an_edited_callee_reaches_its_caller(copy: Path) -> None:

@@ -66,6 +66,8 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
     taken = {body.joint.name for body in groups if body.joint}
     base = ROOT_JOINT[choices.fixed_base]
     base = base if base not in taken else f"{root}_{base}"
+    for name in choices.neutral:
+        checks.one_of("load_urdf(neutral=...): joint", name, [*robot.joints, *([base] if floating else [])])
     joints = [_joint(body, places, coms, choices, base) for body in groups]
     if not any(joint.nv for joint in joints):
         raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
@@ -92,10 +94,14 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
 
 
 def _neutral(robot: Robot, choices: Choices, name: str) -> float:
-    """Neutral coordinate of a joint with at most one degree of freedom."""
-    if name in choices.neutral and robot.joints[name].kind in ("revolute", "prismatic"):
-        return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
-    return resting(robot.joints[name].limits) if name in robot.joints else 0.0
+    """Neutral coordinate of a joint with one degree of freedom; of one with more, which is to be locked, zero."""
+    if name not in choices.neutral:
+        return resting(robot.joints[name].limits)
+    if robot.joints[name].kind not in ("revolute", "prismatic"):
+        raise ValueError(
+            f"load_urdf(neutral=...): joint {name!r} does not move, or is held where all coordinates are zero"
+        )
+    return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
 
 
 def _inertias(groups: list[Group], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim import checks
-from sim.parts import Contact
+from sim.parts import LAWS, Contact
 from sim.urdf.assemble import Choices, assemble
 from sim.urdf.report import Notes, UrdfMechanism
 from sim.urdf.robot import read_robot
@@ -70,17 +70,16 @@ def load_urdf(
     notes = Notes()
     robot = read_robot(parse(file), notes)
     checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
+    checks.one_of("load_urdf(law=...)", law, LAWS)
     if not isinstance(rim_points, int | np.integer) or rim_points < 3:
         raise ValueError(f"load_urdf(rim_points=...): expected a whole number >= 3, got {rim_points!r}")
     held = [locked] if isinstance(locked, str) else list(locked)
-    for call, names in (("locked", held), ("neutral", neutral or ()), ("actuated", actuated or ())):
-        for name in names:
-            if name != "floating_base":
-                checks.one_of(f"load_urdf({call}=...): joint", name, robot.joints)
-    if robot.mimics:
+    for name in held:
+        checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
+    if following := [name for name in robot.mimics if name not in held]:
         fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
-        notes.add(f"mimic joints are not modelled; these {fate}", robot.mimics, warn=True)
-        held += robot.mimics if mimic == "locked" else ()
+        notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
+        held += following if mimic == "locked" else []
     choices = Choices(
         file=file.name,
         fixed_base=not floating,

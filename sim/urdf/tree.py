@@ -84,7 +84,8 @@ def ordered(robot: Robot, file: str) -> tuple[str, list[UrdfJoint]]:
         order.append(joint)
         waiting += below.get(joint.child, [])[::-1]
     if len(order) < len(robot.joints):
-        lost = next(joint for joint in robot.joints.values() if joint not in order)
+        placed = {joint.name for joint in order}
+        lost = next(joint for joint in robot.joints.values() if joint.name not in placed)
         raise lost.element.error(f"joint {lost.name!r} is part of a cycle that does not hang on the root {roots[0]!r}")
     return roots[0], order
 

@@ -1,0 +1,165 @@
+"""Collision shapes of URDF files as contacts: where they are, which are chosen, and that a robot stands on them."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from urdf_files import collision, inertial, joint, link, write
+
+import dojo_opt as dojo
+from sim.urdf.stance import gaps
+
+SPHERE, BOX = '<sphere radius="0.1"/>', '<box size="0.2 0.4 0.6"/>'
+CYLINDER, CAPSULE = '<cylinder radius="0.3" length="0.2"/>', '<capsule radius="0.05" length="0.4"/>'
+MESH = '<mesh filename="package://robot/foot.stl" scale="1 1 1"/>'
+
+
+def one(folder: Path, *parts: str, **settings: object) -> dojo.UrdfMechanism:
+    """A body with its centre of mass at (0.1, 0, 0) of its link."""
+    return dojo.load_urdf(write(folder, link("body", inertial(xyz="0.1 0 0"), *parts)), **settings)
+
+
+def balls(mech: dojo.Mechanism) -> list[tuple[float, ...]]:
+    """(x, y, z, radius) of the contacts, sorted."""
+    return sorted((*(round(x, 9) for x in c.point), c.radius) for c in mech.contacts)
+
+
+def test_a_sphere_is_one_ball(tmp_path: Path) -> None:
+    mech = one(tmp_path, collision(SPHERE, "0.1 0.2 0.3"))
+    assert balls(mech) == [(0.0, 0.2, 0.3, 0.1)]
+    assert mech.contact_names == ("body",)
+
+
+def test_a_box_is_its_corners_turned_and_moved(tmp_path: Path) -> None:
+    mech = one(tmp_path, collision(BOX, "0.1 0 1", f"0 0 {np.pi / 2}"))
+    expected = [(x, y, 1.0 + z, 0.0) for x, y, z in product((-0.2, 0.2), (-0.1, 0.1), (-0.3, 0.3))]
+    np.testing.assert_allclose(balls(mech), sorted(expected), atol=1e-9)
+
+
+def test_a_capsule_is_two_balls(tmp_path: Path) -> None:
+    mech = one(tmp_path, collision(CAPSULE, "0.1 0 0"))
+    assert balls(mech) == [(0.0, 0.0, -0.2, 0.05), (0.0, 0.0, 0.2, 0.05)]
+
+
+@pytest.mark.parametrize("rim", [3, 4, 8])
+def test_a_cylinder_is_points_on_both_rims(tmp_path: Path, rim: int) -> None:
+    points = np.array([c.point for c in one(tmp_path, collision(CYLINDER, "0.1 0 0"), rim_points=rim).contacts])
+    assert len(points) == 2 * rim
+    np.testing.assert_allclose(np.linalg.norm(points[:, :2], axis=1), 0.3)
+    np.testing.assert_allclose(np.sort(points[:, 2]), np.repeat([-0.1, 0.1], rim))
+    assert len({tuple(p) for p in points.round(6)}) == 2 * rim
+
+
+def wheeled(folder: Path, axis: str, at: str = "0 0 0") -> dojo.UrdfMechanism:
+    wheel = link("wheel", inertial(), collision(CYLINDER, at, f"{np.pi / 2} 0 0"))
+    return dojo.load_urdf(
+        write(
+            folder, link("car", inertial()), wheel, joint("axle", "car", "wheel", "continuous", axis, at='xyz="0 1 0"')
+        )
+    )
+
+
+def test_a_cylinder_that_turns_about_its_axis_is_a_wheel(tmp_path: Path) -> None:
+    """Two balls of its radius: level, it is as high above the ground at every angle as a round wheel."""
+    mech = wheeled(tmp_path, '<axis xyz="0 1 0"/>')
+    np.testing.assert_allclose(balls(mech), [(0.0, -0.1, 0.0, 0.3), (0.0, 0.1, 0.0, 0.3)], atol=1e-9)
+    q = np.array(mech.neutral)
+    for angle in (0.0, 0.4, 2.0):
+        q[-1] = angle
+        np.testing.assert_allclose(gaps(mech, q), 0.0, atol=2e-9)
+    assert len(wheeled(tmp_path, '<axis xyz="1 0 0"/>').contacts) == 8  # not its axis
+    assert len(wheeled(tmp_path, '<axis xyz="0 1 0"/>', "0.1 0 0").contacts) == 8  # eccentric
+
+
+def test_shapes_of_merged_links_are_carried_over(tmp_path: Path) -> None:
+    at = 'xyz="0.1 0 -1" rpy="0 1.5707963267948966 0"'
+    parts = (link("body", inertial()), link("foot", inertial(0.5), collision(SPHERE, "0 0 0.2")))
+    path = write(tmp_path, *parts, joint("ankle", "body", "foot", "fixed", "", at=at))
+    merged, kept = dojo.load_urdf(path), dojo.load_urdf(path, merge_fixed=False)
+    assert (merged.contacts[0].body, kept.contacts[0].body) == ("body", "foot")
+    com = np.array([0.1, 0.0, -1.0]) / 3.0  # 0.5 of 1.5 kg at the foot
+    np.testing.assert_allclose(merged.contacts[0].point, np.array([0.3, 0.0, -1.0]) - com, atol=1e-12)
+    np.testing.assert_allclose(kept.contacts[0].point, (0.0, 0.0, 0.2))
+    assert merged.contact_names == kept.contact_names == ("foot",)
+
+
+# -- choices -----------------------------------------------------------------------------------------------------------
+
+
+def biped(folder: Path) -> Path:
+    """A trunk with a box; feet with a sphere and with a mesh."""
+    feet = (link("left", inertial(), collision(SPHERE)), link("right", inertial(), collision(MESH)))
+    down = {"left": 'xyz="0 0.2 -0.5"', "right": 'xyz="0 -0.2 -0.5"'}
+    ankles = (joint(f"{foot}_ankle", "trunk", foot, at=at) for foot, at in down.items())
+    return write(folder, link("trunk", inertial(), collision(BOX)), *feet, *ankles)
+
+
+def test_all_links_touch_the_ground_or_those_that_are_chosen(tmp_path: Path) -> None:
+    path = biped(tmp_path)
+    every = dojo.load_urdf(path)
+    assert len(every.contacts) == 9
+    assert any(str(n) == "no contact from collision shapes of kind 'mesh': right" for n in every.report.notes)
+    assert dojo.load_urdf(path, contacts=["left"]).contact_names == ("left",)
+    assert dojo.load_urdf(path, ground=False).contacts == ()
+
+
+def test_a_contact_can_be_placed_by_hand_in_the_frame_of_its_link(tmp_path: Path) -> None:
+    foot = dojo.Contact("right", point=(0.0, 0.0, 0.1), radius=0.02, friction=0.3)
+    mech = dojo.load_urdf(biped(tmp_path), contacts=["left", foot])
+    assert [(c.name, c.body, c.radius, c.friction) for c in mech.contacts] == [
+        ("left", "left", 0.1, 0.8),
+        ("right", "right", 0.02, 0.3),
+    ]
+    with pytest.raises(dojo.UrdfError, match=r"link name='right'.*contacts=\.\.\.: the link has no sphere, box"):
+        dojo.load_urdf(biped(tmp_path), contacts=["right"])
+    with pytest.raises(dojo.UrdfError, match=r"load_urdf\(contacts=\.\.\.\): 'hand' is not a link of the file: trunk"):
+        dojo.load_urdf(biped(tmp_path), contacts=["hand"])
+
+
+def test_friction_is_the_callers_or_the_files_or_the_usual_one(tmp_path: Path) -> None:
+    rubber = '<contact><lateral_friction value="1.5"/><rolling_friction value="0.1"/></contact>'
+    slick, sticky = one(tmp_path, collision(SPHERE)), one(tmp_path, rubber, collision(SPHERE))
+    assert (slick.contacts[0].friction, sticky.contacts[0].friction) == (0.8, 1.5)
+    assert one(tmp_path, rubber, collision(SPHERE), friction=0.2).contacts[0].friction == 0.2
+    assert "rolling and spinning friction and restitution are not modelled: body" in str(sticky.report)
+    assert one(tmp_path, collision(SPHERE), law="linear").contacts[0].law == "linear"
+
+
+def test_contact_names_never_collide(tmp_path: Path) -> None:
+    parts = (link("foot", inertial(), collision(CAPSULE)), link("foot_0", inertial(), collision(SPHERE)))
+    mech = dojo.load_urdf(write(tmp_path, *parts, joint("toe", "foot", "foot_0")))
+    assert mech.contact_names == ("foot_0", "foot_1", "foot_0_1")
+
+
+def test_what_cannot_touch_the_ground_is_said(tmp_path: Path) -> None:
+    with pytest.warns(dojo.UrdfWarning, match="nothing of the robot makes contact with the ground"):
+        one(tmp_path, collision(MESH))
+    path = biped(tmp_path)
+    with pytest.warns(
+        dojo.UrdfWarning, match=r"contacts that are below the ground in the neutral state.*left \(0\.6 m\)"
+    ):
+        mech = dojo.load_urdf(path, floating=False)
+    assert "no contacts on links that are fixed to the world: trunk" in str(mech.report)
+    assert dojo.load_urdf(path, floating=False, position=(0, 0, 1)).contact_names == ("left",)
+
+
+# -- standing ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_lowest_contact_touches_the_ground(tmp_path: Path) -> None:
+    for settings in ({}, {"neutral": {"left_ankle": 0.5}}, {"contacts": ["left"]}):
+        mech = dojo.load_urdf(biped(tmp_path), **settings)
+        lowest = gaps(mech, np.array(mech.neutral)).min()
+        assert 0.0 < lowest < 1e-8
+
+
+def test_a_box_stands_and_carries_its_weight(tmp_path: Path) -> None:
+    mech = one(tmp_path, collision(BOX, "0.1 0 0"))
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)
+    t = sim.rollout(sim.neutral(), np.zeros((100, 0)), throw=True)
+    np.testing.assert_allclose(t.x[-1, :3], (0.1, 0.0, 0.3), atol=1e-4)
+    np.testing.assert_allclose(t.contacts.normal_force[-1].sum(), 9.81, rtol=1e-3)
+    assert t.contacts.gap.min() > -1e-8

@@ -1,0 +1,126 @@
+"""URDF files for tests, put together from parts; and MuJoCo's reading of a file, as the reference."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import dojo_opt as dojo
+from sim.shapes import rotation_matrix
+from sim.urdf.stance import poses
+
+SKEWED = (0.02, 0.03, 0.04, 0.002, -0.003, 0.004)  # xx yy zz xy xz yz [kg m^2]
+
+
+def inertial(mass: float = 1.0, xyz: str = "0 0 0", rpy: str = "0 0 0", inertia: tuple[float, ...] = SKEWED) -> str:
+    xx, yy, zz, xy, xz, yz = inertia
+    return (
+        f'<inertial><origin xyz="{xyz}" rpy="{rpy}"/><mass value="{mass}"/>'
+        f'<inertia ixx="{xx}" ixy="{xy}" ixz="{xz}" iyy="{yy}" iyz="{yz}" izz="{zz}"/></inertial>'
+    )
+
+
+def collision(shape: str, xyz: str = "0 0 0", rpy: str = "0 0 0") -> str:
+    return f'<collision><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{shape}</geometry></collision>'
+
+
+def link(name: str, *parts: str) -> str:
+    """A link; one of 1 kg when nothing is said about it."""
+    return f'<link name="{name}">{"".join(parts or [inertial()])}</link>'
+
+
+def joint(name: str, parent: str, child: str, kind: str = "revolute", *parts: str, at: str = "") -> str:
+    origin = at or 'xyz="0.1 -0.2 0.3" rpy="0.3 -0.4 0.5"'
+    inside = "".join(parts or ['<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="5" velocity="2"/>'])
+    return (
+        f'<joint name="{name}" type="{kind}"><origin {origin}/><parent link="{parent}"/><child link="{child}"/>'
+        f"{inside}</joint>"
+    )
+
+
+def write(folder: Path, *parts: str, name: str = "robot") -> Path:
+    """The file of a robot, one part per line: the first part is on line 2."""
+    path = folder / f"{name}.urdf"
+    path.write_text("\n".join([f'<robot name="{name}">', *parts, "</robot>"]))
+    return path
+
+
+# -- MuJoCo's reading of the same file ---------------------------------------------------------------------------------
+
+
+def mujoco_model(path: Path) -> Any:
+    """The links and joints of a file as MuJoCo reads them, on a floating base, without shapes; nothing is merged."""
+    import mujoco
+
+    root = ET.fromstring(path.read_bytes().strip(b"\0 \t\r\n"))
+    for link_ in root.iter("link"):
+        for tag in ("visual", "collision"):
+            for part in link_.findall(tag):
+                link_.remove(part)
+    for joint_ in root.iter("joint"):
+        for mimic in joint_.findall("mimic"):
+            joint_.remove(mimic)
+    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    spec.compiler.fusestatic = False
+    if (first := spec.worldbody.first_body()) and not first.joints:
+        first.add_freejoint(name="floating_base")
+    return spec.compile()
+
+
+def compare_with_mujoco(path: Path, rng: np.random.Generator, states: int = 3) -> tuple[float, float, float]:
+    """Largest differences from MuJoCo at random states: link poses [m, -], mass [relative], kinetic energy [relative].
+
+    The kinetic energies of random velocities are v^T M v / 2, so they see every entry of the mass matrix.
+    """
+    import mujoco
+
+    mech = dojo.load_urdf(path, ground=False)
+    sim = dojo.Simulator(mech, time_step=1e-3)
+    model = mujoco_model(path)
+    data = mujoco.MjData(model)
+    base = mech.joints[0]
+    com = -np.array(mech.report.links[base.child].point)  # the centre of mass in the frame of the root
+    worst = np.zeros(3)
+    bodies = {mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, k): k for k in range(model.nbody)}
+    for _ in range(states):
+        q, v = np.zeros(mech.nq), rng.normal(size=mech.nv)
+        for j in mech.joints:
+            at, dof = mech.q_slice(j.name), mech.v_slice(j.name)
+            q[at] = rng.normal(size=j.nq)
+            if j.nrot == 3:
+                q[at.stop - 4 : at.stop] /= np.linalg.norm(q[at.stop - 4 : at.stop])
+            if j.kind == "floating":
+                R = rotation_matrix(q[at][3:])
+                place = np.concatenate([q[at][:3] - R @ com, q[at][3:]])
+                speed = np.concatenate([v[dof][:3] - R @ np.cross(v[dof][3:], com), v[dof][3:]])
+                k = model.jnt(j.name).id
+            else:
+                place, speed = q[at], v[dof]
+                k = model.jnt(j.name).id
+            a, d = model.jnt_qposadr[k], model.jnt_dofadr[k]
+            data.qpos[a : a + j.nq], data.qvel[d : d + j.nv] = place, speed
+        mujoco.mj_forward(model, data)
+        ours = poses(mech, q)
+        for name, frame in mech.report.links.items():
+            if name not in bodies or frame.body is None:
+                continue
+            body = ours[frame.body]
+            worst[0] = max(worst[0], np.abs(body.at(frame.point) - data.xpos[bodies[name]]).max())
+            R = body.rotation @ rotation_matrix(frame.orientation)
+            worst[0] = max(worst[0], np.abs(R - data.xmat[bodies[name]].reshape(3, 3)).max())
+        x = np.concatenate([q, np.zeros(mech.nv)])
+        z = sim.maximal(x)
+        for k, body in enumerate(mech.body_names):  # the compiled kinematics stand on the same poses
+            worst[0] = max(worst[0], np.abs(z[k, :3] - ours[body].point).max())
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        theirs = 0.5 * data.qvel @ M @ data.qvel
+        energy = sim.kinetic_energy(sim.start(q, v * 0.1)) * 100.0
+        worst[2] = max(worst[2], abs(energy - theirs) / theirs)
+    moving = sum(b.mass for b in mech.bodies)
+    theirs = sum(model.body_mass[bodies[n]] for n, f in mech.report.links.items() if n in bodies and f.body)
+    worst[1] = abs(moving - theirs) / moving
+    return float(worst[0]), float(worst[1]), float(worst[2])
