@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+_HUGE = 1e30  # no quantity of a robot; cubes of smaller numbers are finite
+
+
 class UrdfError(ValueError):
     """A URDF file that cannot be read, or a robot that cannot be simulated; names the file, the line, the element."""
 
@@ -67,7 +70,7 @@ class Element:
             values = np.array([float(word) for word in text.split()])
         except ValueError:
             values = np.array([np.nan])
-        if len(values) != length or not np.isfinite(values).all():
+        if len(values) != length or not np.all(np.abs(values) < _HUGE):
             expected = "a finite number" if length == 1 else f"{length} finite numbers"
             hint = "; this is a xacro file, run xacro on it first" if "${" in text or "$(" in text else ""
             raise self.error(f"{attribute}={text!r}: expected {expected}{hint}")

@@ -65,6 +65,10 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
         "line 2, <mass>: value='heavy': expected",
     ),
     "infinity": ((link("base", inertial(mass=float("inf"))),), "line 2, <mass>: value='inf': expected a finite number"),
+    "huge": (
+        (link("base", inertial(xyz="0 0 1e300")),),
+        "line 2, <origin>: xyz='0 0 1e300': expected 3 finite numbers",
+    ),
     "commas": ((link("base", inertial(xyz="1, 2, 3")),), "line 2, <origin>: xyz='1, 2, 3': expected 3 finite numbers"),
     "negative mass": ((link("base", inertial(-1.0)),), "line 2, <mass>: expected a mass >= 0, got -1"),
     "no mass": ((link("base", "<inertial/>"),), "line 2, <inertial>: expected a <mass> inside"),
