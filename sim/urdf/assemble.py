@@ -58,7 +58,6 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
     if locked:
         notes.add("joints that are held where they are", locked)
     groups, places = group(robot, root, order, choices.fixed_base, choices.merge, locked)
-    floating = bool(groups) and groups[0].joint is None and not choices.fixed_base
     if root == WORLD and not choices.fixed_base:
         notes.add("the root is called 'world', so it is fixed there although floating=True", [root])
     inertias = _inertias(groups, choices, notes)
@@ -66,9 +65,9 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
     taken = {body.joint.name for body in groups if body.joint}
     base = ROOT_JOINT[choices.fixed_base]
     base = base if base not in taken else f"{root}_{base}"
-    for name in choices.neutral:
-        checks.one_of("load_urdf(neutral=...): joint", name, [*robot.joints, *([base] if floating else [])])
     joints = [_joint(body, places, coms, choices, base) for body in groups]
+    for name in choices.neutral:
+        checks.one_of("load_urdf(neutral=...): joint", name, dict.fromkeys([*robot.joints, *(j.name for j in joints)]))
     if not any(joint.nv for joint in joints):
         raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
     found = find_contacts(places, coms, choices.contacts, (choices.friction, choices.law, choices.rim_points), notes)
@@ -83,9 +82,10 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
         name=robot.name,
         neutral=neutral,
     )
-    if floating:
-        mech = replace(mech, neutral=lifted(mech, base, coms[root], choices.neutral))
-    _ground_notes(mech, choices, floating, notes)
+    bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
+    if len(bases) == 1 and bases[0] not in choices.neutral:
+        mech = replace(mech, neutral=lifted(mech, bases[0]))
+    _ground_notes(mech, choices, bool(bases), notes)
     report = _report(robot, mech, places, coms, choices.file, notes)
     for note in report.notes:
         if note.warn:
@@ -135,8 +135,8 @@ def _joint(body: Group, places: Mapping[str, Place], coms: Mapping[str, Floats],
     com = coms[body.name]
     if body.joint is None:
         if choices.fixed_base:
-            return Joint("fixed", None, body.name, base, choices.position, -com)
-        return Joint("floating", None, body.name, base)
+            return Joint("fixed", None, body.name, base, choices.position, child_point=-com)
+        return Joint("floating", None, body.name, base, child_point=-com)
     joint, at = body.joint, places[body.joint.parent]
     frame = at.pose.then(joint.pose)
     if at.group.name in coms:

@@ -38,8 +38,9 @@ def load_urdf(
 ) -> UrdfMechanism:
     """The robot of a URDF file.
 
-        floating      whether the root can move (joint "floating_base") or is fixed to the world; a root link called
-                      "world" is the world in either case
+        floating      whether the root can move or is fixed to the world; a root link called "world" is the world in
+                      either case. The joint is called "floating_base": its coordinates are the position of the root's
+                      frame and its quaternion, its speeds that of the frame's origin (world) and of rotation (body)
         ground        whether collision shapes cannot enter the half-space z < 0
         friction      coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
         contacts      which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the

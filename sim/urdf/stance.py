@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim.build import translation_axes
 from sim.mechanism import Mechanism
@@ -54,17 +52,13 @@ def gaps(mech: Mechanism, q: Floats) -> Floats:
     return np.array(out, dtype=np.float64)
 
 
-def lifted(mech: Mechanism, base: str, com: Floats, given: Mapping[str, ArrayLike]) -> Floats:
-    """Neutral q with the floating base so high that every contact is on or above its ground, and one touches.
-
-    Without a contact, the frame of the root link is at the origin, and com is its centre of mass in it.
-    """
+def lifted(mech: Mechanism, base: str) -> Floats:
+    """Neutral q with the joint `base`, floating in the world, so high that the lowest contact touches its ground."""
     q = np.array(mech.neutral, dtype=np.float64)
-    if base in given:
-        return q
-    at = mech.q_slice(base).start
-    q[at : at + 3] = com
+    joint = mech.joints[mech.joint_names.index(base)]
     rise = mech.contact_normals[:, 2]
     if np.any(rise > 0.0):
-        q[at + 2] -= (gaps(mech, q)[rise > 0.0] / rise[rise > 0.0]).min() - _CLEAR
+        up = _CLEAR - (gaps(mech, q)[rise > 0.0] / rise[rise > 0.0]).min()
+        at = mech.q_slice(base).start
+        q[at : at + 3] += up * rotation_matrix(joint.orientation)[2]
     return q

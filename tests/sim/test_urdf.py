@@ -334,6 +334,19 @@ def test_the_neutral_state_is_within_limits_and_can_be_chosen(tmp_path: Path) ->
         dojo.load_urdf(ball, neutral={"elbow": (0, 1, 0, 0)}, locked=["elbow"])
 
 
+def test_a_base_that_floats_in_the_file_is_put_on_the_ground_too(tmp_path: Path) -> None:
+    at = 'xyz="0 0 7" rpy="1 0.3 0"'
+    path = write(
+        tmp_path,
+        link("world", ""),
+        link("base", inertial(), BALL),
+        joint("free", "world", "base", "floating", "", at=at),
+    )
+    mech = dojo.load_urdf(path)
+    assert mech.joint_names == ("free",)
+    np.testing.assert_allclose(poses(mech, np.array(mech.neutral))["base"].point, (0, 0, 0.1), atol=1e-8)
+
+
 # -- what is not represented -------------------------------------------------------------------------------------------
 
 
