@@ -12,7 +12,8 @@ never was higher than at the start by more than 1 % of the largest kinetic energ
 what the smoothing of the contacts lifts a resting body by. The time step is 5 ms; a robot that does not do well with it
 is tried with 1 ms, and the line says so. The table shows the first reason of a refusal.
 
-PyBullet's thousand random objects are one mesh each, with the same numbers but for the mass: one line for all.
+PyBullet's thousand random objects are one mesh each. All are loaded; those with equal masses and inertias, which is
+all of them, are simulated once, and are one line of the table.
 """
 
 from __future__ import annotations
@@ -148,17 +149,26 @@ def line(o: Outcome) -> str:
 
 
 def study(paths: list[Path], out: Any = None) -> list[Outcome]:
-    """All files; the random objects of PyBullet, which are alike, as one."""
-    alike = [p for p in paths if "random_urdfs" in p.parts]
-    rest = [p for p in paths if "random_urdfs" not in p.parts]
-    outcomes = []
-    for path in rest + alike[:1]:
-        outcomes.append(run(path))
-        if path in alike:
-            outcomes[-1].copies = len(alike)
-        if out:
-            print(line(outcomes[-1]), file=out, flush=True)
+    """All files; of the random objects of PyBullet, those with the same body as one."""
+    outcomes = [_told(run(path), out) for path in paths if "random_urdfs" not in path.parts]
+    alike: dict[Any, list[Path]] = {}
+    for path in paths:
+        if "random_urdfs" in path.parts:
+            mech, how, reason = load(path)
+            key = (mech.bodies[0].mass, mech.bodies[0].inertia, len(mech.contacts), how) if mech else reason
+            alike.setdefault(key, []).append(path)
+    for copies in alike.values():
+        outcome = run(copies[0])
+        outcome.copies = len(copies)
+        outcomes.append(_told(outcome, out))
     return outcomes
+
+
+def _told(outcome: Outcome, out: Any) -> Outcome:
+    """The outcome, after its line is printed."""
+    if out:
+        print(line(outcome), file=out, flush=True)
+    return outcome
 
 
 def counts(outcomes: list[Outcome]) -> Counter[str]:
