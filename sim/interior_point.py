@@ -1,17 +1,21 @@
 """The interior point of a step: Newton's method on the joint velocities, contacts and limits held on the central path.
 
-Three things decide (20,000 random extreme states, `benchmarks/robustness.py`):
+Four things decide (20,000 random extreme states, `benchmarks/robustness.py`):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
   beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
   positive. Conic scalings jam on thin cones.
-* The start is on the central path: of kappa itself where that balances, else of a kappa0 fit for the predicted overlap.
-* When the boundary or the line search allow only a short step, or nothing has converged for a while, the method does
-  not creep: it starts again on the central path, at a larger kappa, from rest, half the incoming velocity, or all of
-  it.
+* The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
+  the impulses of kappa itself, a robot at rest, starts there.
+* An attempt whose steps become short, at the boundary or in the line search, is given up: creeping on costs more than
+  starting again.
+* The next attempt starts from another share of the incoming velocity and another kappa0. Shares are a golden-ratio
+  sequence: starts that differ solve what no single better start did.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
@@ -39,15 +43,28 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
-_NOT_FINITE = int(Status.NOT_FINITE)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
+_AT_REST = 1e-3  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _SHORT = 0.1  # a step below this share of the Newton step is short
-_RESTART_GROWTH = 3.0  # of the starting kappa, per restart
-_HURRY = 12  # iterations of the first attempt, whose friction follows the normal impulses
-_PATIENCE = 30  # iterations of the others, whose friction is led down to kappa step by step
-_HALVINGS = 12  # of the line search, then the step is taken as it is and counts as short
+_GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
+_GROWTHS = 8  # attempts
+_GOLDEN = 0.6180339887498949
+_LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
+_ATTEMPTS = 60
+_PATIENCE = 30  # iterations of an attempt
+_HALVINGS = 12  # of the line search
+_FEW = 3  # halvings; an attempt that needs more is given up
+
+
+class Merit(NamedTuple):
+    """How far an iterate is from the solution; everything infinite where a body turns by half a turn."""
+
+    residual: float  # largest equality residual, momenta relative to their scale
+    violation: float  # largest |product - kappa|, or violation of the friction law at the present smoothing
+    mean: float  # of the complementarity products
 
 
 @kernel
@@ -108,13 +125,20 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
 
 
 @kernel
-def follow(model: Model, work: Work, kappa: float, smoothing: float) -> tuple[float, float]:
-    """The smoothing brought down towards kappa as far as the friction law holds on the way, and its violation there."""
+def follow(model: Model, work: Work, least: float, smoothing: float, ratio: float) -> tuple[float, float, float]:
+    """The smoothing brought down to `least` as far as the friction law holds on the way, and its violation there.
+
+    ratio: of one smoothing to the next; it shrinks where Newton's method lands well within the law.
+    """
     slip = slip_error(model, work, smoothing)
-    while smoothing > kappa and slip < 0.3 * smoothing:
-        smoothing = max(kappa, 0.1 * smoothing)
+    if slip < 0.03 * smoothing:
+        ratio = max(1e-4, ratio * ratio)
+    elif slip > 0.3 * smoothing:
+        ratio = min(1e-2, ratio**0.5)
+    while smoothing > least and slip < 0.3 * smoothing:
+        smoothing = max(least, ratio * smoothing)
         slip = slip_error(model, work, smoothing)
-    return smoothing, slip
+    return smoothing, slip, ratio
 
 
 @kernel
@@ -125,41 +149,132 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
             work.nu[d] = share * v[d]
             work.nu_trial[d] = work.nu[d]
         if momentum_balance(model, work, h, q):
+            inequality_kinematics(model, work, h)
             return True
         share *= 0.7
     return False
 
 
 @kernel
-def balances_at_kappa(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> bool:
-    """Whether the incoming motion balances better with the impulses of kappa itself than with those of a larger start.
+def first_attempt(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> int:
+    """0, the start at kappa itself, where the incoming motion all but balances with its impulses; 1 everywhere else.
 
     The gap of a resting contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution.
     """
+    if not place(model, work, options.h, q, v, 1.0):
+        return 1
     start_inequalities(model, work, options.h, options.kappa, 0.0)
     hard, _ = residuals(model, work, options.h, q, v, u)
     start_inequalities(model, work, options.h, options.kappa, 1.0)
     soft, _ = residuals(model, work, options.h, q, v, u)
-    return hard < soft
+    return 0 if hard < _AT_REST * soft else 1
 
 
 @kernel
-def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, attempt: int) -> float:
-    """Start on the central path: attempt 0 at kappa itself or the usual kappa0, 1 the usual one, then ever larger ones.
+def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, attempt: int) -> float:
+    """Start on the central path: attempt 0 at kappa itself, 1 at the usual kappa0, then at others.
 
-    nu is the incoming velocity at first; from attempt 2 on rest, half of it, all of it in turn.
+    nu is the incoming velocity at first, from attempt 2 on a share of it: 1/2 and on by the golden ratio, modulo 1.
     Returns the kappa of the start, 0 if there is none.
     """
-    share = 1.0
-    if attempt >= 2:
-        share = 0.0 if attempt % 3 == 2 else (0.5 if attempt % 3 == 0 else 1.0)
+    share = 1.0 if attempt < 2 else (0.5 + _GOLDEN * (attempt - 2)) % 1.0
     if not place(model, work, options.h, q, v, share):
         return 0.0
-    inequality_kinematics(model, work, options.h)
-    growth = _RESTART_GROWTH ** max(attempt - 1, 0)
-    if attempt == 0 and balances_at_kappa(model, work, options, q, v, u):
-        growth = 0.0
+    growth = 0.0 if attempt == 0 else _GROWTH ** ((attempt - 1) % _GROWTHS)
     return start_inequalities(model, work, options.h, options.kappa, growth)
+
+
+@kernel
+def assess(
+    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, scale: float, smoothing: float
+) -> Merit:
+    """Merit of the present iterate."""
+    r, e = residuals(model, work, options.h, q, v, u)
+    mean, violation = products(model, work, options.kappa)
+    violation = max(violation, slip_error(model, work, smoothing))
+    r = max(r / scale, e)
+    if r < 1e300 and violation < 1e300:
+        return Merit(r, violation, mean)
+    return Merit(1e301, 1e301, 1e301)
+
+
+@kernel
+def search(
+    model: Model,
+    work: Work,
+    options: Options,
+    inputs: tuple[Vector, Vector, Vector],
+    scale: float,
+    smoothing: float,
+    alpha: float,
+    last: Merit,
+) -> tuple[Merit, int]:
+    """Merit after the step alpha along the Newton direction, halved until it is better than `last`; and the halvings.
+
+    Better is a smaller residual, or one within the noise of the products that it belongs to; or smaller violations at
+    a residual that did not double.
+    """
+    q, v, u = inputs
+    for d in range(v.shape[0]):
+        work.nu_trial[d] = work.nu[d]
+    keep_inequalities(model, work)
+    now = last
+    for halvings in range(_HALVINGS + 1):
+        for d in range(v.shape[0]):
+            work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
+        inside = momentum_balance(model, work, options.h, q)
+        inequality_kinematics(model, work, options.h)
+        move_inequalities(model, work, alpha)
+        now = assess(model, work, options, q, v, u, scale, smoothing)
+        if inside and now.residual <= max(last.residual, options.tolerance, 0.1 * now.mean**0.5):
+            return now, halvings
+        fits = now.violation <= last.violation and last.violation > options.kappa
+        if inside and fits and now.residual < 2.0 * last.residual:
+            return now, halvings
+        alpha *= 0.5
+    return now, _HALVINGS + 1
+
+
+@kernel
+def try_from(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], attempt: int, iterations: int
+) -> Outcome:
+    """One attempt; NO_PROGRESS when it is given up.  inputs: (q, v, u);  iterations: those of the attempts before."""
+    q, v, u = inputs
+    h = options.h
+    kappa = options.kappa
+    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
+    scale = residual_scale(work)
+    smoothing = start(model, work, options, q, v, attempt)
+    ratio = 1e-2
+    patience = iterations + _PATIENCE
+    halvings = 0
+    merit = assess(model, work, options, q, v, u, scale, max(smoothing, kappa))
+    while smoothing > 0.0 and merit.residual < 1e300:
+        before = smoothing
+        if attempt < _LED:
+            smoothing = max(kappa, min(merit.mean, smoothing))
+            smoothing, slip, ratio = follow(model, work, kappa, smoothing, ratio)
+        else:
+            smoothing, slip, ratio = follow(model, work, max(kappa, 0.1 * merit.mean), smoothing, ratio)
+            if smoothing < before:
+                patience = max(patience, iterations + _PATIENCE // 2)
+        merit = Merit(merit.residual, max(merit.violation, slip), merit.mean)
+        if merit.residual < options.tolerance and merit.violation < spread and smoothing <= kappa:
+            return Outcome(_SOLVED, iterations, merit.residual, merit.violation)
+        if iterations >= options.max_iterations:
+            return Outcome(_MAX_ITERATIONS, iterations, merit.residual, merit.violation)
+        if iterations >= patience or halvings > _FEW:
+            break
+        iterations += 1
+        if not linearize_step(model, work, h, q, v, smoothing):
+            return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
+        alpha = direction(model, work, h, kappa, merit.mean)
+        if alpha < _SHORT:
+            break
+        alpha = min(1.0, (0.99 if max(merit.residual, merit.violation) > 0.1 else 0.9999) * alpha)
+        merit, halvings = search(model, work, options, inputs, scale, smoothing, alpha, merit)
+    return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
 @kernel
@@ -168,73 +283,10 @@ def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vec
 
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
-    h = options.h
-    kappa = options.kappa
-    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
-    scale = residual_scale(work)
-    status = _MAX_ITERATIONS
-    iterations = 0
-    attempt = 0
-    patience = 0
-    halvings = 0
-    smoothing = kappa
-    starting = True
-    alpha = 1.0
-    r = 1e300
-    violation = 1e300
-    last_r = 1e300
-    last_violation = 1e300
-    while True:
-        if starting:
-            smoothing = start(model, work, options, q, v, u, attempt)
-            inside = smoothing > 0.0
-            patience = iterations + (_PATIENCE if attempt > 0 else _HURRY)
-            last_r = 1e300
-            last_violation = 1e300
-        else:
-            for d in range(v.shape[0]):
-                work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
-            inside = momentum_balance(model, work, h, q)
-            inequality_kinematics(model, work, h)
-            move_inequalities(model, work, alpha)
-        rd, re = residuals(model, work, h, q, v, u)
-        mean, violation = products(model, work, kappa)
-        violation = max(violation, slip_error(model, work, smoothing))
-        r = max(rd / scale, re)
-        if not (r < 1e300 and violation < 1e300):
-            inside = False
-        better = r <= max(last_r, options.tolerance, 0.1 * mean**0.5)
-        better = better or (violation <= last_violation and last_violation > kappa and r < 2.0 * last_r)
-        if not starting and not (inside and better) and halvings < _HALVINGS:
-            halvings += 1
-            alpha *= 0.5
-            continue
-        if not inside:
-            status = _NOT_FINITE
+    first = first_attempt(model, work, options, q, v, u)
+    out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    for attempt in range(first, _ATTEMPTS):
+        out = try_from(model, work, options, (q, v, u), attempt, out.iterations)
+        if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
             break
-        smoothing, slip = follow(model, work, kappa, smoothing if attempt > 0 else max(kappa, min(mean, smoothing)))
-        violation = max(violation, slip)
-        if r < options.tolerance and violation < spread and smoothing <= kappa:
-            status = _SOLVED
-            break
-        if iterations >= options.max_iterations:
-            break
-        starting = False
-        last_r = r
-        last_violation = violation
-        iterations += 1
-        if not linearize_step(model, work, h, q, v, smoothing):
-            status = _SINGULAR
-            break
-        alpha = direction(model, work, h, kappa, mean)
-        if alpha < _SHORT or halvings > 3 or iterations >= patience:
-            attempt += 1
-            halvings = 0
-            starting = True
-            continue
-        halvings = 0
-        alpha = min(1.0, (0.95 if max(r, violation) > 1e-3 else 0.99) * alpha)
-        for d in range(v.shape[0]):
-            work.nu_trial[d] = work.nu[d]
-        keep_inequalities(model, work)
-    return Outcome(status, iterations, r, violation)
+    return out

@@ -39,7 +39,7 @@ class Simulator(States):
         time_step: float = 0.02,
         kappa: float = 1e-6,
         tolerance: float = 1e-8,
-        max_iterations: int = 100,
+        max_iterations: int = 500,
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
