@@ -1,4 +1,4 @@
-"""pack: a Mechanism as the two flat buffers that kernels read."""
+"""pack: a Mechanism as the Model that kernels read."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.layout import Sizes, allocate_model, read_model
+from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
-from sim.model import InputKind, Integers, Law, Model, Vector
+from sim.model import InputKind, Law, Model
 from sim.parts import Contact, Joint
 
 Floats = NDArray[np.float64]
@@ -21,16 +21,15 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
     return Sizes(mech.nbody, mech.nq, mech.nv, len(mech.contacts), nlimit, len(mech.inputs or ()))
 
 
-def pack(mech: Mechanism) -> tuple[Vector, Integers]:
-    """(floats, ints) of a mechanism; see layout.py."""
-    floats, ints = allocate_model(mechanism_sizes(mech))
-    model = read_model(floats, ints)
+def pack(mech: Mechanism) -> Model:
+    """The numbers of a mechanism."""
+    model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
     _pack_joints(mech.joints, model)
     _pack_contacts(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
-    return floats, ints
+    return model
 
 
 def _pack_tree(mech: Mechanism, model: Model) -> None:

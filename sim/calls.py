@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
-from sim.layout import NCONTACT, NLIMIT, NQ, NU, NV, work_size
-from sim.model import Integers, Vector
+from sim.layout import allocate_work, sizes_of, table
+from sim.model import Integers, Model, Vector
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -44,36 +44,47 @@ class Settings(NamedTuple):
 class Calls:
     """The kernels of one packed mechanism, as functions of checked arrays."""
 
-    def __init__(self, floats: Vector, ints: Integers, settings: Settings) -> None:
-        self.floats, self.ints, self.settings = floats, ints, settings
-        self.nx, self.ndx = int(ints[NQ] + ints[NV]), 2 * int(ints[NV])
-        self.nu, self.ncontact = int(ints[NU]), int(ints[NCONTACT])
-        self.hard = 1 if ints[NCONTACT] + ints[NLIMIT] else None  # None: the interior point is not compiled
+    def __init__(self, model: Model, settings: Settings) -> None:
+        self.model, self.settings = model, settings
+        self.sizes = sizes_of(model)
+        self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
+        self.hard = 1 if self.sizes.ncontact + self.sizes.nlimit else None  # None: the interior point is not compiled
         self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
+        self._model = table(model)
         self._scratch = threading.local()
 
-    def _work(self) -> Vector:
-        """This thread's buffer."""
-        if not hasattr(self._scratch, "one"):
-            self._scratch.one = np.zeros(work_size(self.ints))
-        return self._scratch.one
+    def __getstate__(self) -> tuple[Model, Settings]:
+        """Tables are addresses in this process: another one makes its own."""
+        return self.model, self.settings
 
-    def _works(self, count: int) -> Floats:
-        """This thread's buffers for a parallel call, one per chunk."""
-        chunks = max(1, min(count, _CHUNKS * (os.cpu_count() or 1)))
-        if not hasattr(self._scratch, "many") or len(self._scratch.many) < chunks:
-            self._scratch.many = np.zeros((chunks, work_size(self.ints)))
-        return self._scratch.many[:chunks]
+    def __setstate__(self, state: tuple[Model, Settings]) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+    def _works(self, count: int) -> NDArray[np.int64]:
+        """Tables of `count` Works of this thread, (count, ...)."""
+        kept = self._scratch.__dict__.setdefault("works", [])
+        while len(kept) < count:
+            kept.append(allocate_work(self.sizes))
+        if len(self._scratch.__dict__.get("tables", ())) < count:
+            self._scratch.tables = np.array([table(work) for work in kept])
+        return self._scratch.tables[:count]
+
+    def _work(self) -> NDArray[np.int64]:
+        """Table of the first Work of this thread."""
+        return self._works(1)[0]
+
+    def _chunks(self, count: int) -> NDArray[np.int64]:
+        """Tables for a parallel call over `count` items, one per chunk."""
+        return self._works(max(1, min(count, _CHUNKS * (os.cpu_count() or 1))))
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """(number of solved steps, states, report of every step, contacts of every step)."""
         steps = len(us)
         xs = np.zeros((steps + 1, self.nx))
         reports = np.zeros((steps, REPORT))
-        contacts = np.zeros((steps, self.ncontact, CONTACT))
+        contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
         knot = rollout.roll(
-            self.floats,
-            self.ints,
+            self._model,
             self._work(),
             self.settings.array(),
             x,
@@ -102,8 +113,7 @@ class Calls:
         xs, u_out, report = np.zeros((len(us) + 1, self.nx)), np.zeros((len(us), self.nu)), np.zeros(REPORT)
         settings = self.settings.array(kappa)
         knot = rollout.closed_loop(
-            self.floats,
-            self.ints,
+            self._model,
             self._work(),
             settings,
             x,
@@ -130,9 +140,9 @@ class Calls:
         settings = self.settings.array(kappa)
         out = (xs, us, substeps, A, B, x_next, reports, self.hard, self.smooth)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            rollout.linearize(self.floats, self.ints, self._work(), settings, (0, n), *out)
+            rollout.linearize(self._model, self._work(), settings, (0, n), *out)
         else:
-            rollout.linearize_knots(self.floats, self.ints, self._works(n), settings, *out)
+            rollout.linearize_knots(self._model, self._chunks(n), settings, *out)
         unsolved = reports[:, 0] != Status.SOLVED
         for array in (A, B, x_next):
             array[unsolved] = 0.0
@@ -148,67 +158,67 @@ class Calls:
         n, steps = us.shape[:2]
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        settings, works = self.settings.array(), self._works(n)
-        rollout.roll_batch(self.floats, self.ints, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
+        settings, works = self.settings.array(), self._chunks(n)
+        rollout.roll_batch(self._model, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
         return xs, status, knots
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""
         x = np.concatenate([q, v])
-        status = start.start_at(self.floats, self.ints, self._work(), self.settings.time_step, v, x)
+        status = start.start_at(self._model, self._work(), self.settings.time_step, v, x)
         return int(status), x
 
     def integrate(self, xs: Floats, dxs: Floats) -> Floats:
         """x (+) dx of every row."""
         out = np.zeros_like(xs)
-        state.integrate_states(self.floats, self.ints, xs, dxs, out)
+        state.integrate_states(self._model, xs, dxs, out)
         return out
 
     def difference(self, x0s: Floats, x1s: Floats) -> Floats:
         """x1 (-) x0 of every row."""
         out = np.zeros((len(x0s), self.ndx))
-        state.state_differences(self.floats, self.ints, x0s, x1s, out)
+        state.state_differences(self._model, x0s, x1s, out)
         return out
 
     def normalise(self, xs: Floats, tolerance: float) -> int:
         """Normalise quaternions in place; see `normalise_quaternions`."""
-        return int(state.normalise_quaternions(self.floats, self.ints, xs, tolerance))
+        return int(state.normalise_quaternions(self._model, xs, tolerance))
 
     def maximal(self, xs: Floats, nbody: int) -> Floats:
         """z of every row, (n, nbody, 13)."""
         out = np.zeros((len(xs) * nbody, 13))
-        coordinates.maximal_states(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        coordinates.maximal_states(self._model, self._work(), self.settings.time_step, xs, out)
         return out.reshape(len(xs), nbody, 13)
 
     def minimal(self, zs: Floats) -> Floats:
         """x of every z, (n, nbody, 13)."""
         out = np.zeros((len(zs), self.nx))
         flat = zs.reshape(-1, 13)
-        coordinates.minimal_states(self.floats, self.ints, self._work(), self.settings.time_step, flat, out)
+        coordinates.minimal_states(self._model, self._work(), self.settings.time_step, flat, out)
         return out
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
         """dz/dx."""
         out = np.zeros((12 * nbody, self.ndx))
         h = self.settings.time_step
-        coordinates_jacobian.maximal_jacobian_at(self.floats, self.ints, self._work(), h, x, out)
+        coordinates_jacobian.maximal_jacobian_at(self._model, self._work(), h, x, out)
         return out
 
     def minimal_jacobian(self, z: Floats) -> Floats:
         """dx/dz."""
         out = np.zeros((self.ndx, 12 * len(z)))
         h = self.settings.time_step
-        coordinates_jacobian.minimal_jacobian_at(self.floats, self.ints, self._work(), h, z, out)
+        coordinates_jacobian.minimal_jacobian_at(self._model, self._work(), h, z, out)
         return out
 
     def energies(self, xs: Floats) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        energy.energies(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        energy.energies(self._model, self._work(), self.settings.time_step, xs, out)
         return out
 
     def momenta(self, xs: Floats) -> Floats:
         """(linear, angular) momentum of every row."""
         out = np.zeros((len(xs), 6))
-        energy.momenta(self.floats, self.ints, self._work(), self.settings.time_step, xs, out)
+        energy.momenta(self._model, self._work(), self.settings.time_step, xs, out)
         return out

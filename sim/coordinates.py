@@ -11,9 +11,10 @@ from math import atan2, pi
 
 from sim.kinematics import displace, tree_poses
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
+from solvers.record import Table
 
 
 @kernel
@@ -156,20 +157,20 @@ def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) ->
 
 
 @kernel
-def maximal_states(floats: Vector, ints: Integers, buffer: Vector, h: float, xs: Matrix, out: Matrix) -> None:
+def maximal_states(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """`maximal_state` row by row.   xs: (n, nx); out: (n * nbody, 13)."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     nbody = model.body_parent.shape[0]
     for t in range(xs.shape[0]):
         maximal_state(model, work, h, xs[t], out[t * nbody : (t + 1) * nbody])
 
 
 @kernel
-def minimal_states(floats: Vector, ints: Integers, buffer: Vector, h: float, zs: Matrix, out: Matrix) -> None:
+def minimal_states(model_at: Table, work_at: Table, h: float, zs: Matrix, out: Matrix) -> None:
     """`minimal_state` row by row.   zs: (n * nbody, 13); out: (n, nx)."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     nbody = model.body_parent.shape[0]
     for t in range(out.shape[0]):
         minimal_state(model, work, h, zs[t * nbody : (t + 1) * nbody], out[t])

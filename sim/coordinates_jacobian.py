@@ -9,7 +9,7 @@ from __future__ import annotations
 from sim.coordinates import body_turn, joint_frame, node_poses, poses_of_maximal, translation_axis
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import (
     Mat3,
     Vec3,
@@ -23,6 +23,7 @@ from sim.rotation import (
     rotate,
 )
 from solvers.jit import kernel
+from solvers.record import Table
 
 
 @kernel
@@ -239,12 +240,12 @@ def _joint_turn(model: Model, work: Work, i: int) -> Vec3:
 
 
 @kernel
-def maximal_jacobian_at(floats: Vector, ints: Integers, buffer: Vector, h: float, x: Vector, out: Matrix) -> None:
-    """`maximal_jacobian` from flat buffers."""
-    maximal_jacobian(model_view(floats, ints), work_view(buffer, ints), h, x, out)
+def maximal_jacobian_at(model_at: Table, work_at: Table, h: float, x: Vector, out: Matrix) -> None:
+    """`maximal_jacobian` from tables."""
+    maximal_jacobian(model_view(model_at), work_view(work_at), h, x, out)
 
 
 @kernel
-def minimal_jacobian_at(floats: Vector, ints: Integers, buffer: Vector, h: float, z: Matrix, out: Matrix) -> None:
-    """`minimal_jacobian` from flat buffers; z: (nbody, 13)."""
-    minimal_jacobian(model_view(floats, ints), work_view(buffer, ints), h, z, out)
+def minimal_jacobian_at(model_at: Table, work_at: Table, h: float, z: Matrix, out: Matrix) -> None:
+    """`minimal_jacobian` from tables; z: (nbody, 13)."""
+    minimal_jacobian(model_view(model_at), work_view(work_at), h, z, out)

@@ -13,9 +13,10 @@ from sim.dynamics import angular_momentum, world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints import relative_to_rest
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import cross, quat_exp, quat_mul, quat_turn
 from solvers.jit import kernel
+from solvers.record import Table
 
 
 @kernel
@@ -139,20 +140,20 @@ def potential_energy(model: Model, work: Work, x: Vector) -> float:
 
 
 @kernel
-def energies(floats: Vector, ints: Integers, buffer: Vector, h: float, xs: Matrix, out: Matrix) -> None:
+def energies(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """out[t] = (kinetic, potential) energy of state t [J].   xs: (n, nx); out: (n, 2)."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     for t in range(xs.shape[0]):
         out[t, 0] = kinetic_energy(model, work, h, xs[t])
         out[t, 1] = potential_energy(model, work, xs[t])
 
 
 @kernel
-def momenta(floats: Vector, ints: Integers, buffer: Vector, h: float, xs: Matrix, out: Matrix) -> None:
+def momenta(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """out[t] = (linear, angular about the origin of the world) momentum of state t.   xs: (n, nx); out: (n, 6)."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     for t in range(xs.shape[0]):
         node_momentum(model, work, h, xs[t], work.wrench)
         for k in range(6):

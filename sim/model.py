@@ -1,7 +1,6 @@
-"""Model, Work: what kernels read and write, as NamedTuples of views into two flat buffers.
+"""Model, Work: what kernels read and write, as NamedTuples of arrays.
 
-A compiled call unboxes every array of a NamedTuple (0.2 us each), so only flat buffers cross the border from Python;
-`model_view` and `work_view` rebuild the named views inside compiled code for next to nothing.
+Compiled code takes each as one pointer (solvers/record.py); layout.py holds the shapes and allocates them.
 
 Glossary, one meaning each, everywhere in `sim`:
 

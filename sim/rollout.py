@@ -5,7 +5,8 @@
     contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
     hard       None for scenes without contacts and limits: their code is then not compiled; otherwise `smooth` is None
 
-Every function takes the flat buffers of `layout.py`; every loop stops at the first step that is not SOLVED.
+Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
+not SOLVED.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from sim.model import Integers, Matrix, Model, Options, Vector, Work
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
+from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -31,9 +33,8 @@ def _options(settings: Vector) -> Options:
 
 @kernel
 def roll(
-    floats: Vector,
-    ints: Integers,
-    buffer: Vector,
+    model_at: Table,
+    work_at: Table,
     settings: Vector,
     x: Vector,
     us: Matrix,
@@ -47,8 +48,8 @@ def roll(
 
     us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 8).
     """
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     options = _options(settings)
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
@@ -62,9 +63,8 @@ def roll(
 
 @kernel
 def closed_loop(
-    floats: Vector,
-    ints: Integers,
-    buffer: Vector,
+    model_at: Table,
+    work_at: Table,
     settings: Vector,
     x: Vector,
     us: Matrix,
@@ -85,8 +85,8 @@ def closed_loop(
 
     us, u_out: (T, nu); xs, xs_ref: (T + 1, nx); k: (T, nu); K: (T, nu, ndx); gaps: (T + 1, ndx).
     """
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     options = _options(settings)
     xs_ref, ks, Ks, gaps = policy
     low, high = limits
@@ -183,9 +183,8 @@ def _linearize_knot(
 
 @kernel
 def linearize(
-    floats: Vector,
-    ints: Integers,
-    buffer: Vector,
+    model_at: Table,
+    work_at: Table,
     settings: Vector,
     knots: tuple[int, int],
     xs: Matrix,
@@ -199,8 +198,8 @@ def linearize(
     smooth: int | None,
 ) -> None:
     """A[t], B[t], x_next[t] of the knots (xs[t], us[t]) from knots[0] up to knots[1]."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     options = _options(settings)
     for t in range(knots[0], knots[1]):
         _linearize_knot(model, work, options, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard, smooth)
@@ -208,9 +207,8 @@ def linearize(
 
 @parallel_kernel
 def linearize_knots(
-    floats: Vector,
-    ints: Integers,
-    buffers: Matrix,
+    model_at: Table,
+    work_ats: Matrix,
     settings: Vector,
     xs: Matrix,
     us: Matrix,
@@ -222,19 +220,18 @@ def linearize_knots(
     hard: int | None,
     smooth: int | None,
 ) -> None:
-    """`linearize` of all knots, spread over the threads: chunk c has the scratch buffers[c]."""
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c]."""
     n = us.shape[0]
-    chunks = buffers.shape[0]
+    chunks = work_ats.shape[0]
     for c in prange(chunks):
         knots = (c * n // chunks, (c + 1) * n // chunks)
-        linearize(floats, ints, buffers[c], settings, knots, xs, us, substeps, A, B, x_next, reports, hard, smooth)
+        linearize(model_at, work_ats[c], settings, knots, xs, us, substeps, A, B, x_next, reports, hard, smooth)
 
 
 @kernel
 def _roll_one(
-    floats: Vector,
-    ints: Integers,
-    buffer: Vector,
+    model_at: Table,
+    work_at: Table,
     settings: Vector,
     x0: Vector,
     us: Matrix,
@@ -243,8 +240,8 @@ def _roll_one(
     smooth: int | None,
 ) -> tuple[int, int]:
     """A rollout that keeps its states only: (status, number of solved steps)."""
-    model = model_view(floats, ints)
-    work = work_view(buffer, ints)
+    model = model_view(model_at)
+    work = work_view(work_at)
     options = _options(settings)
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
@@ -257,9 +254,8 @@ def _roll_one(
 
 @parallel_kernel
 def roll_batch(
-    floats: Vector,
-    ints: Integers,
-    buffers: Matrix,
+    model_at: Table,
+    work_ats: Matrix,
     settings: Vector,
     x0s: Matrix,
     us: Cube,
@@ -271,7 +267,7 @@ def roll_batch(
 ) -> None:
     """Rollouts from x0s[i] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,)."""
     n = us.shape[0]
-    chunks = buffers.shape[0]
+    chunks = work_ats.shape[0]
     for c in prange(chunks):
         for i in range(c * n // chunks, (c + 1) * n // chunks):
-            status[i], knots[i] = _roll_one(floats, ints, buffers[c], settings, x0s[i], us[i], xs[i], hard, smooth)
+            status[i], knots[i] = _roll_one(model_at, work_ats[c], settings, x0s[i], us[i], xs[i], hard, smooth)

@@ -7,9 +7,10 @@ from sim.elimination import factor, project, solve, subtree_sums
 from sim.energy import add_spring_momentum, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
-from sim.model import Integers, Model, Vector, Work
+from sim.model import Model, Vector, Work
 from sim.rotation import quat_turn
 from solvers.jit import kernel
+from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -134,6 +135,6 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
 
 
 @kernel
-def start_at(floats: Vector, ints: Integers, buffer: Vector, h: float, velocity: Vector, x: Vector) -> int:
-    """`start_state` from flat buffers."""
-    return start_state(model_view(floats, ints), work_view(buffer, ints), h, velocity, x)
+def start_at(model_at: Table, work_at: Table, h: float, velocity: Vector, x: Vector) -> int:
+    """`start_state` from tables."""
+    return start_state(model_view(model_at), work_view(work_at), h, velocity, x)

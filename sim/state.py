@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from sim.kinematics import displace
 from sim.layout import model_view
-from sim.model import Integers, Matrix, Model, Vector
+from sim.model import Matrix, Model, Vector
 from sim.rotation import quat_log, quat_mul
 from solvers.jit import kernel
+from solvers.record import Table
 
 
 @kernel
@@ -55,28 +56,28 @@ def state_difference(model: Model, x0: Vector, x1: Vector, out: Vector) -> None:
 
 
 @kernel
-def integrate_states(floats: Vector, ints: Integers, xs: Matrix, dxs: Matrix, out: Matrix) -> None:
+def integrate_states(model_at: Table, xs: Matrix, dxs: Matrix, out: Matrix) -> None:
     """`integrate_state` row by row.   xs, out: (n, nx); dxs: (n, ndx)."""
-    model = model_view(floats, ints)
+    model = model_view(model_at)
     for t in range(xs.shape[0]):
         integrate_state(model, xs[t], dxs[t], out[t])
 
 
 @kernel
-def state_differences(floats: Vector, ints: Integers, x0s: Matrix, x1s: Matrix, out: Matrix) -> None:
+def state_differences(model_at: Table, x0s: Matrix, x1s: Matrix, out: Matrix) -> None:
     """`state_difference` row by row.   x0s, x1s: (n, nx); out: (n, ndx)."""
-    model = model_view(floats, ints)
+    model = model_view(model_at)
     for t in range(x0s.shape[0]):
         state_difference(model, x0s[t], x1s[t], out[t])
 
 
 @kernel
-def normalise_quaternions(floats: Vector, ints: Integers, xs: Matrix, tolerance: float) -> int:
+def normalise_quaternions(model_at: Table, xs: Matrix, tolerance: float) -> int:
     """Scale the quaternions of every row to length one, in place, unless they are so to 1e-12 already.
 
     Returns -1, or row * nbody + body of the first one that is off by more than the tolerance.   xs: (n, nx).
     """
-    model = model_view(floats, ints)
+    model = model_view(model_at)
     n = model.body_parent.shape[0]
     for t in range(xs.shape[0]):
         for i in range(n):

@@ -24,10 +24,10 @@ class States:
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
         self.time_step, self.kappa, self.tolerance, self.max_iterations = settings
-        self.model_floats, self.model_ints = pack(mechanism)
+        self.model = pack(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._calls = Calls(self.model_floats, self.model_ints, settings)
+        self._calls = Calls(self.model, settings)
         self._border = Border(mechanism, self._calls)
 
     def __setattr__(self, name: str, value: Any) -> None:

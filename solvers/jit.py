@@ -1,4 +1,4 @@
-"""`@kernel`: the one place that imports Numba, its flags, and a disk cache that cannot go stale.
+"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Only this file and record.py import Numba.)
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the cache folder is named by a digest of every source file that can reach a kernel, so any edit

@@ -21,7 +21,6 @@ import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave, ratio, slope
 from dojo_opt.report.result import Report, Row
-from sim.layout import read_model
 from sim.model import Vector
 from sim.simulator import Simulator
 from solvers.jit import threads
@@ -129,7 +128,7 @@ def _mujoco_cases(sim: Simulator, x: Vector, u: Vector) -> dict[str, Callable[[]
     """
     import mujoco
 
-    model = mujoco_scene.load(read_model(sim.model_floats, sim.model_ints), sim.time_step, integrator="discrete")
+    model = mujoco_scene.load(sim.model, sim.time_step, integrator="discrete")
     data = mujoco_scene.state(model, x)
     full = mujoco.mjtState.mjSTATE_INTEGRATION
     start = np.empty(mujoco.mj_stateSize(model, full))

@@ -10,10 +10,11 @@ import pytest
 from dojo_opt import models
 from sim.build import mechanism_sizes, pack
 from sim.kinematics import tree_poses
-from sim.layout import model_view, read_model, read_work, work_size, work_view
+from sim.layout import allocate_work, model_view, sizes_of, table, work_view
 from sim.mechanism import Mechanism
-from sim.model import Integers, Vector
+from sim.model import Vector
 from solvers.jit import kernel
+from solvers.record import Table
 
 # nbody, nq, nv, ncontact, nlimit, nu
 SIZES = {
@@ -30,24 +31,23 @@ SIZES = {
 
 
 @kernel
-def _poses(floats: Vector, ints: Integers, work: Vector, q: Vector) -> None:
-    w = work_view(work, ints)
-    tree_poses(model_view(floats, ints), q, q, w.origin, w.pos2, w.quat2, w.rot2, w.S2)
+def _poses(model_at: Table, work_at: Table, q: Vector) -> None:
+    w = work_view(work_at)
+    tree_poses(model_view(model_at), q, q, w.origin, w.pos2, w.quat2, w.rot2, w.S2)
 
 
 def poses(mech: Mechanism, q: object = None) -> tuple[np.ndarray, np.ndarray]:
     """Positions and rotation matrices of the bodies."""
-    floats, ints = pack(mech)
-    work = np.zeros(work_size(ints))
-    _poses(floats, ints, work, np.array(mech.neutral if q is None else q, dtype=np.float64))
-    w = read_work(work, ints)
+    model = pack(mech)
+    w = allocate_work(sizes_of(model))
+    _poses(table(model), table(w), np.array(mech.neutral if q is None else q, dtype=np.float64))
     return w.pos2, w.rot2.reshape(-1, 3, 3)
 
 
 def clearances(mech: Mechanism) -> dict[str, float]:
     """Distance of every contact from the ground in the neutral configuration."""
     pos, rot = poses(mech)
-    model = read_model(*pack(mech))
+    model = pack(mech)
     points = [pos[b] + rot[b] @ p for b, p in zip(model.contact_body, model.contact_point, strict=True)]
     return {n: float(p[2] - r) for n, p, r in zip(mech.contact_names, points, model.contact_radius, strict=True)}
 
@@ -89,7 +89,7 @@ def test_quadruped_stands_on_four_feet() -> None:
 
 def test_quadruped_is_symmetric_left_and_right() -> None:
     mech = models.quadruped(contacts="all")
-    model = read_model(*pack(mech))
+    model = pack(mech)
     mirror = np.array([1.0, -1.0, 1.0])
     J = model.body_inertia.reshape(-1, 3, 3)
     for part in ("hip", "thigh", "calf"):

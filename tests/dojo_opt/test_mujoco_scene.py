@@ -7,7 +7,6 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
-from sim.layout import read_model
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.parts import Body, Contact, Input, Joint
@@ -16,7 +15,7 @@ mujoco = pytest.importorskip("mujoco")
 
 
 def numbers(sim: dojo.Simulator) -> Model:
-    return read_model(sim.model_floats, sim.model_ints)
+    return sim.model
 
 
 def twin(sim: dojo.Simulator, **options: str) -> object:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim.build import pack
 from sim.coordinates import maximal_states, minimal_states
 from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
-from sim.layout import work_size
+from sim.layout import allocate_work, sizes_of, table
 from sim.mechanism import Mechanism
 from sim.state import integrate_states, state_differences
 
@@ -23,28 +23,32 @@ class Maps:
 
     def __init__(self, mech: Mechanism) -> None:
         self.mech = mech
-        self.floats, self.ints = pack(mech)
-        self.work = np.full(work_size(self.ints), np.nan)
+        self.model = pack(mech)
+        self.model_at = table(self.model)
+        self.work = allocate_work(sizes_of(self.model))
+        for array in self.work:
+            array[...] = np.nan
+        self.work_at = table(self.work)
         self.nx, self.ndx = mech.nq + mech.nv, 2 * mech.nv
 
     def maximal(self, x: Floats) -> Floats:
         out = np.full((self.mech.nbody, 13), np.nan)
-        maximal_states(self.floats, self.ints, self.work, H, x[None], out)
+        maximal_states(self.model_at, self.work_at, H, x[None], out)
         return out
 
     def minimal(self, z: Floats) -> Floats:
         out = np.full((1, self.nx), np.nan)
-        minimal_states(self.floats, self.ints, self.work, H, z, out)
+        minimal_states(self.model_at, self.work_at, H, z, out)
         return out[0]
 
     def integrate(self, x: Floats, dx: Floats) -> Floats:
         out = np.full((1, self.nx), np.nan)
-        integrate_states(self.floats, self.ints, x[None], dx[None], out)
+        integrate_states(self.model_at, x[None], dx[None], out)
         return out[0]
 
     def difference(self, x0: Floats, x1: Floats) -> Floats:
         out = np.full((1, self.ndx), np.nan)
-        state_differences(self.floats, self.ints, x0[None], x1[None], out)
+        state_differences(self.model_at, x0[None], x1[None], out)
         return out[0]
 
 
@@ -117,7 +121,7 @@ def test_velocities_are_those_of_the_interval(kind: str, on_world: bool) -> None
 def test_jacobian_of_maximal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     J = np.full((12 * maps.mech.nbody, maps.ndx), np.nan)
-    maximal_jacobian_at(maps.floats, maps.ints, maps.work, H, x, J)
+    maximal_jacobian_at(maps.model_at, maps.work_at, H, x, J)
     z, e = maps.maximal(x), 1e-6
     for k, d in enumerate(np.eye(maps.ndx)):
         plus, minus = (apart(z, maps.maximal(maps.integrate(x, s * e * d))) for s in (1, -1))
@@ -131,7 +135,7 @@ def test_jacobian_of_minimal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     J = np.full((maps.ndx, 12 * maps.mech.nbody), np.nan)
     z, e = maps.maximal(x), 1e-6
-    minimal_jacobian_at(maps.floats, maps.ints, maps.work, H, z, J)
+    minimal_jacobian_at(maps.model_at, maps.work_at, H, z, J)
     for k, d in enumerate(np.eye(12 * maps.mech.nbody)):
         plus, minus = (maps.difference(x, maps.minimal(move(z, s * e * d))) for s in (1, -1))
         # off the joints too: the map takes the part along the free directions
@@ -145,8 +149,8 @@ def test_jacobians_are_inverse(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     forward = np.empty((12 * maps.mech.nbody, maps.ndx))
     back = np.empty((maps.ndx, 12 * maps.mech.nbody))
-    maximal_jacobian_at(maps.floats, maps.ints, maps.work, H, x, forward)
-    minimal_jacobian_at(maps.floats, maps.ints, maps.work, H, maps.maximal(x), back)
+    maximal_jacobian_at(maps.model_at, maps.work_at, H, x, forward)
+    minimal_jacobian_at(maps.model_at, maps.work_at, H, maps.maximal(x), back)
     np.testing.assert_allclose(back @ forward, np.eye(maps.ndx), atol=1e-10)
 
 

@@ -12,18 +12,18 @@ import sim.model
 from sim.layout import (
     MODEL_FIELDS,
     MODEL_INTS,
-    WORK_DERIVATIVE_FIELDS,
     WORK_FIELDS,
     Sizes,
     allocate_model,
+    allocate_work,
     model_view,
-    read_model,
-    read_work,
-    work_size,
+    sizes_of,
+    table,
     work_view,
 )
-from sim.model import Integers, Model, Vector, Work
+from sim.model import Model, Work
 from solvers.jit import kernel
+from solvers.record import Table
 
 ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5)
 BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)
@@ -56,22 +56,18 @@ def test_kind_matches_annotation(cls: type, table: dict[str, tuple[int | str, ..
 
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])
-def test_fields_tile_their_buffers(sizes: Sizes) -> None:
-    floats, ints = allocate_model(sizes)
-    work = np.zeros(work_size(ints))
-    model, scratch = read_model(floats, ints), read_work(work, ints)
-    for name, value in zip(Model._fields, model, strict=True):
-        value[...] += 1
-        assert np.all(value == 1), f"{name} overlaps another field"
-    for name, value in zip(Work._fields, scratch, strict=True):
-        value[...] += 1.0
-        assert np.all(value == 1.0), f"{name} overlaps another field"
-    assert np.all(floats == 1.0) and np.all(work == 1.0)
+def test_fields_do_not_overlap(sizes: Sizes) -> None:
+    model, work = allocate_model(sizes), allocate_work(sizes)
+    assert sizes_of(allocate_model(sizes))._replace(nq=sizes.nq) == sizes
+    for record in (model, work):
+        for name, value in zip(record._fields, record, strict=True):
+            value[...] += 1
+            assert np.all(value == 1), f"{name} overlaps another field"
 
 
 @kernel
-def _mark_model(floats: Vector, ints: Integers) -> None:
-    m = model_view(floats, ints)
+def _mark_model(model_at: Table) -> None:
+    m = model_view(model_at)
     for i in range(m.body_parent.shape[0]):
         m.body_parent[i] = 10 + i
         for k in range(9):
@@ -85,8 +81,8 @@ def _mark_model(floats: Vector, ints: Integers) -> None:
 
 
 @kernel
-def _mark_work(work: Vector, ints: Integers) -> int:
-    w = work_view(work, ints)
+def _mark_work(work_at: Table) -> int:
+    w = work_view(work_at)
     for i in range(w.pos3.shape[0]):
         w.pos3[i, 2] = 5.0 + i
     for r in range(w.panel.shape[0]):
@@ -97,26 +93,26 @@ def _mark_work(work: Vector, ints: Integers) -> int:
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])
 def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
-    floats, ints = allocate_model(sizes)
-    _mark_model(floats, ints)
-    model = read_model(floats, ints)
+    model = allocate_model(sizes)
+    _mark_model(table(model))
     assert model.body_parent.tolist() == [10 + i for i in range(sizes.nbody)]
     np.testing.assert_array_equal(model.body_inertia, 100 * np.arange(sizes.nbody)[:, None] + np.arange(9))
     np.testing.assert_array_equal(model.dof_rest, -1.0 - np.arange(sizes.nv))
     assert model.contact_law.tolist() == [2] * sizes.ncontact and model.gravity[2] == -9.81
 
     width = 2 * sizes.nv + sizes.nu
-    work = np.zeros(work_size(ints))
-    assert _mark_work(work, ints) == 1000 * width + sizes.nbody
-    scratch = read_work(work, ints)
-    np.testing.assert_array_equal(scratch.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
-    np.testing.assert_array_equal(scratch.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(width))
+    work = allocate_work(sizes)
+    assert _mark_work(table(work)) == 1000 * width + sizes.nbody
+    np.testing.assert_array_equal(work.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
+    np.testing.assert_array_equal(work.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(width))
 
 
-def test_short_buffer_has_no_derivative_rows() -> None:
-    _, ints = allocate_model(ALL)
-    work = np.zeros(work_size(ints, derivatives=False))
-    assert _mark_work(work, ints) == 1000 * (2 * ALL.nv + ALL.nu)
-    scratch = read_work(work, ints)
-    for name in WORK_FIELDS:
-        assert (getattr(scratch, name).size == 0) == (name in WORK_DERIVATIVE_FIELDS), name
+@pytest.mark.parametrize("sizes", [ALL, BARE])
+def test_python_reads_the_same_arrays(sizes: Sizes) -> None:
+    work = allocate_work(sizes)
+    for k, array in enumerate(work):
+        array[...] = k
+    seen = work_view(table(work))
+    for mine, theirs in zip(work, seen, strict=True):
+        assert theirs.shape == mine.shape and theirs.dtype == mine.dtype
+        np.testing.assert_array_equal(theirs, mine)

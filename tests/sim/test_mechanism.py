@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from mechanisms import CASES, chain_with
 
 from sim.build import contact_frame, mechanism_sizes, pack, translation_axes
-from sim.layout import read_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law
 from sim.parts import KINDS, Body, Contact, Input, Joint
@@ -131,7 +130,7 @@ def test_tree_order_keeps_the_given_order_where_it_can() -> None:
     ]
     mech = Mechanism([Body(n, shape=BALL) for n in names], joints)
     assert mech.body_names == ("a", "b", "d", "c") == mech.joint_names
-    model = read_model(*pack(mech))
+    model = pack(mech)
     assert model.body_parent.tolist() == [-1, 0, 1, 0]
     assert model.body_qadr.tolist() == [0, 7, 8, 9, 9] and model.body_vadr.tolist() == [0, 6, 7, 8, 8]
     assert mech.q_slice("d") == slice(8, 9) and mech.v_slice("b") == slice(6, 7)
@@ -147,7 +146,7 @@ def test_any_order_of_a_tree_packs_with_parents_first(data: st.DataObject) -> No
         Joint(k, f"b{p}" if p >= 0 else None, f"b{i}") for i, (k, p) in enumerate(zip(kinds, parents, strict=True))
     ]
     mech = Mechanism([Body(f"b{i}", shape=BALL) for i in range(n)], data.draw(st.permutations(joints)))
-    model = read_model(*pack(mech))
+    model = pack(mech)
     for i, joint in enumerate(mech.joints):
         assert mech.bodies[i].name == joint.child
         assert model.body_parent[i] < i
@@ -160,7 +159,7 @@ def test_any_order_of_a_tree_packs_with_parents_first(data: st.DataObject) -> No
 def test_every_kind_of_joint_packs(kind: str, on_world: bool) -> None:
     mech = chain_with(kind, on_world)
     i = mech.joint_names.index("a" if on_world else "b")
-    model = read_model(*pack(mech))
+    model = pack(mech)
     ntrans, nrot = KINDS[kind]
     assert (model.joint_ntrans[i], model.joint_nrot[i]) == (ntrans, nrot)
     assert model.body_vadr[i + 1] - model.body_vadr[i] == ntrans + nrot
@@ -214,7 +213,7 @@ def test_packed_numbers() -> None:
     assert mech.contact_names == ("leg_0", "leg_1", "torso")
     assert mech.input_names == ("hip", "torso[4]", "leg")
     assert mechanism_sizes(mech) == (2, 8, 7, 3, 1, 3)
-    m = read_model(*pack(mech))
+    m = pack(mech)
     assert m.limit_dof.tolist() == [6] and m.limit_sign.tolist() == [1.0] and m.limit_bound.tolist() == [-1.0]
     np.testing.assert_array_equal(m.dof_damper, [0.5] * 6 + [0.2])
     assert (m.dof_spring[6], m.dof_rest[6]) == (3.0, 0.1)

@@ -56,7 +56,8 @@ def test_replace() -> None:
 def test_pickle() -> None:
     other = pickle.loads(pickle.dumps(SIM))
     assert other.mechanism == SIM.mechanism and repr(other) == repr(SIM)
-    np.testing.assert_array_equal(other.model_floats, SIM.model_floats)
+    for mine, theirs in zip(SIM.model, other.model, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
 
 
 def test_describe_says_what_is_there_and_what_is_not() -> None:

@@ -1,0 +1,128 @@
+"""Records: NamedTuples of arrays that compiled code takes as one pointer.
+
+Numba passes a NamedTuple by value, seven numbers per array: with a hundred arrays every call inside compiled code
+copies hundreds of numbers, and every function that takes one is slow to compile. A record is the address of a table
+
+    table[3 k : 3 k + 3] = address of the data of array k, rows, columns (1 for a vector)
+
+and its field k an array read from there. Tables do not change while compiled code runs, which the loads say (LLVM's
+`invariant.load`), so a field costs no more in a loop than a local array does.
+
+A table holds addresses: whoever makes one keeps the arrays alive.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
+from numba.np.arrayobj import populate_array
+from numpy.typing import NDArray
+
+Table = NDArray[np.int64]
+R = TypeVar("R")
+
+
+class Field(NamedTuple):
+    """One array of a record: C order, 8 bytes per entry."""
+
+    name: str
+    integer: bool
+    columns: int | None  # None: a vector; 0: a matrix whose width is in the table
+
+
+class RecordType(types.Type):
+    """Numba's type of a record."""
+
+    def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
+        self.fields = {field.name: (k, field) for k, field in enumerate(fields)}
+        super().__init__(name=f"Record({name}, {[tuple(f) for f in fields]})")
+
+    def array(self, name: str) -> types.Array:
+        """Type of one field."""
+        field = self.fields[name][1]
+        return types.Array(types.int64 if field.integer else types.float64, 1 if field.columns is None else 2, "C")
+
+
+@register_model(RecordType)
+class RecordModel(models.OpaqueModel):
+    """In compiled code a record is the address of its table."""
+
+
+@infer_getattr
+class RecordAttribute(AttributeTemplate):
+    """Types of the fields."""
+
+    key = RecordType
+
+    def generic_resolve(self, record: RecordType, name: str) -> types.Type | None:
+        return record.array(name) if name in record.fields else None
+
+
+@lower_getattr_generic(RecordType)
+def _field(context: Any, builder: Any, record: RecordType, value: Any, name: str) -> Any:
+    """The array of one field, from its three words of the table."""
+    k, field = record.fields[name]
+    kind = record.array(name)
+    array = context.make_array(kind)(context, builder)
+    item = context.get_data_type(kind.dtype).as_pointer()
+    data = _load(builder, value, item, 3 * k)
+    shape = [_load(builder, value, cgutils.intp_t, 3 * k + 1)]
+    strides = [cgutils.intp_t(8)]
+    if field.columns is not None:
+        columns = cgutils.intp_t(field.columns) if field.columns else _load(builder, value, cgutils.intp_t, 3 * k + 2)
+        shape.append(columns)
+        strides = [builder.mul(columns, strides[0]), strides[0]]
+    populate_array(array, data=data, shape=shape, strides=strides, itemsize=cgutils.intp_t(8), meminfo=None)
+    return array._getvalue()
+
+
+def _load(builder: Any, table: Any, kind: Any, k: int) -> Any:
+    """Word k of the table; nothing writes to it while compiled code runs."""
+    words = builder.bitcast(table, kind.as_pointer())
+    word = builder.load(builder.gep(words, [ir.Constant(ir.IntType(64), k)]))
+    word.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return word
+
+
+def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
+    """A function, for compiled code and for Python, from a table to the record `cls` with these fields."""
+    kind = RecordType(cls.__name__, tuple(fields))
+
+    @intrinsic
+    def at(typing: Any, table: Any) -> Any:
+        def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(signature.args[0])(context, builder, arguments[0])
+            return builder.bitcast(array.data, cgutils.voidptr_t)
+
+        return kind(table), lower
+
+    def view(table: Table) -> R:
+        return cls(*(_array(field, table[3 * k : 3 * k + 3]) for k, field in enumerate(fields)))
+
+    @overload(view, strict=False)  # not strict: annotations are no part of the signature
+    def compiled(table: Any) -> Any:
+        return lambda table: at(table)
+
+    return view
+
+
+def _array(field: Field, words: Table) -> NDArray[Any]:
+    """One field, for Python."""
+    address, rows, columns = (int(word) for word in words)
+    kind = ctypes.c_int64 if field.integer else ctypes.c_double
+    flat = np.frombuffer((kind * (rows * columns)).from_address(address), dtype=np.int64 if field.integer else float)
+    return flat if field.columns is None else flat.reshape(rows, columns)
+
+
+def table(arrays: Sequence[NDArray[Any]]) -> Table:
+    """Addresses and shapes of the arrays of a record, in the order of its fields."""
+    rows = [(a.ctypes.data, a.shape[0], a.shape[1] if a.ndim == 2 else 1) for a in arrays]
+    return np.array(rows, dtype=np.int64).ravel()
