@@ -137,12 +137,12 @@ class Calls:
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        settings = self.settings.array(kappa)
-        out = (xs, us, substeps, A, B, x_next, reports, self.hard, self.smooth)
+        line = rollout.Linearized(xs, us, A, B, x_next, reports)
+        settings, how = self.settings.array(kappa), (self.hard, self.smooth)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            rollout.linearize(self._model, self._work(), settings, (0, n), *out)
+            rollout.linearize(self._model, self._work(), settings, (0, n), substeps, line, *how)
         else:
-            rollout.linearize_knots(self._model, self._chunks(n), settings, *out)
+            rollout.linearize_knots(self._model, self._chunks(n), settings, substeps, line, *how)
         unsolved = reports[:, 0] != Status.SOLVED
         for array in (A, B, x_next):
             array[unsolved] = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ Floats = NDArray[np.float64]
 
 def _floats(call: str, value: Any) -> Floats:
     """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.c_contiguous:
+        return value
     try:
         with np.errstate(all="ignore"):
             raw = np.asarray(value)
@@ -27,10 +30,12 @@ def array(call: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
     """`value` as a finite float64 array of the given shape (None: any length)."""
     out = _floats(call, value)
     fits = out.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, out.shape, strict=True))
+    if fits and isfinite(out.sum()):
+        return out
     if not fits:
         wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
         raise ValueError(f"{call}: expected shape ({wanted}), got {out.shape}")
-    if not np.isfinite(out).all():
+    if not np.isfinite(out).all():  # a sum of finite numbers may overflow
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(out))[0])
         where = f" at index {index[0] if len(index) == 1 else index}" if index else ""
         raise ValueError(f"{call}: expected finite numbers, got {out[index]}{where}")
@@ -39,9 +44,12 @@ def array(call: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
 
 def number(call: str, value: Any, at_least: float | None = None, above: float | None = None) -> float:
     """`value` as a finite float within the stated bound."""
-    if np.ndim(value) != 0:
+    if type(value) is float and isfinite(value):
+        out = value
+    elif np.ndim(value) != 0:
         raise ValueError(f"{call}: expected one number, got {value!r}")
-    out = float(array(call, value, ()))
+    else:
+        out = float(array(call, value, ()))
     if at_least is not None and out < at_least:
         raise ValueError(f"{call}: expected a number >= {at_least:g}, got {out:g}")
     if above is not None and out <= above:

@@ -56,30 +56,41 @@ def _copy_rows(P: Matrix, first: int, count: int, source: Matrix, start: int) ->
 
 
 @kernel
+def _pass_up(P: Matrix, child: int, parent: int) -> None:
+    """P[parent : parent + 6] += P[child : child + 6]"""
+    for r in range(6):
+        p = P[child + r]
+        s = P[parent + r]
+        for k in range(p.shape[0]):
+            s[k] += p[k]
+
+
+@kernel
 def _panel_up(model: Model, work: Work) -> None:
-    """From the leaves to the root: columns = D^-1 (columns - S2^T p), p_parent += p + U columns."""
-    nbody = model.body_parent.shape[0]
+    """From the leaves to the root: columns = D^-1 (columns - S2^T p), p_parent += p + U columns.
+
+    A leaf has p = 0: nothing to project, and its U columns go to the parent at once.
+    """
     X = work.columns
     P = work.panel
-    _clear_rows(P, 0, 6 * nbody)
-    for i in range(nbody - 1, -1, -1):
+    _clear_rows(P, 0, P.shape[0])
+    for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         q = model.body_parent[i]
-        for d in range(d0, d0 + n):
-            _rows_minus(work.S2, d, P, 6 * i, X)
+        leaf = model.body_leaf[i] == 1
+        if not leaf:
+            for d in range(d0, d0 + n):
+                _rows_minus(work.S2, d, P, 6 * i, X)
         if n == 1:
             _scale_row(X, d0, work.D[i, 0])
         elif n > 1:
             lu_solve_rows(work.D[i], n, int(work.D[i, 36]), X, d0)
         if q >= 0:
             for d in range(d0, d0 + n):
-                _add_rows(work.U, d, X, P, 6 * i)
-            for r in range(6):
-                p = P[6 * i + r]
-                s = P[6 * q + r]
-                for k in range(p.shape[0]):
-                    s[k] += p[k]
+                _add_rows(work.U, d, X, P, 6 * q if leaf else 6 * i)
+            if not leaf:
+                _pass_up(P, 6 * i, 6 * q)
 
 
 @kernel

@@ -6,7 +6,7 @@ Four things decide (20,000 random extreme states, `benchmarks/robustness.py`):
   beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
   positive. Conic scalings jam on thin cones.
 * The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
-  the impulses of kappa itself, a robot at rest, starts there.
+  the impulses of kappa itself, a robot at rest or a good guess, starts there.
 * An attempt whose steps become short, at the boundary or in the line search, is given up: creeping on costs more than
   starting again.
 * The next attempt starts from another share of the incoming velocity and another kappa0. Shares are a golden-ratio
@@ -47,7 +47,7 @@ _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
-_AT_REST = 1e-3  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
+_AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
@@ -156,32 +156,39 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
 
 
 @kernel
-def first_attempt(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> int:
-    """0, the start at kappa itself, where the incoming motion all but balances with its impulses; 1 everywhere else.
+def first_attempt(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Vector
+) -> int:
+    """0, the start at kappa itself, where the guess all but balances with its impulses; 1 everywhere else.
 
-    The gap of a resting contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution.
+    The gap of a pressing contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution,
+    and so does a step whose solution is known.   Leaves the iterate at the start of attempt 0.
     """
+    q, v, u = inputs
     if not place(model, work, options.h, q, v, 1.0):
+        return 1
+    start_inequalities(model, work, options.h, options.kappa, 1.0)
+    soft, _ = residuals(model, work, options.h, q, v, u)
+    if not place(model, work, options.h, q, guess, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 0.0)
     hard, _ = residuals(model, work, options.h, q, v, u)
-    start_inequalities(model, work, options.h, options.kappa, 1.0)
-    soft, _ = residuals(model, work, options.h, q, v, u)
     return 0 if hard < _AT_REST * soft else 1
 
 
 @kernel
 def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, attempt: int) -> float:
-    """Start on the central path: attempt 0 at kappa itself, 1 at the usual kappa0, then at others.
+    """Start on the central path: attempt 0 at kappa itself (see above), 1 at the usual kappa0, then at others.
 
     nu is the incoming velocity at first, from attempt 2 on a share of it: 1/2 and on by the golden ratio, modulo 1.
     Returns the kappa of the start, 0 if there is none.
     """
+    if attempt == 0:
+        return options.kappa
     share = 1.0 if attempt < 2 else (0.5 + _GOLDEN * (attempt - 2)) % 1.0
     if not place(model, work, options.h, q, v, share):
         return 0.0
-    growth = 0.0 if attempt == 0 else _GROWTH ** ((attempt - 1) % _GROWTHS)
-    return start_inequalities(model, work, options.h, options.kappa, growth)
+    return start_inequalities(model, work, options.h, options.kappa, _GROWTH ** ((attempt - 1) % _GROWTHS))
 
 
 @kernel
@@ -278,12 +285,14 @@ def try_from(
 
 
 @kernel
-def interior_point(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> Outcome:
-    """Solve the step for v25 with all complementarity products at kappa.
+def interior_point(
+    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Vector
+) -> Outcome:
+    """Solve the step for v25 with all complementarity products at kappa; guess: (nv,) of v25, may be far off.
 
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
-    first = first_attempt(model, work, options, q, v, u)
+    first = first_attempt(model, work, options, (q, v, u), guess)
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     for attempt in range(first, _ATTEMPTS):
         out = try_from(model, work, options, (q, v, u), attempt, out.iterations)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.model import Model, Work
 from solvers.record import Field, record, table
@@ -23,8 +24,9 @@ def _shapes(text: str) -> dict[str, Shape]:
 
 MODEL_INTS = _shapes(
     """
-    body_parent nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody, dof_body nv,
-    dof_qadr nv, contact_body ncontact, contact_law ncontact, limit_dof nlimit, input_kind nu, input_index nu
+    body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, limit_dof nlimit, input_kind nu,
+    input_index nu
     """
 )
 
@@ -79,10 +81,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     return rows, cols
 
 
-def _carve(fields: dict[str, Shape], sizes: Sizes, kind: type) -> dict[str, Any]:
+def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
     extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
-    buffer = np.zeros(sum(rows * cols for rows, cols in extents.values()), dtype=kind)
+    buffer: NDArray[Any] = np.zeros(sum(rows * cols for rows, cols in extents.values()), dtype=kind)
     arrays, start = {}, 0
     for name, (rows, cols) in extents.items():
         flat = buffer[start : start + rows * cols]

@@ -46,6 +46,7 @@ class Model(NamedTuple):
 
     # topology
     body_parent: Integers  # (nbody,) index of the parent body, -1 for the world
+    body_leaf: Integers  # (nbody,) 1 where no body hangs on this one
     body_qadr: Integers  # (nbody + 1,) first coordinate of joint i in q
     body_vadr: Integers  # (nbody + 1,) first velocity of joint i in v: translations first, then rotations
     joint_ntrans: Integers  # (nbody,) free translations, 0 to 3

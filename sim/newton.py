@@ -38,15 +38,15 @@ def norm(x: Vector) -> float:
 
 
 @kernel
-def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector) -> Outcome:
-    """Solve R(v25) = 0 from v25 = v15; halve steps that leave the domain or let the residual grow.
+def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Vector) -> Outcome:
+    """Solve R(v25) = 0 from v25 = guess; halve steps that leave the domain or let the residual grow.
 
     Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
     """
     h = options.h
     scale = residual_scale(work)
     for d in range(v.shape[0]):
-        work.nu_trial[d] = v[d]
+        work.nu_trial[d] = guess[d]
         work.dnu[d] = 0.0
     alpha = 1.0
     last = 1e300

@@ -11,10 +11,12 @@ not SOLVED.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from sim.gradients import gradient
 from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Options, Vector, Work
+from sim.model import Integers, Matrix, Options, Vector, Work
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
@@ -24,6 +26,17 @@ from solvers.status import Status
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
 Cube = Matrix  # (n, rows, columns)
+
+
+class Linearized(NamedTuple):
+    """Knots of a trajectory, and what their linearization fills in."""
+
+    xs: Matrix  # (T, nx) or (T + 1, nx) states, in; the next one is where a step of a knot starts to look
+    us: Matrix  # (T, nu) inputs, in
+    A: Cube  # (T, ndx, ndx)
+    B: Cube  # (T, ndx, nu)
+    x_next: Matrix  # (T, nx)
+    reports: Matrix  # (T, 5)
 
 
 @kernel
@@ -51,10 +64,11 @@ def roll(
     model = model_view(model_at)
     work = work_view(work_at)
     options = _options(settings)
+    nq = work.theta1.shape[0]
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
     for t in range(us.shape[0]):
-        if step(model, work, options, xs[t], us[t], xs[t + 1], reports[t], hard, smooth) != _SOLVED:
+        if step(model, work, options, xs[t], us[t], xs[t, nq:], xs[t + 1], reports[t], hard, smooth) != _SOLVED:
             return t
         if hard is not None:
             report_contacts(model, work, contacts[t])
@@ -88,6 +102,7 @@ def closed_loop(
     model = model_view(model_at)
     work = work_view(work_at)
     options = _options(settings)
+    nq = work.theta1.shape[0]
     xs_ref, ks, Ks, gaps = policy
     low, high = limits
     ndx = gaps.shape[1]
@@ -108,7 +123,8 @@ def closed_loop(
         for _ in range(substeps):
             for k in range(x.shape[0]):
                 work.step_x[0, k] = b[k]
-            if step(model, work, options, work.step_x[0], u_out[t], b, report, hard, smooth) != _SOLVED:
+            guess = xs_ref[t + 1, nq:] if substeps == 1 else work.step_x[0, nq:]
+            if step(model, work, options, work.step_x[0], u_out[t], guess, b, report, hard, smooth) != _SOLVED:
                 return t
         if alpha < 1.0:
             for k in range(ndx):
@@ -148,84 +164,60 @@ def _chain(work: Work, A: Matrix, B: Matrix) -> None:
 
 
 @kernel
-def _linearize_knot(
-    model: Model,
-    work: Work,
-    options: Options,
-    x: Vector,
-    u: Vector,
-    substeps: int,
-    A: Matrix,
-    B: Matrix,
-    x_next: Vector,
-    report: Vector,
-    hard: int | None,
-    smooth: int | None,
-) -> None:
-    """A, B of one knot: the product of the derivatives of its steps."""
-    nq = work.theta1.shape[0]
-    for k in range(x.shape[0]):
-        x_next[k] = x[k]
-    for s in range(substeps):
-        a = work.step_x[0]
-        for k in range(x.shape[0]):
-            a[k] = x_next[k]
-        if step(model, work, options, a, u, x_next, report, hard, smooth) != _SOLVED:
-            return
-        Js = A if s == 0 else work.step_A
-        Ju = B if s == 0 else work.step_B
-        if not gradient(model, work, options.h, options.kappa, a[:nq], a[nq:], Js, Ju, hard):
-            report[0] = _SINGULAR
-            return
-        if s > 0:
-            _chain(work, A, B)
-
-
-@kernel
 def linearize(
     model_at: Table,
     work_at: Table,
     settings: Vector,
     knots: tuple[int, int],
-    xs: Matrix,
-    us: Matrix,
     substeps: int,
-    A: Cube,
-    B: Cube,
-    x_next: Matrix,
-    reports: Matrix,
+    line: Linearized,
     hard: int | None,
     smooth: int | None,
 ) -> None:
-    """A[t], B[t], x_next[t] of the knots (xs[t], us[t]) from knots[0] up to knots[1]."""
+    """Derivatives of the knots from knots[0] up to knots[1]: products of the derivatives of their steps."""
     model = model_view(model_at)
     work = work_view(work_at)
     options = _options(settings)
+    nq = work.theta1.shape[0]
+    x = work.step_x[0]
     for t in range(knots[0], knots[1]):
-        _linearize_knot(model, work, options, xs[t], us[t], substeps, A[t], B[t], x_next[t], reports[t], hard, smooth)
+        A = line.A[t]
+        B = line.B[t]
+        x_next = line.x_next[t]
+        report = line.reports[t]
+        for k in range(x.shape[0]):
+            x_next[k] = line.xs[t, k]
+        for s in range(substeps):
+            for k in range(x.shape[0]):
+                x[k] = x_next[k]
+            guess = line.xs[t + 1, nq:] if substeps == 1 and t + 1 < line.xs.shape[0] else x[nq:]
+            if step(model, work, options, x, line.us[t], guess, x_next, report, hard, smooth) != _SOLVED:
+                break
+            Js = A if s == 0 else work.step_A
+            Ju = B if s == 0 else work.step_B
+            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju, hard):
+                report[0] = _SINGULAR
+                break
+            if s > 0:
+                _chain(work, A, B)
 
 
 @parallel_kernel
 def linearize_knots(
     model_at: Table,
-    work_ats: Matrix,
+    work_ats: Table,
     settings: Vector,
-    xs: Matrix,
-    us: Matrix,
     substeps: int,
-    A: Cube,
-    B: Cube,
-    x_next: Matrix,
-    reports: Matrix,
+    line: Linearized,
     hard: int | None,
     smooth: int | None,
 ) -> None:
     """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c]."""
-    n = us.shape[0]
+    n = line.us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
         knots = (c * n // chunks, (c + 1) * n // chunks)
-        linearize(model_at, work_ats[c], settings, knots, xs, us, substeps, A, B, x_next, reports, hard, smooth)
+        linearize(model_at, work_ats[c], settings, knots, substeps, line, hard, smooth)
 
 
 @kernel
@@ -243,10 +235,11 @@ def _roll_one(
     model = model_view(model_at)
     work = work_view(work_at)
     options = _options(settings)
+    nq = work.theta1.shape[0]
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
     for t in range(us.shape[0]):
-        status = step(model, work, options, xs[t], us[t], xs[t + 1], work.report, hard, smooth)
+        status = step(model, work, options, xs[t], us[t], xs[t, nq:], xs[t + 1], work.report, hard, smooth)
         if status != _SOLVED:
             return status, t
     return _SOLVED, us.shape[0]
@@ -255,7 +248,7 @@ def _roll_one(
 @parallel_kernel
 def roll_batch(
     model_at: Table,
-    work_ats: Matrix,
+    work_ats: Table,
     settings: Vector,
     x0s: Matrix,
     us: Cube,

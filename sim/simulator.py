@@ -204,5 +204,5 @@ class Simulator(States):
             )
         steps = whole(f"{call}(substeps=...)", substeps)
         level = self._border.kappa("linearize_trajectory", kappa)
-        A, B, x_next, reports = self._calls.linearize(states[: len(inputs)], inputs, steps, level)
+        A, B, x_next, reports = self._calls.linearize(states, inputs, steps, level)
         return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))

@@ -22,6 +22,7 @@ def step(
     options: Options,
     x: Vector,
     u: Vector,
+    guess: Vector,
     out: Vector,
     report: Vector,
     hard: int | None,
@@ -29,6 +30,7 @@ def step(
 ) -> int:
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
+    guess: (nv,) where the search for the next velocity may start, x[nq:] when nothing better is known.
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
     last iterate when the status is not SOLVED; nobody must use it.
     Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of
@@ -40,9 +42,9 @@ def step(
     r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
     if begin_step(model, work, options.h, q, v, u):
         if smooth is not None:
-            r = newton(model, work, options, q, v, u)
+            r = newton(model, work, options, q, v, u, guess)
         if hard is not None:
-            r = interior_point(model, work, options, q, v, u)
+            r = interior_point(model, work, options, q, v, u, guess)
     total = 0.0
     for k in range(nq):
         out[k] = work.theta3[k]

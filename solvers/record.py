@@ -14,6 +14,7 @@ A table holds addresses: whoever makes one keeps the arrays alive.
 from __future__ import annotations
 
 import ctypes
+import zlib
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -43,7 +44,8 @@ class RecordType(types.Type):
 
     def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
         self.fields = {field.name: (k, field) for k, field in enumerate(fields)}
-        super().__init__(name=f"Record({name}, {[tuple(f) for f in fields]})")
+        digest = zlib.crc32(repr(fields).encode())  # the name stands in every symbol: short, and one per list of fields
+        super().__init__(name=f"{name}_{digest:08x}")
 
     def array(self, name: str) -> types.Array:
         """Type of one field."""
@@ -117,8 +119,8 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
 def _array(field: Field, words: Table) -> NDArray[Any]:
     """One field, for Python."""
     address, rows, columns = (int(word) for word in words)
-    kind = ctypes.c_int64 if field.integer else ctypes.c_double
-    flat = np.frombuffer((kind * (rows * columns)).from_address(address), dtype=np.int64 if field.integer else float)
+    kind: Any = ctypes.c_int64 if field.integer else ctypes.c_double
+    flat: NDArray[Any] = np.ctypeslib.as_array((kind * (rows * columns)).from_address(address))
     return flat if field.columns is None else flat.reshape(rows, columns)
 
 

@@ -4,7 +4,8 @@ One core, processor time, whole horizons per call so that no Python is inside th
 round; times are medians over the rounds, ratios medians of the ratios taken round by round.
 
 A gradient's time is that of `linearize_trajectory` per knot minus that of a step: a linearised knot solves its step,
-at the same kappa and so with the same iterations, and then differentiates it.
+at the same kappa, and then differentiates it. All knots are the state in which the scene stands still, so that the next
+knot, where a step starts to look, tells it no more than its own velocity does, and iterations are those of the rollout.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def _scene(report: Report, name: str, sim: Simulator, x: Vector, u: Vector, roun
     """Rows of one mechanism that holds still: step, gradient, and their ratios to MuJoCo's."""
     us = np.tile(u, (KNOTS, 1))
     trajectory = _solved(name, sim.rollout(x, us))
-    xs = np.ascontiguousarray(trajectory.x[:-1])
+    xs = np.tile(x, (KNOTS, 1))
     cases: dict[str, Callable[[], Any]] = {
         "step": lambda: sim.rollout(x, us),
         "step and gradient": lambda: sim.linearize_trajectory(xs, us, kappa=sim.kappa),

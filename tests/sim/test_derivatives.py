@@ -166,7 +166,7 @@ def test_trajectory_linearization_agrees_with_single_steps(rng):
     assert np.all(np.asarray(out.status) == 0)
     for t in range(8):
         A, _ = sim.linearize(xs[t], us[t])
-        np.testing.assert_allclose(out.A[t], A, rtol=0, atol=1e-9 * np.abs(A).max())
+        np.testing.assert_allclose(out.A[t], A, rtol=0, atol=1e-8 * np.abs(A).max())
         np.testing.assert_allclose(sim.difference(x1=out.x_next[t], x0=xs[t + 1]), 0.0, atol=1e-9)
     chained = sim.linearize_trajectory(xs[::2], us[::2], substeps=2)
     for k in range(4):

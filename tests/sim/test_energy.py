@@ -11,7 +11,7 @@ from dojo_opt import models
 from sim.build import pack
 from sim.coordinates import maximal_states
 from sim.energy import energies, momenta
-from sim.layout import work_size
+from sim.layout import allocate_work, sizes_of, table
 from sim.mechanism import Mechanism
 from sim.shapes import rotation_matrix
 
@@ -20,13 +20,16 @@ Floats = NDArray[np.float64]
 
 def measure(mech: Mechanism, q: Floats, v: Floats, h: float) -> tuple[Floats, Floats, Floats]:
     """(kinetic, potential), momentum, maximal state."""
-    floats, ints = pack(mech)
-    work = np.full(work_size(ints), np.nan)
+    model = pack(mech)
+    work = allocate_work(sizes_of(model))
+    for array in work:
+        array[...] = np.nan
+    model_at, work_at = table(model), table(work)
     x = np.concatenate([q, v])[None]
     e, p, z = np.empty((1, 2)), np.empty((1, 6)), np.empty((mech.nbody, 13))
-    energies(floats, ints, work, h, x, e)
-    momenta(floats, ints, work, h, x, p)
-    maximal_states(floats, ints, work, h, x, z)
+    energies(model_at, work_at, h, x, e)
+    momenta(model_at, work_at, h, x, p)
+    maximal_states(model_at, work_at, h, x, z)
     return e[0], p[0], z
 
 

@@ -249,4 +249,5 @@ def test_closed_loop_follows_its_policy() -> None:
         x = PENDULUM.rollout(x, [u, u]).x[-1] - 0.75 * gaps[t + 1]
         np.testing.assert_allclose(shot.x[t + 1], x, atol=1e-12)
     assert (shot.status, shot.knot) == (Status.SOLVED, 3)
-    np.testing.assert_array_equal(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x)
+    # a rollout under a policy looks for the next velocity near that of the policy: equal to the tolerance of a step
+    np.testing.assert_allclose(PENDULUM.closed_loop(x0, us).x, PENDULUM.rollout(x0, us).x, atol=1e-7)
