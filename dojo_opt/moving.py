@@ -1,0 +1,111 @@
+"""Moving references: what a receding horizon is to track, as functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.problem import Problem
+from dojo_opt.term import PickTerm, StateTerm
+from sim import checks
+from sim.simulator import Simulator
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Moving = Callable[[Vector], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
+
+__all__ = ["References", "Sampled"]
+
+
+class Sampled:
+    """A trajectory as a function of time: rows at `time`, on the way between two of them, the last one from then on.
+
+    rows (n, nx) are states of `sim`; with another width, or sim=None, they are interpolated linearly. With a `cycle`, a
+    state change (ndx,) per repetition such as the advance of a gait, the trajectory goes round: its last row is its
+    first one, moved on.
+    """
+
+    def __init__(
+        self, time: ArrayLike, rows: ArrayLike, sim: Simulator | None = None, cycle: ArrayLike | None = None
+    ) -> None:
+        self.time = checks.array("Sampled(time)", time, (None,))
+        self.rows = checks.array("Sampled(rows)", rows, (len(self.time), None))
+        if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
+            raise ValueError("Sampled(time): expected at least two times, growing")
+        self._sim = sim if sim is not None and self.rows.shape[1] == sim.nx else None
+        self.cycle = None
+        if cycle is not None:
+            if self._sim is None:
+                raise ValueError("Sampled(cycle=...): needs sim=... and rows that are its states")
+            self.cycle = checks.array("Sampled(cycle=...)", cycle, (self._sim.ndx,))
+
+    def __call__(self, times: Vector) -> Matrix:
+        """Rows (n, width) at the times (n,)."""
+        times = np.asarray(times, dtype=np.float64)
+        first, last = self.time[0], self.time[-1]
+        laps = np.zeros(len(times))
+        if self.cycle is not None:
+            laps = np.floor((times - first) / (last - first) + 1e-9)
+            times = times - laps * (last - first)
+        at = np.clip(times, first, last)
+        i = np.clip(np.searchsorted(self.time, at, side="right") - 1, 0, len(self.time) - 2)
+        f = ((at - self.time[i]) / (self.time[i + 1] - self.time[i]))[:, None]
+        before, after = self.rows[i], self.rows[i + 1]
+        if self._sim is None:
+            return (1.0 - f) * before + f * after
+        out = self._sim.integrate(before, f * self._sim.difference(after, before))
+        if self.cycle is not None:
+            out = self._sim.integrate(out, laps[:, None] * self.cycle)
+        return out
+
+
+class References:
+    """The costs of a problem whose references move, and the functions that move them.
+
+    given: one function or trajectory for all `Tracking` costs, or {index of a cost: function or trajectory} for
+    `Tracking` and `Effort`. A function takes times (n,) [s] and returns rows (n, nx) or (n, nu); a trajectory is rows
+    one knot apart, or anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero.
+    """
+
+    def __init__(self, problem: Problem, given: Any) -> None:
+        self._h = problem.knot_time
+        self._sim = problem.sim
+        table = dict(given) if isinstance(given, Mapping) else {}
+        if given is not None and not table:
+            table = {i: given for i, term in enumerate(problem.costs) if isinstance(term, StateTerm)}
+            if not table:
+                raise ValueError("MPC(reference=...): the problem has no Tracking cost")
+        self._moving: list[tuple[StateTerm | PickTerm, Moving]] = []
+        for index, value in table.items():
+            call = f"MPC(reference={{{index!r}: ...}})"
+            if not isinstance(index, int | np.integer) or not 0 <= index < len(problem.costs):
+                raise ValueError(f"{call}: expected the index of a cost, 0 to {len(problem.costs) - 1}")
+            term = problem.costs[index]
+            if not isinstance(term, StateTerm | PickTerm):
+                raise ValueError(f"{call}: a {term.name} has no reference that can move")
+            self._moving.append((term, self._function(call, value, term.reference.shape[1])))
+        self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
+        self.input: Moving | None = next((f for term, f in self._moving if isinstance(term, PickTerm)), None)
+        self._call_checked(0.0)
+
+    def _function(self, call: str, value: Any, width: int) -> Moving:
+        if callable(value):
+            return value
+        if hasattr(value, "x") and hasattr(value, "time"):
+            return Sampled(value.time, value.x, self._sim)
+        rows = checks.array(call, value, (None, width))
+        return Sampled(self._h * np.arange(len(rows)), rows, self._sim if width == self._sim.nx else None)
+
+    def _call_checked(self, time: float) -> None:
+        """Once at the border: every function returns what its cost can use."""
+        for term, function in self._moving:
+            times = time + self._h * term.knots
+            checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
+
+    def move(self, time: float) -> None:
+        """Let the first knot of every reference be at `time` [s]."""
+        for term, function in self._moving:
+            term.reference[:] = function(time + self._h * term.knots)

@@ -1,0 +1,263 @@
+"""`MPC`: the planner in closed loop, one iteration per tick from the shifted plan."""
+
+from __future__ import annotations
+
+import copy
+import time as clock
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.ground import Ground
+from dojo_opt.line_search import Iterate
+from dojo_opt.measurement import Measurement
+from dojo_opt.moving import References
+from dojo_opt.plan import Plan
+from dojo_opt.planner import Solver
+from dojo_opt.policy import Policy
+from dojo_opt.problem import Problem
+from dojo_opt.term import StateTerm
+from dojo_opt.tick import Settings, Tick
+from sim import checks
+from solvers.status import Status
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
+_PREDICTION = 5e-3  # longest step of the prediction over the delay [s]
+
+__all__ = ["MPC"]
+
+
+class MPC:
+    """Model-predictive control: `u = mpc(time, x)`, called at any rate, plans anew once per `period`.
+
+    problem     its simulator is the model; the plant may be another one. Its start and guess are those of the first
+                plan only, which is solved to the end; its references are overwritten where `reference` is given.
+    iterations  of the planner per tick
+    reference   what to track over time, see `dojo_opt.moving.References`; without it, the problem's own at every tick
+    plan        the first plan, at the time of the first call; without it, `ilqr` is called with its defaults
+    settings    fields of `dojo_opt.tick.Settings` by name
+
+    A tick shifts the plan by the time that has passed and keeps its states as the guess, the measured one in front: the
+    disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
+    over together with the robot.) A plan that the planner rejects is not used: the one before stays in force.
+    `log` has one `Tick` per plan.
+    """
+
+    def __init__(
+        self, problem: Problem, iterations: int = 1, *, reference: Any = None, plan: Plan | None = None, **settings: Any
+    ) -> None:
+        if int(iterations) != iterations or iterations < 1:
+            raise ValueError(f"MPC(iterations=...): expected a whole number >= 1, got {iterations!r}")
+        self.settings = Settings(**settings)
+        self._made_from = (problem, int(iterations), reference, plan, settings)
+        self.problem = _own(problem)
+        self.sim = self.problem.sim
+        self.period = float(self.settings.period or self.problem.knot_time)
+        self._solver = Solver(self.problem, self.settings.planner(int(iterations)))
+        self.references = References(self.problem, reference)
+        self._fine = None
+        if self.settings.delay:
+            self._steps = int(np.ceil(self.settings.delay / _PREDICTION - 1e-9))
+            self._fine = self.sim.replace(time_step=self.settings.delay / self._steps)
+        self._first = plan
+        self._ground = Ground(self.sim)
+        self._flat = self._ground.height.copy()
+        self.reset()
+
+    def __reduce__(self) -> Any:
+        return _rebuild, self._made_from
+
+    def fresh(self) -> MPC:
+        """Another one, made from the same arguments."""
+        return _rebuild(*self._made_from)
+
+    def reset(self) -> None:
+        """Forget plan, measurements and log."""
+        self.log: list[Tick] = []
+        self.policy: Policy | None = None
+        self._measured = Measurement(self.sim, self.settings.mean_velocity)
+        self._issued: deque[tuple[float, Vector]] = deque()
+        self._due = -np.inf
+        self._ground.height[:] = self._flat
+        self._solver.descent.reset()
+        self._solver.objective.reset()
+
+    def __call__(self, time: float, x: ArrayLike) -> Vector:
+        """Input (nu,) [N, N m] for the measured state x (nx,) at `time` [s]; with a `delay`, that for time + delay."""
+        now = checks.number("MPC(time)", time)
+        measured = checks.array("MPC(x)", x, (self.sim.nx,))
+        self._measured.add(now, measured)
+        if self.policy is None:
+            self._begin(now)
+        elif now >= self._due - 1e-9:
+            self._tick(now, self.policy)
+        return self._command(now)
+
+    def _command(self, now: float) -> Vector:
+        """The planned input, with feedback unless it is switched off."""
+        policy, settings = self.policy, self.settings
+        assert policy is not None
+        u = policy.control(now + settings.delay)
+        fallen_back = self.log[-1].fallback
+        scale = 1.0 if fallen_back else settings.gain_scale
+        if scale > 0.0:
+            u += scale * policy.feedback(now, self._measured.state())
+        limits = self.problem.control_limits
+        if limits is not None:
+            np.clip(u, *limits, out=u)
+        if settings.delay:
+            self._issued.append((now + settings.delay, u))
+            while len(self._issued) > 1 and self._issued[1][0] <= now:
+                self._issued.popleft()
+        return u
+
+    def _ahead(self, now: float) -> Vector:
+        """State of the model at which the next plan starts: the measured one, moved on by the delay."""
+        if self._fine is None:
+            return self._measured.state()
+        _, x = self._measured.last
+        ends, h = [], self._fine.time_step
+        for k in range(self._steps):
+            u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), np.zeros(self.sim.nu))
+            x = self._fine.step(x, u).x
+            ends.append((now + (k + 1) * h, x))
+        return self._measured.state(ends)
+
+    def _begin(self, now: float) -> None:
+        """The first plan."""
+        begin = clock.perf_counter()
+        self._start(now)
+        self.problem.start = self._measured.state()
+        plan = self._first or Solver(self.problem).solve()
+        shape = (self.problem.horizon, self.sim.nu)
+        if plan.u.shape != shape:
+            raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")
+        self._solver.objective.reset(plan.multipliers)
+        self.policy = Policy(self.sim, now + self.settings.delay, plan.x, plan.u, plan.K, self.problem.substeps)
+        fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
+        self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, 0.0)
+
+    def _start(self, now: float) -> None:
+        self._due = now + self.period
+        self.references.move(now + self.settings.delay)
+
+    def _tick(self, now: float, old: Policy) -> None:
+        """Shift, iterate, and take the new plan when it is one."""
+        begin = clock.perf_counter()
+        solver, problem = self._solver, self.problem
+        self._start(now)
+        start = self._ahead(now)
+        gap = float(np.abs(self.sim.difference(start, old.state(now + self.settings.delay))).max())
+        if self.settings.learn_ground:
+            self._ground.learn(old, now, self._measured.last[1], self._measured.first)
+        shifted = old.shifted(now + self.settings.delay, self._tail)
+        problem.start = start
+        continuation = solver.continuation
+        continuation.reset()
+        solver.descent.K[:] = shifted.K
+        solver.descent.k.fill(0.0)
+        self._shift_multipliers((now - self.log[-1].time) / problem.knot_time)
+        guess, kappa = self._guess(shifted)
+        if guess is None:
+            status = Status.SIMULATION_FAILED
+        else:
+            continuation.start(guess, kappa)
+            status = continuation.run(solver.options.stages[0])
+        history = continuation.history
+        alpha = history[-1]["alpha"] if history else 1.0
+        # an iteration that was rejected from consistent states leaves a plan that is as good as it was
+        taken = status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT) and self._usable()
+        if taken:
+            after = continuation.now
+            solver.objective.update_multipliers(after.x, after.u)
+            sim, substeps = self.sim, problem.substeps
+            self.policy = Policy(sim, now + self.settings.delay, after.x, after.u, solver.descent.K.copy(), substeps)
+        cost = continuation.now.cost if taken else self.log[-1].cost
+        self._record(now, begin, status, not taken, len(history), cost, alpha, gap)
+
+    def _usable(self) -> bool:
+        """Whether the present iterate is a trajectory of the model, up to what a short step leaves open."""
+        now = self._solver.continuation.now
+        history = self._solver.continuation.history
+        moved = any(record["alpha"] > 0.0 for record in history)
+        return bool(np.isfinite(now.merit)) and (moved or now.gaps is None)
+
+    def _guess(self, shifted: Policy) -> tuple[Iterate | None, float | None]:
+        """First iterate of a tick, and the smoothing at which its gaps are known to be closed."""
+        solver, kappa = self._solver, self.settings.kappa
+        if self.settings.guess == "states":
+            xs = shifted.x.copy()
+            xs[0] = self.problem.start
+            return Iterate(xs, shifted.u, None, *solver.objective.evaluate(xs, shifted.u)), None
+        scales = _SCALES if self.settings.guess == "feedback" else (0.0,)
+        nominal = Iterate(shifted.x, shifted.u, None, np.inf, np.inf)
+        best = None
+        for scale in scales:
+            shot = solver.line_search.roll(nominal, None, scale * shifted.K, 1.0, kappa)
+            if shot.status == Status.SOLVED:
+                trial = solver.line_search.accept(shot, None)
+                if best is None or trial.merit < best.merit:
+                    best = trial
+        return best, kappa
+
+    def _tail(self, count: int) -> tuple[Matrix, Matrix]:
+        """States and inputs for knots beyond the old horizon: the last ones, moved along with their references."""
+        policy, h = self.policy, self.problem.knot_time
+        assert policy is not None
+        end = policy.time + h * len(policy.u)
+        times = end + h * np.arange(count + 1.0)
+        xs, us = np.repeat(policy.x[-1:], count, axis=0), np.repeat(policy.u[-1:], count, axis=0)
+        if self.references.input is not None:
+            rows = np.asarray(self.references.input(times - h))
+            us = us + rows[1:] - rows[0]
+        if self.references.state is not None:
+            rows = np.asarray(self.references.state(times))
+            xs = self.sim.integrate(rows[1:], self.sim.difference(policy.x[-1], rows[0]))
+        else:
+            tail = self.sim.rollout(policy.x[-1], np.repeat(us, policy.substeps, axis=0)).x[policy.substeps :: policy.substeps]
+            xs[: len(tail)] = tail
+            xs[len(tail) :] = xs[len(tail) - 1] if len(tail) else policy.x[-1]
+        return xs, us
+
+    def _shift_multipliers(self, knots: float) -> None:
+        """Multipliers of constraints on consecutive knots move along with the horizon; a terminal one stays."""
+        n, f = int(knots), knots - int(knots)
+        for term in self.problem.constraints:
+            rows = len(term.knots)
+            if rows > 1 and np.all(np.diff(term.knots) == 1):
+                first = np.minimum(np.arange(rows) + n, rows - 1)
+                after = np.minimum(first + 1, rows - 1)
+                term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
+
+    def _record(
+        self, now: float, begin: float, status: Status, fallback: bool, iterations: int, cost: float, alpha: float,
+        gap: float,
+    ) -> None:
+        x = self._measured.state()
+        term = next((t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0), None)
+        nv = self.sim.nv
+        error = np.zeros(0) if term is None else self.sim.difference(x, term.reference[0])[:nv]
+        contacts = self._ground.touching(self._ground.gaps(x))
+        ms = 1e3 * (clock.perf_counter() - begin)
+        first = not self.log
+        self.log.append(
+            Tick(now, ms, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
+        )
+
+
+def _own(problem: Problem) -> Problem:
+    """The problem with a simulator and terms of its own: MPC moves their references and learns its ground."""
+    own = copy.copy(problem)
+    own.sim = problem.sim.replace()
+    own.costs = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[0]]
+    own.constraints = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[1]]
+    return own
+
+
+def _rebuild(problem: Problem, iterations: int, reference: Any, plan: Plan | None, settings: dict[str, Any]) -> MPC:
+    return MPC(problem, iterations, reference=reference, plan=plan, **settings)
