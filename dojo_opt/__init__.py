@@ -21,25 +21,35 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "ClosedLoop",
     "Contact",
     "Cylinder",
+    "Disturbances",
     "Input",
     "Joint",
     "Linearization",
+    "MPC",
     "Mechanism",
+    "Perturbation",
     "Plan",
+    "Plant",
     "Problem",
+    "Push",
+    "Sampled",
     "SimulationError",
     "Simulator",
     "Sphere",
     "Status",
     "Trajectory",
+    "closed_loop",
     "constraint",
     "cost",
     "ilqr",
     "models",
+    "monte_carlo",
     "plots",
     "problems",
+    "tasks",
     "viewer",
 ]
 
@@ -48,32 +58,49 @@ _HOME: dict[str, str | None] = {
     "Body": "sim.parts",
     "Box": "sim.shapes",
     "Capsule": "sim.shapes",
+    "ClosedLoop": "dojo_opt.closed_loop",
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
+    "Disturbances": "dojo_opt.disturbances",
     "Input": "sim.parts",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
+    "MPC": "dojo_opt.mpc",
     "Mechanism": "sim.mechanism",
+    "Perturbation": "dojo_opt.perturbation",
     "Plan": "dojo_opt.plan",
+    "Plant": "dojo_opt.plant",
     "Problem": "dojo_opt.problem",
+    "Push": "dojo_opt.perturbation",
+    "Sampled": "dojo_opt.moving",
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "Trajectory": "sim.results",
+    "closed_loop": "dojo_opt.closed_loop",
     "constraint": None,
     "cost": None,
     "ilqr": "dojo_opt.planner",
     "models": None,
+    "monte_carlo": "dojo_opt.monte_carlo",
     "plots": None,
     "problems": None,
+    "tasks": None,
     "viewer": None,
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, models, plots, problems, viewer
+    from dojo_opt import constraint, cost, models, plots, problems, tasks, viewer
+    from dojo_opt.closed_loop import ClosedLoop, closed_loop
+    from dojo_opt.disturbances import Disturbances
+    from dojo_opt.monte_carlo import monte_carlo
+    from dojo_opt.moving import Sampled
+    from dojo_opt.mpc import MPC
+    from dojo_opt.perturbation import Perturbation, Push
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
+    from dojo_opt.plant import Plant
     from dojo_opt.problem import Problem
     from sim.mechanism import Mechanism
     from sim.parts import Body, Contact, Input, Joint

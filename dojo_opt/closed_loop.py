@@ -87,7 +87,9 @@ def closed_loop(
     command = np.zeros(plant.sim.nu)
     for k in range(steps):
         if k % every == 0:
-            command = checks.array("closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,))
+            command = checks.array(
+                "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
+            )
         u, result = plant.step(command)
         status.append(int(result.status))
         if result.status != Status.SOLVED:

@@ -36,6 +36,16 @@ class Ground:
         self._radius = np.array([c.radius for c in contacts], dtype=np.float64)
         self._normal = sim.mechanism.contact_normals
         self.height = read_model(sim.model_floats, sim.model_ints).contact_height  # (ncontact,) [m], a view
+        self._flat = self.height.copy()
+
+    @property
+    def rise(self) -> float:
+        """Mean height that was learnt, above the one at the beginning [m]."""
+        return float(np.mean(self.height - self._flat)) if self.height.size else 0.0
+
+    def forget(self) -> None:
+        """Back to the heights at the beginning."""
+        self.height[:] = self._flat
 
     def points(self, x: Vector) -> Matrix:
         """Lowest points of the contacts at x, (ncontact, 3) [m]."""

@@ -10,7 +10,7 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dojo_opt.closed_loop import closed_loop
 from dojo_opt.perturbation import Perturbation
@@ -136,7 +136,7 @@ def _run(
 def wilson_interval(successes: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
     """Interval of a probability after `successes` in `runs` trials.   Wilson 1927.
 
-        (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n),   p = successes/n
+    (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n),   p = successes/n
     """
     if not 0 <= successes <= runs or runs < 1:
         raise ValueError(f"wilson_interval: expected 0 <= successes <= runs and runs >= 1, got {successes} of {runs}")

@@ -17,49 +17,63 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Moving = Callable[[Vector], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
+_ROUNDING = 1e-9  # laps: times are sums of floating-point steps
+
 __all__ = ["References", "Sampled"]
 
 
 class Sampled:
     """A trajectory as a function of time: rows at `time`, on the way between two of them, the last one from then on.
 
-    rows (n, nx) are states of `sim`; with another width, or sim=None, they are interpolated linearly. With a `cycle`, a
-    state change (ndx,) per repetition such as the advance of a gait, the trajectory goes round: its last row is its
-    first one, moved on.
+    rows (n, nx) are states of `sim` and interpolated on their manifold; with sim=None they are any numbers. With a
+    `cycle`, a state change (ndx,) or a change of a row such as the advance of a gait, the trajectory goes round: its
+    last row is its first one, moved on, and it has neither beginning nor end.
     """
 
     def __init__(
         self, time: ArrayLike, rows: ArrayLike, sim: Simulator | None = None, cycle: ArrayLike | None = None
     ) -> None:
         self.time = checks.array("Sampled(time)", time, (None,))
-        self.rows = checks.array("Sampled(rows)", rows, (len(self.time), None))
+        width = None if sim is None else sim.nx
+        self.rows = checks.array("Sampled(rows)", rows, (len(self.time), width))
         if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
             raise ValueError("Sampled(time): expected at least two times, growing")
-        self._sim = sim if sim is not None and self.rows.shape[1] == sim.nx else None
-        self.cycle = None
-        if cycle is not None:
-            if self._sim is None:
-                raise ValueError("Sampled(cycle=...): needs sim=... and rows that are its states")
-            self.cycle = checks.array("Sampled(cycle=...)", cycle, (self._sim.ndx,))
+        self._sim = sim
+        size = self.rows.shape[1] if sim is None else sim.ndx
+        self.cycle = None if cycle is None else checks.array("Sampled(cycle=...)", cycle, (size,))
 
-    def __call__(self, times: Vector) -> Matrix:
+    def __call__(self, times: ArrayLike) -> Matrix:
         """Rows (n, width) at the times (n,)."""
-        times = np.asarray(times, dtype=np.float64)
+        t = np.asarray(times, dtype=np.float64)
         first, last = self.time[0], self.time[-1]
-        laps = np.zeros(len(times))
+        laps = np.zeros(len(t))
         if self.cycle is not None:
-            laps = np.floor((times - first) / (last - first) + 1e-9)
-            times = times - laps * (last - first)
-        at = np.clip(times, first, last)
+            laps = np.floor((t - first) / (last - first) + _ROUNDING)
+            t = t - laps * (last - first)
+        at = np.clip(t, first, last)
         i = np.clip(np.searchsorted(self.time, at, side="right") - 1, 0, len(self.time) - 2)
         f = ((at - self.time[i]) / (self.time[i + 1] - self.time[i]))[:, None]
         before, after = self.rows[i], self.rows[i + 1]
         if self._sim is None:
-            return (1.0 - f) * before + f * after
+            out = (1.0 - f) * before + f * after
+            return out if self.cycle is None else out + laps[:, None] * self.cycle
         out = self._sim.integrate(before, f * self._sim.difference(after, before))
-        if self.cycle is not None:
-            out = self._sim.integrate(out, laps[:, None] * self.cycle)
-        return out
+        return out if self.cycle is None else self._sim.integrate(out, laps[:, None] * self.cycle)
+
+    def over(self, interval: float) -> Sampled:
+        """The same states with velocities that are the mean ones over `interval` [s], such as the step of a model.
+
+        A gait sampled finely has its touchdowns where they are, but the velocities of its own short steps.
+        """
+        if self._sim is None or self.cycle is None:
+            raise ValueError(
+                "Sampled.over: needs states (sim=...) and a cycle, so that there is a time before the first"
+            )
+        sim, h = self._sim, checks.number("Sampled.over(interval)", interval, above=0.0)
+        then = self(self.time - h)
+        rows = self.rows.copy()
+        rows[:, sim.nq :] = sim.difference(rows, then)[:, : sim.nv] / h
+        return Sampled(self.time, rows, sim, self.cycle)
 
 
 class References:
@@ -86,18 +100,18 @@ class References:
             term = problem.costs[index]
             if not isinstance(term, StateTerm | PickTerm):
                 raise ValueError(f"{call}: a {term.name} has no reference that can move")
-            self._moving.append((term, self._function(call, value, term.reference.shape[1])))
+            self._moving.append((term, self._function(call, value, isinstance(term, StateTerm))))
         self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
         self.input: Moving | None = next((f for term, f in self._moving if isinstance(term, PickTerm)), None)
         self._call_checked(0.0)
 
-    def _function(self, call: str, value: Any, width: int) -> Moving:
+    def _function(self, call: str, value: Any, of_states: bool) -> Moving:
         if callable(value):
             return value
         if hasattr(value, "x") and hasattr(value, "time"):
             return Sampled(value.time, value.x, self._sim)
-        rows = checks.array(call, value, (None, width))
-        return Sampled(self._h * np.arange(len(rows)), rows, self._sim if width == self._sim.nx else None)
+        rows = checks.array(call, value, (None, self._sim.nx if of_states else self._sim.nu))
+        return Sampled(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)
 
     def _call_checked(self, time: float) -> None:
         """Once at the border: every function returns what its cost can use."""
@@ -105,7 +119,9 @@ class References:
             times = time + self._h * term.knots
             checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
 
-    def move(self, time: float) -> None:
-        """Let the first knot of every reference be at `time` [s]."""
+    def move(self, time: float, rise: float = 0.0) -> None:
+        """Let the first knot of every reference be at `time` [s], and a floating base be higher by `rise` [m]."""
         for term, function in self._moving:
             term.reference[:] = function(time + self._h * term.knots)
+            if rise and isinstance(term, StateTerm):
+                term.reference[:, 2] += rise

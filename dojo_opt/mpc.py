@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.ground import Ground
+from dojo_opt.horizon import shift_multipliers, tail
 from dojo_opt.line_search import Iterate
 from dojo_opt.measurement import Measurement
+from dojo_opt.monte_carlo import Sampler, Study, monte_carlo
 from dojo_opt.moving import References
 from dojo_opt.plan import Plan
 from dojo_opt.planner import Solver
+from dojo_opt.plant import Plant
 from dojo_opt.policy import Policy
 from dojo_opt.problem import Problem
 from dojo_opt.term import StateTerm
@@ -25,6 +28,7 @@ from solvers.status import Status
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _PREDICTION = 5e-3  # longest step of the prediction over the delay [s]
@@ -57,6 +61,7 @@ class MPC:
         self._made_from = (problem, int(iterations), reference, plan, settings)
         self.problem = _own(problem)
         self.sim = self.problem.sim
+        self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(int(iterations)))
         self.references = References(self.problem, reference)
@@ -66,7 +71,6 @@ class MPC:
             self._fine = self.sim.replace(time_step=self.settings.delay / self._steps)
         self._first = plan
         self._ground = Ground(self.sim)
-        self._flat = self._ground.height.copy()
         self.reset()
 
     def __reduce__(self) -> Any:
@@ -76,14 +80,20 @@ class MPC:
         """Another one, made from the same arguments."""
         return _rebuild(*self._made_from)
 
+    def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> Study:
+        """Closed loops under random perturbations; see `dojo_opt.monte_carlo.monte_carlo`."""
+        return monte_carlo(self, plant, sampler, duration, **settings)
+
     def reset(self) -> None:
         """Forget plan, measurements and log."""
         self.log: list[Tick] = []
         self.policy: Policy | None = None
         self._measured = Measurement(self.sim, self.settings.mean_velocity)
         self._issued: deque[tuple[float, Vector]] = deque()
+        self._first_input = self.problem.controls0[0]  # what acts until a command arrives: a guess
         self._due = -np.inf
-        self._ground.height[:] = self._flat
+        self.problem.start = self.start.copy()
+        self._ground.forget()
         self._solver.descent.reset()
         self._solver.objective.reset()
 
@@ -111,6 +121,7 @@ class MPC:
         if limits is not None:
             np.clip(u, *limits, out=u)
         if settings.delay:
+            self._first_input = u if not self._issued else self._first_input
             self._issued.append((now + settings.delay, u))
             while len(self._issued) > 1 and self._issued[1][0] <= now:
                 self._issued.popleft()
@@ -123,45 +134,45 @@ class MPC:
         _, x = self._measured.last
         ends, h = [], self._fine.time_step
         for k in range(self._steps):
-            u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), np.zeros(self.sim.nu))
+            u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), self._first_input)
             x = self._fine.step(x, u).x
             ends.append((now + (k + 1) * h, x))
         return self._measured.state(ends)
 
     def _begin(self, now: float) -> None:
         """The first plan."""
-        begin = clock.perf_counter()
+        begin = clock.perf_counter(), clock.thread_time()
         self._start(now)
-        self.problem.start = self._measured.state()
+        self.problem.start = self._ahead(now)
         plan = self._first or Solver(self.problem).solve()
         shape = (self.problem.horizon, self.sim.nu)
         if plan.u.shape != shape:
             raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")
         self._solver.objective.reset(plan.multipliers)
-        self.policy = Policy(self.sim, now + self.settings.delay, plan.x, plan.u, plan.K, self.problem.substeps)
+        self.policy = self._policy(now, plan.x, plan.u, plan.K)
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
         self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, 0.0)
 
     def _start(self, now: float) -> None:
         self._due = now + self.period
-        self.references.move(now + self.settings.delay)
+        self.references.move(now + self.settings.delay, self._ground.rise)
 
     def _tick(self, now: float, old: Policy) -> None:
         """Shift, iterate, and take the new plan when it is one."""
-        begin = clock.perf_counter()
+        begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        self._start(now)
         start = self._ahead(now)
         gap = float(np.abs(self.sim.difference(start, old.state(now + self.settings.delay))).max())
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
-        shifted = old.shifted(now + self.settings.delay, self._tail)
+        self._start(now)
+        shifted = old.shifted(now + self.settings.delay, lambda count: tail(old, self.references, count))
         problem.start = start
         continuation = solver.continuation
         continuation.reset()
         solver.descent.K[:] = shifted.K
         solver.descent.k.fill(0.0)
-        self._shift_multipliers((now - self.log[-1].time) / problem.knot_time)
+        shift_multipliers(problem.constraints, (now - self.log[-1].time) / problem.knot_time)
         guess, kappa = self._guess(shifted)
         if guess is None:
             status = Status.SIMULATION_FAILED
@@ -175,10 +186,15 @@ class MPC:
         if taken:
             after = continuation.now
             solver.objective.update_multipliers(after.x, after.u)
-            sim, substeps = self.sim, problem.substeps
-            self.policy = Policy(sim, now + self.settings.delay, after.x, after.u, solver.descent.K.copy(), substeps)
+            self.policy = self._policy(now, after.x, after.u, solver.descent.K.copy())
         cost = continuation.now.cost if taken else self.log[-1].cost
         self._record(now, begin, status, not taken, len(history), cost, alpha, gap)
+
+    def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
+        """A plan made at `now`, which starts when its first input can act."""
+        delay = self.settings.delay
+        lead = (now, self._measured.state()) if delay else None
+        return Policy(self.sim, now + delay, x, u, K, self.problem.substeps, lead)
 
     def _usable(self) -> bool:
         """Whether the present iterate is a trajectory of the model, up to what a short step leaves open."""
@@ -205,37 +221,15 @@ class MPC:
                     best = trial
         return best, kappa
 
-    def _tail(self, count: int) -> tuple[Matrix, Matrix]:
-        """States and inputs for knots beyond the old horizon: the last ones, moved along with their references."""
-        policy, h = self.policy, self.problem.knot_time
-        assert policy is not None
-        end = policy.time + h * len(policy.u)
-        times = end + h * np.arange(count + 1.0)
-        xs, us = np.repeat(policy.x[-1:], count, axis=0), np.repeat(policy.u[-1:], count, axis=0)
-        if self.references.input is not None:
-            rows = np.asarray(self.references.input(times - h))
-            us = us + rows[1:] - rows[0]
-        if self.references.state is not None:
-            rows = np.asarray(self.references.state(times))
-            xs = self.sim.integrate(rows[1:], self.sim.difference(policy.x[-1], rows[0]))
-        else:
-            tail = self.sim.rollout(policy.x[-1], np.repeat(us, policy.substeps, axis=0)).x[policy.substeps :: policy.substeps]
-            xs[: len(tail)] = tail
-            xs[len(tail) :] = xs[len(tail) - 1] if len(tail) else policy.x[-1]
-        return xs, us
-
-    def _shift_multipliers(self, knots: float) -> None:
-        """Multipliers of constraints on consecutive knots move along with the horizon; a terminal one stays."""
-        n, f = int(knots), knots - int(knots)
-        for term in self.problem.constraints:
-            rows = len(term.knots)
-            if rows > 1 and np.all(np.diff(term.knots) == 1):
-                first = np.minimum(np.arange(rows) + n, rows - 1)
-                after = np.minimum(first + 1, rows - 1)
-                term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
-
     def _record(
-        self, now: float, begin: float, status: Status, fallback: bool, iterations: int, cost: float, alpha: float,
+        self,
+        now: float,
+        begin: tuple[float, float],
+        status: Status,
+        fallback: bool,
+        iterations: int,
+        cost: float,
+        alpha: float,
         gap: float,
     ) -> None:
         x = self._measured.state()
@@ -243,10 +237,10 @@ class MPC:
         nv = self.sim.nv
         error = np.zeros(0) if term is None else self.sim.difference(x, term.reference[0])[:nv]
         contacts = self._ground.touching(self._ground.gaps(x))
-        ms = 1e3 * (clock.perf_counter() - begin)
+        ms, cpu = 1e3 * (clock.perf_counter() - begin[0]), 1e3 * (clock.thread_time() - begin[1])
         first = not self.log
         self.log.append(
-            Tick(now, ms, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
+            Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )
 
 

@@ -78,7 +78,10 @@ class Perturbation:
 
     def pushed(self, mechanism: Mechanism) -> tuple[str, ...]:
         """Names of the bodies that are pushed."""
-        names = (checks.one_of("Push(body=...)", p.body or mechanism.body_names[0], mechanism.body_names) for p in self.pushes)
+        names = (
+            checks.one_of("Push(body=...)", p.body or mechanism.body_names[0], mechanism.body_names)
+            for p in self.pushes
+        )
         return tuple(dict.fromkeys(names))
 
     def mechanism(self, mechanism: Mechanism) -> Mechanism:

@@ -17,7 +17,10 @@ Vector = NDArray[np.float64]
 
 __all__ = ["Plant"]
 
-_LOW, _TILTED = 0.5, 0.5  # fallen: below this share of the first height, or with less than this upward share of the axis
+_LOW, _TILTED = (
+    0.5,
+    0.5,
+)  # fallen: below this share of the first height, or with less than this upward share of the axis
 
 
 class Plant:
@@ -97,7 +100,7 @@ class Plant:
         return u, result
 
     def fallen(self, x: Vector) -> bool:
-        """Whether a robot on a floating base lies: below half its first height over the ground, or tilted by 60 degrees.
+        """Whether a robot on a floating base lies: below half its first height, or tilted by more than 60 degrees.
 
         A robot without a floating base never does.
         """

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from dojo_opt.motion import Motion, motion
+from dojo_opt.plots_mpc import base_path, closed_loop, study, survival, tick_times, tracking
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
@@ -17,7 +18,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["contact_forces", "controls", "paths", "state", "trajectory", "velocities"]
+__all__ = [
+    "base_path",
+    "closed_loop",
+    "contact_forces",
+    "controls",
+    "paths",
+    "state",
+    "study",
+    "survival",
+    "tick_times",
+    "tracking",
+    "trajectory",
+    "velocities",
+]
 
 
 @overload

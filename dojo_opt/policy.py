@@ -34,6 +34,7 @@ class Policy:
     u: Matrix
     K: Stack
     substeps: int = 1  # simulation steps per knot
+    lead: tuple[float, Vector] | None = None  # an earlier time [s], and the state then, from which x[0] was predicted
 
     @property
     def knot_time(self) -> float:
@@ -52,6 +53,10 @@ class Policy:
 
     def state(self, time: float) -> Vector:
         """State (nx,) at `time`, between knots along the shortest way; the last one beyond the end."""
+        if self.lead is not None and time < self.time:
+            begin, x = self.lead
+            f = min(1.0, max(0.0, (time - begin) / (self.time - begin)))
+            return self.sim.integrate(x, f * self.sim.difference(self.x[0], x))
         n, f = self._place(time)
         if n >= len(self.u):
             return self.x[-1]
@@ -64,9 +69,7 @@ class Policy:
         return self.u[self.index(time)].copy()
 
     def feedback(self, time: float, x: Vector) -> Vector:
-        """K (x (-) planned state) at `time`; zero before the first knot."""
-        if time < self.time - _ROUNDING * self.knot_time:
-            return np.zeros(self.u.shape[1])
+        """K (x (-) planned state) at `time`."""
         knot = min(self._place(time)[0], len(self.u) - 1)
         return self.K[knot] @ self.sim.difference(x, self.state(time))
 

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt import models
+from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
+from dojo_opt.moving import Sampled
 from dojo_opt.mpc import MPC
 from dojo_opt.plant import Plant
 from dojo_opt.problem import Problem
@@ -18,7 +19,7 @@ from sim.simulator import Simulator
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-__all__ = ["Hopping", "hopper_mpc", "plant"]
+__all__ = ["MPCS", "Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
 
@@ -84,6 +85,47 @@ def hopper_mpc(
     return MPC(problem, reference=Hopping(start, velocity, height, stance), **settings)
 
 
+def quadruped_mpc(
+    speed: float = 0.2,
+    period: float = 0.48,
+    *,
+    step_height: float = 0.05,
+    damper: float = 0.05,
+    substeps: int = 1,
+    **settings: Any,
+) -> MPC:
+    """The quadruped trots at a speed [m/s]: 20 knots of 40 ms, the ground learnt from the feet that stand.
+
+    Tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the trunk weigh
+    10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2; torques are limited to 33.5 N m.
+    damper [N m s/rad] is that of the joints. settings: those of `MPC`.
+    """
+    knot, horizon, limit = 0.04, 20, 33.5
+    sim = Simulator(models.quadruped(damper=damper), time_step=knot / substeps)
+    fine = gaits.trot(sim.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
+    advance = sim.difference(fine.x[-1], fine.x[0])
+    advance[6:] = 0.0  # joints and velocities come round
+    reference = Sampled(fine.time, fine.x, sim, advance).over(sim.time_step)
+    torque = gaits.trot(sim, speed=speed, period=period, cycles=1, step_height=step_height).torques()
+    held = Sampled(sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu))
+    weight = np.array([10.0] * 6 + [1.0] * 12 + [0.1] * 6 + [0.01] * 12)
+    times = knot * np.arange(horizon + 1)
+    problem = Problem(
+        sim,
+        reference([0.0])[0],
+        horizon,
+        cost=[Tracking(reference(times), weight), Effort(1e-4)],
+        control_limits=(-limit, limit),
+        substeps=substeps,
+        controls0=np.clip(held(times[:-1]), -limit, limit),
+        states0=reference(times),
+    )
+    return MPC(problem, reference={0: reference, 1: held}, **{"learn_ground": True, **settings})
+
+
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
     """The plant that belongs to an MPC: its own mechanism with a finer step and harder contact, and a perturbation."""
-    return Plant(mpc.problem.sim.replace(time_step=time_step, kappa=kappa), mpc.problem.start, **perturbation)
+    return Plant(mpc.sim.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
+
+
+MPCS = {"hopper_mpc": hopper_mpc, "quadruped_mpc": quadruped_mpc}  # by name, for the command line

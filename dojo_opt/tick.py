@@ -57,7 +57,8 @@ class Tick:
     """One planning instant. When `fallback` is true the plan before it stays in force, with its gains."""
 
     time: float  # of the measurement [s]
-    milliseconds: float  # that the tick took
+    milliseconds: float  # that the tick took, by the clock
+    cpu_milliseconds: float  # by the processor: what is left when others use the machine, too
     iterations: int  # of the planner, rejected ones included
     cost: float  # of the plan that is in force, when it was made
     alpha: float  # last step size; 0 when it was rejected
@@ -70,6 +71,6 @@ class Tick:
     first: bool = False  # the plan from which the others are warm-started
 
 
-def milliseconds(log: Sequence[Tick]) -> Vector:
-    """Times of the ticks of a log but the first [ms]."""
-    return np.array([tick.milliseconds for tick in log if not tick.first])
+def milliseconds(log: Sequence[Tick], cpu: bool = False) -> Vector:
+    """Times of the ticks of a log but the first [ms], by the clock or by the processor."""
+    return np.array([tick.cpu_milliseconds if cpu else tick.milliseconds for tick in log if not tick.first])

@@ -110,10 +110,12 @@ def _animation(m: Motion) -> Any:
     from meshcat.path import Path as Node
 
     clips = {}
-    frames = [float(t * FRAMES) for t in m.time]
+    # a plant steps more often than a screen: keys that no frame would show only make the file larger
+    every = max(1, int(1.0 / (FRAMES * (m.time[1] - m.time[0])) + 1e-9)) if len(m.time) > 1 else 1
+    frames = [float(t * FRAMES) for t in m.time[::every]]
     for k, body in enumerate(m.mechanism.bodies):
         clip = AnimationClip(fps=FRAMES)
-        for frame, position, quaternion in zip(frames, m.position[:, k], m.quaternion[:, k], strict=True):
+        for frame, position, quaternion in zip(frames, m.position[::every, k], m.quaternion[::every, k], strict=True):
             clip.set_property(frame, "position", "vector3", position.tolist())
             clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
         clips[Node(("meshcat", "bodies", body.name))] = clip

@@ -1,0 +1,47 @@
+"""Horizon: what has to be made up when it moves on, at its end and for its constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.moving import References
+from dojo_opt.policy import Policy
+from dojo_opt.term import Term
+
+Matrix = NDArray[np.float64]
+
+__all__ = ["shift_multipliers", "tail"]
+
+
+def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Matrix]:
+    """States (count, nx) and inputs (count, nu) of knots beyond the end of a plan.
+
+    The last ones, moved along with their references; states without one go where the last input takes them.
+    """
+    sim, h = policy.sim, policy.knot_time
+    times = policy.time + h * (len(policy.u) + np.arange(count + 1.0))
+    us = np.repeat(policy.u[-1:], count, axis=0)
+    if references.input is not None:
+        rows = np.asarray(references.input(times - h))
+        us = us + rows[1:] - rows[0]
+    if references.state is not None:
+        rows = np.asarray(references.state(times))
+        return sim.integrate(rows[1:], sim.difference(policy.x[-1], rows[0])), us
+    moved = sim.rollout(policy.x[-1], np.repeat(us, policy.substeps, axis=0)).x[:: policy.substeps]
+    xs = np.repeat(moved[-1:], count, axis=0)  # a rollout that stopped early stays where it stopped
+    xs[: len(moved) - 1] = moved[1:]
+    return xs, us
+
+
+def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
+    """Multipliers of constraints on consecutive knots move along with the horizon; those of a single knot stay."""
+    n, f = int(knots), knots - int(knots)
+    for term in constraints:
+        rows = len(term.knots)
+        if rows > 1 and np.all(np.diff(term.knots) == 1):
+            first = np.minimum(np.arange(rows) + n, rows - 1)
+            after = np.minimum(first + 1, rows - 1)
+            term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
