@@ -36,6 +36,8 @@ __all__ = [
     "Trajectory",
     "constraint",
     "cost",
+    "equilibrium",
+    "gaits",
     "ilqr",
     "models",
     "plots",
@@ -63,6 +65,8 @@ _HOME: dict[str, str | None] = {
     "Trajectory": "sim.results",
     "constraint": None,
     "cost": None,
+    "equilibrium": "dojo_opt.equilibrium",
+    "gaits": None,
     "ilqr": "dojo_opt.planner",
     "models": None,
     "plots": None,
@@ -71,7 +75,8 @@ _HOME: dict[str, str | None] = {
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, models, plots, problems, viewer
+    from dojo_opt import constraint, cost, gaits, models, plots, problems, viewer
+    from dojo_opt.equilibrium import equilibrium
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
     from dojo_opt.problem import Problem
