@@ -12,6 +12,7 @@ from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.equilibrium import equilibrium
 from dojo_opt.gait import Gait
+from dojo_opt.options import CONTINUATION
 from dojo_opt.problem import Problem
 from sim import checks
 from sim.simulator import Simulator
@@ -41,8 +42,8 @@ def follow(
     """Follow a gait, and have the base where the gait has it at the end: place and attitude are constraints.
 
     A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
-    torques by inverse dynamics, whose gaps are closed on the way; "standing" from a rollout under the torques that
-    hold the robot upright at rest. Weights are per second, of squares: place [1/m^2] along x, y, z, attitude [1/rad^2]
+    torques by inverse dynamics, whose gaps are closed on the way; "standing" from nothing but a robot that stands
+    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of squares: place [1/m^2] along x, y, z, attitude [1/rad^2]
     and effort [1/(N m)^2]; angles weigh .2, velocities of the base .01, joint rates .001.
     """
     sim = gait.simulator
@@ -55,10 +56,12 @@ def follow(
     legs = sim.nv - 6
     weight = np.concatenate([np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, ANGLE)])
     weight = np.concatenate([weight, np.full(6, VELOCITY), np.full(legs, RATE)])
+    states, controls = reference, np.zeros(0)
     if guess == "reference":
         controls = gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
     else:
-        controls = np.tile(equilibrium(sim)[1], (horizon, 1))
+        still, torques = equilibrium(sim.replace(kappa=CONTINUATION[0].kappa_eval))
+        states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
     if control_limits is not None:
         controls = np.clip(controls, *control_limits)
     return Problem(
@@ -70,7 +73,7 @@ def follow(
         control_limits=control_limits,
         substeps=substeps,
         controls0=controls,
-        states0=reference if guess == "reference" else None,
+        states0=states,
     )
 
 
