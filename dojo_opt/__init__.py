@@ -44,6 +44,8 @@ __all__ = [
     "closed_loop",
     "constraint",
     "cost",
+    "equilibrium",
+    "gaits",
     "ilqr",
     "models",
     "monte_carlo",
@@ -81,6 +83,8 @@ _HOME: dict[str, str | None] = {
     "closed_loop": "dojo_opt.closed_loop",
     "constraint": None,
     "cost": None,
+    "equilibrium": "dojo_opt.equilibrium",
+    "gaits": None,
     "ilqr": "dojo_opt.planner",
     "models": None,
     "monte_carlo": "dojo_opt.monte_carlo",
@@ -91,9 +95,10 @@ _HOME: dict[str, str | None] = {
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, models, plots, problems, tasks, viewer
+    from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
     from dojo_opt.closed_loop import ClosedLoop, closed_loop
     from dojo_opt.disturbances import Disturbances
+    from dojo_opt.equilibrium import equilibrium
     from dojo_opt.monte_carlo import monte_carlo
     from dojo_opt.moving import Sampled
     from dojo_opt.mpc import MPC

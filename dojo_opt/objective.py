@@ -34,10 +34,16 @@ class Objective:
                     "ilqr(warm_start=...): expected multipliers of shapes "
                     f"{[term.slope.shape for term in self.constraints]}, got {[a.shape for a in given]}"
                 )
+        first = self._options.penalty * self.unit()
         for i, term in enumerate(self.constraints):
             term.slope[:] = multipliers[i] if multipliers else 0.0
-            term.weight[:] = 0.5 * (penalties[i] if penalties else self._options.penalty) * term.mask
+            term.weight[:] = 0.5 * (penalties[i] if penalties else first) * term.mask
         self._last = []
+
+    def unit(self) -> float:
+        """Largest curvature 2 w of a cost, the unit of penalties: a problem and its multiple are solved alike."""
+        largest = max((2.0 * float(term.weight.max(initial=0.0)) for term in self.costs), default=0.0)
+        return largest if largest > 0.0 else 1.0
 
     def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
         """(cost, merit) at (xs, us)."""

@@ -99,7 +99,7 @@ class Solver:
         """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit."""
         options = self.options
         last = len(options.stages) - 1
-        for update in range(last + options.max_updates + 1):
+        for update in range(self.continuation.first_stage(options.stages), last + options.max_updates + 1):
             status = self._stage(options.stages[min(update, last)], options.bisections)
             if status == Status.SIMULATION_FAILED and update < last:
                 continue  # the next stage is another way down
