@@ -60,7 +60,7 @@ _HOME: dict[str, str | None] = {
     "Body": "sim.parts",
     "Box": "sim.shapes",
     "Capsule": "sim.shapes",
-    "ClosedLoop": "dojo_opt.closed_loop",
+    "ClosedLoop": "dojo_opt.loop",
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
     "Disturbances": "dojo_opt.disturbances",
@@ -80,14 +80,14 @@ _HOME: dict[str, str | None] = {
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "Trajectory": "sim.results",
-    "closed_loop": "dojo_opt.closed_loop",
+    "closed_loop": "dojo_opt.loop",
     "constraint": None,
     "cost": None,
     "equilibrium": "dojo_opt.equilibrium",
     "gaits": None,
     "ilqr": "dojo_opt.planner",
     "models": None,
-    "monte_carlo": "dojo_opt.monte_carlo",
+    "monte_carlo": "dojo_opt.study",
     "plots": None,
     "problems": None,
     "tasks": None,
@@ -96,10 +96,9 @@ _HOME: dict[str, str | None] = {
 
 if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
-    from dojo_opt.closed_loop import ClosedLoop, closed_loop
     from dojo_opt.disturbances import Disturbances
     from dojo_opt.equilibrium import equilibrium
-    from dojo_opt.monte_carlo import monte_carlo
+    from dojo_opt.loop import ClosedLoop, closed_loop
     from dojo_opt.moving import Sampled
     from dojo_opt.mpc import MPC
     from dojo_opt.perturbation import Perturbation, Push
@@ -107,6 +106,7 @@ if TYPE_CHECKING:
     from dojo_opt.planner import ilqr
     from dojo_opt.plant import Plant
     from dojo_opt.problem import Problem
+    from dojo_opt.study import monte_carlo
     from sim.mechanism import Mechanism
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory

@@ -51,13 +51,16 @@ class Measurement:
         """The last sample."""
         return self._samples[-1]
 
-    def state(self, ahead: Iterable[tuple[float, Vector]] = ()) -> Vector:
-        """The last sample, or the last of those predicted to come, in the convention of the model."""
+    def state(self, ahead: Iterable[tuple[float, Vector]] = (), interval: float | None = None) -> Vector:
+        """The last sample, or the last of those predicted to come, with its mean velocity over `interval` [s].
+
+        The interval is by default a step of the model.
+        """
         samples = [*self._samples, *ahead]
         now, x = samples[-1]
         if not self._mean or len(samples) < 2:
             return x
-        h = self._sim.time_step
+        h = self._sim.time_step if interval is None else interval
         then, x0 = min(samples[:-1], key=lambda sample: abs(now - h - sample[0]))
         if abs(now - then - h) > _OFF * h:
             return x

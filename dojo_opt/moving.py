@@ -15,7 +15,7 @@ from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-Moving = Callable[[Vector], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
+Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
 

@@ -14,13 +14,13 @@ from dojo_opt.ground import Ground
 from dojo_opt.horizon import shift_multipliers, tail
 from dojo_opt.line_search import Iterate
 from dojo_opt.measurement import Measurement
-from dojo_opt.monte_carlo import Sampler, Study, monte_carlo
 from dojo_opt.moving import References
 from dojo_opt.plan import Plan
 from dojo_opt.planner import Solver
 from dojo_opt.plant import Plant
 from dojo_opt.policy import Policy
 from dojo_opt.problem import Problem
+from dojo_opt.study import Sampler, Study, monte_carlo
 from dojo_opt.term import StateTerm
 from dojo_opt.tick import Settings, Tick
 from sim import checks
@@ -81,7 +81,7 @@ class MPC:
         return _rebuild(*self._made_from)
 
     def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> Study:
-        """Closed loops under random perturbations; see `dojo_opt.monte_carlo.monte_carlo`."""
+        """Closed loops under random perturbations; see `dojo_opt.study`."""
         return monte_carlo(self, plant, sampler, duration, **settings)
 
     def reset(self) -> None:
@@ -131,8 +131,8 @@ class MPC:
         """State of the model at which the next plan starts: the measured one, moved on by the delay."""
         if self._fine is None:
             return self._measured.state()
-        _, x = self._measured.last
         ends, h = [], self._fine.time_step
+        x = self._measured.state(interval=h)
         for k in range(self._steps):
             u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), self._first_input)
             x = self._fine.step(x, u).x

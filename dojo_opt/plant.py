@@ -17,10 +17,9 @@ Vector = NDArray[np.float64]
 
 __all__ = ["Plant"]
 
-_LOW, _TILTED = (
-    0.5,
-    0.5,
-)  # fallen: below this share of the first height, or with less than this upward share of the axis
+_SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
+_LOW = 0.5  # fallen: below this share of the first height,
+_TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
 
 
 class Plant:
@@ -31,7 +30,8 @@ class Plant:
     start         state (nx,) at time zero on level ground; the standing one by default
     perturbation  what is different; or its fields by name:  Plant(sim, payload=3.0, delay=0.02)
 
-    `simulator` is the perturbed one. It has three more inputs for every body that is pushed.
+    `simulator` is the perturbed one. It has three more inputs for every body that is pushed. A step that it cannot
+    solve is tried again with softer contact, up to a thousand times its kappa; `softened` counts those steps.
     """
 
     def __init__(
@@ -68,6 +68,7 @@ class Plant:
         """Back to the start."""
         self.x = self._x0.copy()
         self.steps = 0
+        self.softened = 0
         self._random = np.random.default_rng(self.perturbation.seed)
         self._waiting: deque[Vector] = deque()
 
@@ -94,10 +95,21 @@ class Plant:
             end = self.time + self.sim.time_step
             u = np.concatenate([u, self.perturbation.push_forces(self.sim.mechanism, self.time, end)])
         result = self.simulator.step(self.x, u)
+        if not result.success:
+            result = self._soften(u, result)
         if result.success:
             self.x = result.x
             self.steps += 1
         return u, result
+
+    def _soften(self, u: Vector, result: StepResult) -> StepResult:
+        """The step with the hardest contact at which it can be solved."""
+        for factor in _SOFTER:
+            softer = self.simulator.replace(kappa=factor * self.simulator.kappa).step(self.x, u)
+            if softer.success:
+                self.softened += 1
+                return softer
+        return result
 
     def fallen(self, x: Vector) -> bool:
         """Whether a robot on a floating base lies: below half its first height, or tilted by more than 60 degrees.

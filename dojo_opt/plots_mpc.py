@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dojo_opt.closed_loop import ClosedLoop
-from dojo_opt.monte_carlo import Study
+from dojo_opt.loop import ClosedLoop
+from dojo_opt.study import Study
 from dojo_opt.tick import Tick, milliseconds
 
 if TYPE_CHECKING:

@@ -34,6 +34,7 @@ class ClosedLoop:
     status: Integers  # (N,) or (N + 1,) Status of every step that was tried
     survived: bool
     message: str
+    softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
     log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
     reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
 
@@ -110,6 +111,7 @@ def closed_loop(
         status=np.array(status, dtype=np.int64),
         survived=survived,
         message=message,
+        softened=plant.softened,
         log=tuple(getattr(controller, "log", ())),
         reference=reference,
     )

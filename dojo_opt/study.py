@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.closed_loop import closed_loop
+from dojo_opt.loop import closed_loop
 from dojo_opt.perturbation import Perturbation
 from dojo_opt.plant import Plant
 from dojo_opt.tick import Tick, milliseconds
@@ -35,6 +35,7 @@ class Outcome:
     x: Vector  # (nx,) last state
     log: Sequence[Tick]
     perturbation: Perturbation
+    softened: int  # steps of the plant that needed softer contact than its own, see `Plant`
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,7 @@ def _run(
         x=loop.x[-1],
         log=loop.log,
         perturbation=perturbation,
+        softened=loop.softened,
     )
 
 
@@ -145,4 +147,5 @@ def wilson_interval(successes: int, runs: int, confidence: float = 0.95) -> tupl
     centre = p + z * z / (2.0 * n)
     spread = z * np.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n))
     scale = 1.0 + z * z / n
-    return max(0.0, float((centre - spread) / scale)), min(1.0, float((centre + spread) / scale))
+    lo, hi = float((centre - spread) / scale), float((centre + spread) / scale)
+    return (lo if successes else 0.0), (hi if successes < runs else 1.0)  # exactly, whatever the rounding
