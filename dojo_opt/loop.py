@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.plant import Plant
 from dojo_opt.tick import Tick
 from sim import checks
+from sim.results import Contacts
 from sim.simulator import Simulator
 from solvers.status import MESSAGES, Status
 
@@ -32,6 +33,7 @@ class ClosedLoop:
     x: Matrix  # (N + 1, nx) true states
     u: Matrix  # (N, nu of the plant) inputs that acted, pushes included [N, N m]
     status: Integers  # (N,) or (N + 1,) Status of every step that was tried
+    contacts: Contacts  # of every step, world axes
     survived: bool
     message: str
     softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
@@ -83,6 +85,7 @@ def closed_loop(
     if hasattr(controller, "reset"):
         controller.reset()
     xs, us = [plant.x], []
+    touches: list[Contacts] = []
     status: list[int] = []
     message, survived = "Ran to the end.", True
     command = np.zeros(plant.sim.nu)
@@ -98,6 +101,7 @@ def closed_loop(
             break
         xs.append(plant.x)
         us.append(u)
+        touches.append(result.contacts)
         if lies(plant.x):
             message, survived = f"Fell at {plant.time:.3f} s.", False
             break
@@ -109,9 +113,21 @@ def closed_loop(
         x=np.array(xs),
         u=np.array(us).reshape(len(us), plant.simulator.nu),
         status=np.array(status, dtype=np.int64),
+        contacts=_stacked(plant.simulator, touches),
         survived=survived,
         message=message,
         softened=plant.softened,
         log=tuple(getattr(controller, "log", ())),
         reference=reference,
     )
+
+
+def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:
+    """The contacts of single steps, one after the other."""
+    shapes = {"impulse": (3,), "point": (3,), "gap": (), "slip": ()}
+    arrays = {
+        name: np.array([getattr(c, name) for c in steps], dtype=np.float64).reshape(len(steps), sim.ncontact, *shape)
+        for name, shape in shapes.items()
+    }
+    mech = sim.mechanism
+    return Contacts(mech.contact_names, mech.contact_normals, sim.time_step, **arrays)
