@@ -18,6 +18,10 @@ from typing import Any
 import dojo_opt as dojo
 from dojo_opt.report import REPORTS, run_report
 
+# what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump")
+GAITS = ("trot", "bound", "pace", "walk", "turn", "jump")
+
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="dojo-opt", description="Plan motion through contact, and measure it.")
@@ -25,9 +29,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="plan a reference problem", description="Plan a reference problem.")
-    run.add_argument("name", metavar="NAME", help="a function of dojo_opt.problems, such as hop")
+    run.add_argument("name", metavar="NAME", help=", ".join(PROBLEMS))
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem")
-    run.add_argument("--out", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
+    run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
 
@@ -65,15 +69,16 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 def _run(args: argparse.Namespace) -> int:
-    names = dojo.problems.__all__
-    if args.name not in names:
-        raise ValueError(f"run: no problem {args.name!r}; there are {', '.join(names)}")
-    problem = getattr(dojo.problems, args.name)(**_arguments(args.set))
+    name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
+    if name not in PROBLEMS:
+        raise ValueError(f"run: no problem {args.name!r}; there are {', '.join(PROBLEMS)}")
+    problem = getattr(dojo.problems, name)(**_arguments(args.set))
     start = time.perf_counter()
     plan = dojo.ilqr(problem, verbose=not args.json)
     seconds = time.perf_counter() - start
     if args.out:
-        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+        figure = dojo.plots.gait(plan) if name in GAITS else dojo.plots.trajectory(plan)
+        figure.savefig(args.out, dpi=150)
     if args.html:
         dojo.viewer.save_html(plan, args.html)
     if args.json:

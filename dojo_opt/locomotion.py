@@ -43,8 +43,9 @@ def follow(
 
     A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
     torques by inverse dynamics, whose gaps are closed on the way; "standing" from nothing but a robot that stands
-    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of squares: place [1/m^2] along x, y, z, attitude [1/rad^2]
-    and effort [1/(N m)^2]; angles weigh .2, velocities of the base .01, joint rates .001.
+    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
+    squares: place [1/m^2] along x, y, z, attitude [1/rad^2] and effort [1/(N m)^2]; angles weigh .2, velocities of the
+    base .01, joint rates .001.
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
@@ -143,9 +144,9 @@ _FOLLOW = ("guess", "substeps", "control_limits", "place", "attitude", "effort")
 
 def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, Any], **keywords: Any) -> Problem:
     """The problem to follow a gait of the quadruped; `settings` are shared out between the model, gait and problem."""
-    follows = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
+    follows: dict[str, Any] = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
     follows |= {key: settings[key] for key in _FOLLOW if key in settings}
     rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / int(follows.get("substeps", 1)))
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / follows.get("substeps", 1))
     return follow(gait(sim, **keywords, **rest), **follows)
