@@ -54,9 +54,11 @@ def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float
     return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
 
 
-def bound(sim: Simulator, *, speed: float = 0.5, period: float = 0.48, duty: float = 1 / 3, **gait: Any) -> Gait:
+def bound(
+    sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
+) -> Gait:
     """Hind feet together, then front feet, with a flight in between for duty < 0.5; keywords as for `trot`."""
-    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
 
 
 def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
