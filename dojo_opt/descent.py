@@ -96,9 +96,11 @@ class Descent:
             promise = backward(
                 model, Regularization(self.mu, value, self._damping), self.K, self.k, self._free, self._buffer
             )
-            if promise.status == Status.SOLVED and self._start is not None:
+            if promise.status == Status.SOLVED and self._start is not None and now.gaps is None:
                 k, promise = self._start.solve(model, self.K, self.k, self.mu, self._damping, now.x, now.u)
                 self.k[:] = k
+            elif self._start is not None:
+                self._start.step[:] = 0.0  # gaps are closed from where the guess starts
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()
