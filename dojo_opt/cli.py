@@ -21,6 +21,11 @@ import dojo_opt as dojo
 from dojo_opt.report import REPORTS, run_report
 from dojo_opt.tick import milliseconds
 
+# what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump")
+GAITS = ("trot", "bound", "pace", "walk", "turn", "jump")
+LOOPS = ("hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
+
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="dojo-opt", description="Plan motion through contact, and measure it.")
@@ -29,7 +34,7 @@ def _parser() -> argparse.ArgumentParser:
 
     what = "Plan a reference problem, or run a closed-loop task."
     run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=what)
-    run.add_argument("name", metavar="NAME", help="from dojo_opt.problems, such as hop, or .tasks, such as hopper_mpc")
+    run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS]))
     run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem or task")
     run.add_argument("--perturb", action="append", default=[], metavar="KEY=VALUE", help="of the plant: payload=1.0")
     run.add_argument("--seconds", type=float, default=4.0, metavar="S", help="length of a closed-loop task")
@@ -71,17 +76,18 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 def _run(args: argparse.Namespace) -> int:
-    names, loops = dojo.problems.__all__, dojo.tasks.MPCS
-    if args.name in loops:
+    if args.name in LOOPS:
         return _run_loop(args)
-    if args.name not in names:
-        raise ValueError(f"run: no problem or task {args.name!r}; there are {', '.join([*names, *loops])}")
-    problem = getattr(dojo.problems, args.name)(**_arguments(args.set))
+    name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
+    if name not in PROBLEMS:
+        raise ValueError(f"run: no problem or task {args.name!r}; there are {', '.join([*PROBLEMS, *LOOPS])}")
+    problem = getattr(dojo.problems, name)(**_arguments(args.set))
     start = time.perf_counter()
     plan = dojo.ilqr(problem, verbose=not args.json)
     seconds = time.perf_counter() - start
     if args.out:
-        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+        figure = dojo.plots.gait(plan) if name in GAITS else dojo.plots.trajectory(plan)
+        figure.savefig(args.out, dpi=150)
     if args.html:
         dojo.viewer.save_html(plan, args.html)
     if args.json:
@@ -96,7 +102,7 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _run_loop(args: argparse.Namespace) -> int:
-    mpc = dojo.tasks.MPCS[args.name](**_arguments(args.set))
+    mpc = getattr(dojo.tasks, args.name)(**_arguments(args.set))
     loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **_arguments(args.perturb)), args.seconds)
     if args.out:
         dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)

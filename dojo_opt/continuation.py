@@ -181,6 +181,7 @@ class Continuation:
     def _advance(self, stage: Stage, promise: Promise) -> float:
         """One line search, and the regularisation that follows from its step size."""
         descent = self._descent
+        self._line_search.start_step = descent.start_step
         alpha, self.now = self._line_search.search(self.now, promise, descent.k, descent.K, stage.kappa_eval)
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.free_start import free_start_of
 from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
@@ -38,6 +39,12 @@ class Descent:
         self._no_gaps = np.zeros((T + 1, sim.ndx))
         self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
         self._linear: Any = None
+        self._start = free_start_of(problem)
+
+    @property
+    def start_step(self) -> Any:
+        """Step (ndx,) of a free start, None when it is given."""
+        return None if self._start is None else self._start.step
 
     def reset(self) -> None:
         """Forget regularisation and gains of an earlier solve."""
@@ -89,6 +96,11 @@ class Descent:
             promise = backward(
                 model, Regularization(self.mu, value, self._damping), self.K, self.k, self._free, self._buffer
             )
+            if promise.status == Status.SOLVED and self._start is not None and now.gaps is None:
+                k, promise = self._start.solve(model, self.K, self.k, self.mu, self._damping, now.x, now.u)
+                self.k[:] = k
+            elif self._start is not None:
+                self._start.step[:] = 0.0  # gaps are closed from where the guess starts
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()

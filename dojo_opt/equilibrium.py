@@ -47,7 +47,7 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
         if joint.nrot == 3:
             continue
         q, at = x[sim.mechanism.q_slice(joint.name)], sim.mechanism.v_slice(joint.name)
-        lo, hi = np.array(list(joint.limits), dtype=float).reshape(-1, 2).T
+        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
         out[at] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
     return out
 
@@ -60,7 +60,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     ground: the state is moved to those heights. ValueError when no such forces exist: the centre of mass is not above
     the feet, or a joint without input would have to carry something.
 
-    A state at rest need not be a stable one: under constant torques a legged robot leaves it in some tenths of a second.
+    Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
     """
     mech = sim.mechanism
     feet, B = Feet(sim, mech.contact_names), input_map(sim)

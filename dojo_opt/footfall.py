@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.feet import Feet
-
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
@@ -59,7 +57,7 @@ class Footfall:
         place, heading = self.base((number + self.offset + 0.5 * self.duty) * self.period)
         return place + np.exp(1j * heading) * self.foothold
 
-    def sway(self, t: Any, feet: Feet, inertia: tuple[float, float, float], tilt: float) -> Array:
+    def sway(self, t: Any, inertia: tuple[float, float, float], tilt: float) -> Array:
         """(n, 3) height [m], roll and pitch [rad] of the base about their means.
 
         Every foot on the ground is taken to carry the same constant weight, straight down: twice integrated over a
@@ -70,10 +68,8 @@ class Footfall:
         mass, roll, pitch = inertia
         each = 9.81 * mass / (self.duty * len(self.offset))
         force = each * count
-        second = np.stack(
-            [force.sum(1) / mass, (force * self.foothold.imag).sum(1) / roll, -(force * self.foothold.real).sum(1) / pitch],
-            axis=1,
-        )
+        moments = [(force * self.foothold.imag).sum(1), -(force * self.foothold.real).sum(1)]
+        second = np.stack([force.sum(1) / mass, moments[0] / roll, moments[1] / pitch], axis=1)
         path = _integral(_integral(second, self.period), self.period)
         peak = np.abs(path[:, 1:]).max()
         path[:, 1:] *= min(1.0, tilt / max(peak, 1e-12))

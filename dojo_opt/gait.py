@@ -54,8 +54,8 @@ class Gait:
         us = np.empty((len(tau), sim.nu))
         edges = _pyramid(feet)
         for t in range(len(tau)):
-            carrying = np.flatnonzero(self.contact[t + 1])
-            push = np.concatenate([edges[k] @ J[t, k] for k in carrying], axis=0) if carrying.size else np.zeros((0, sim.nv))
+            carrying = self.contact[t + 1]
+            push = np.einsum("kec,kcv->kev", edges[carrying], J[t, carrying]).reshape(-1, sim.nv)
             left = tau[t]
             if len(push):
                 rows = np.concatenate([push[:, base].T, _EVEN * np.eye(len(push))])
@@ -84,7 +84,7 @@ class Gait:
 
 
 def _with_far_stops(joint: Joint) -> Joint:
-    """The joint with its stops out of reach: they push when they are met, and a first guess of the forces meets them."""
+    """The joint with its stops out of reach: they push when met, and a first guess of the forces meets them."""
     far = [(-_FAR if np.isfinite(lo) else lo, _FAR if np.isfinite(hi) else hi) for lo, hi in joint.limits or ()]
     return replace(joint, limits=far)
 
@@ -110,5 +110,5 @@ def assemble(sim: Simulator, name: str, base: Array, feet: Array, contact: Boole
     steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
     x = x[1:]
     x[:, sim.nq :] = steps / sim.time_step
-    time = sim.time_step * np.arange(len(x))
+    time = sim.time_step * np.arange(len(x), dtype=np.float64)
     return Gait(name, sim, time, x, feet[1:], contact[1:], names)

@@ -54,9 +54,11 @@ def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float
     return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
 
 
-def bound(sim: Simulator, *, speed: float = 0.5, period: float = 0.48, duty: float = 1 / 3, **gait: Any) -> Gait:
+def bound(
+    sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
+) -> Gait:
     """Hind feet together, then front feet, with a flight in between for duty < 0.5; keywords as for `trot`."""
-    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, **gait)
+    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
 
 
 def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
@@ -122,7 +124,8 @@ def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: fl
     """Base forward and up [m] over time: cosine, constant acceleration, parabola, and the same backwards."""
     rise = np.zeros_like(t)
     half = 0.5 * (ends[2] + ends[3])
-    mirrored = np.where(t <= half, t, np.interp(t, [half, ends[3], ends[4], ends[5]], [half, ends[2], ends[1], ends[0]]))
+    backwards = np.interp(t, [half, *ends[3:]], [half, *ends[2::-1]])
+    mirrored = np.where(t <= half, t, backwards)
     sinking = mirrored <= ends[1]
     rise[sinking] = -0.5 * crouch * (1.0 - np.cos(np.pi * mirrored[sinking] / ends[1]))
     pushed = (mirrored > ends[1]) & (mirrored <= ends[2])
@@ -189,7 +192,7 @@ def _periodic(
     )
     t = sim.time_step * np.arange(-1, steps + 1)
     spot, heading = pattern.base(t)
-    sway = pattern.sway(t, feet, _inertia(sim), tilt)
+    sway = pattern.sway(t, _inertia(sim), tilt)
     base = np.empty((len(t), 7))
     base[:, :3] = np.stack([spot.real, spot.imag, sway[:, 0] + (neutral[2] if height is None else height)], axis=1)
     base[:, :2] += neutral[:2]
@@ -222,5 +225,3 @@ def _inertia(sim: Simulator) -> tuple[float, float, float]:
         moments.append((sim.momentum(spun)[1][axis] - sim.momentum(still)[1][axis]) / 1e-3)
     del rest
     return float(mass), float(moments[0]), float(moments[1])
-
-

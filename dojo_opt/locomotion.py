@@ -13,6 +13,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.equilibrium import equilibrium
 from dojo_opt.gait import Gait
 from dojo_opt.options import CONTINUATION
+from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from sim import checks
 from sim.simulator import Simulator
@@ -38,13 +39,18 @@ def follow(
     place: ArrayLike = PLACE,
     attitude: float = ATTITUDE,
     effort: float = EFFORT,
+    periodic: bool = False,
 ) -> Problem:
     """Follow a gait, and have the base where the gait has it at the end: place and attitude are constraints.
 
     A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
     torques by inverse dynamics, whose gaps are closed on the way; "standing" from nothing but a robot that stands
-    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of squares: place [1/m^2] along x, y, z, attitude [1/rad^2]
-    and effort [1/(N m)^2]; angles weigh .2, velocities of the base .01, joint rates .001.
+    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
+    squares: place [1/m^2] along x, y, z, attitude [1/rad^2] and effort [1/(N m)^2]; angles weigh .2, velocities of the
+    base .01, joint rates .001.
+
+    periodic: instead of a start at the first state of the gait and a goal, the start is free, but for its place along x
+    and y and its heading, and the end has to be the start, moved on as the gait moves on.
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
@@ -64,17 +70,33 @@ def follow(
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
     if control_limits is not None:
         controls = np.clip(controls, *control_limits)
+    constraint: Any = Goal(reference[-1], components=np.arange(6))
+    if periodic:
+        constraint = Periodic(_stride(sim, reference))
     return Problem(
         sim,
         reference[0],
         horizon,
         cost=[Tracking(reference, knot * weight), Effort(knot * effort)],
-        constraints=[Goal(reference[-1], components=np.arange(6))],
+        constraints=[constraint],
+        free_start=np.setdiff1d(np.arange(sim.ndx), [0, 1, 5]) if periodic else None,
         control_limits=control_limits,
         substeps=substeps,
         controls0=controls,
         states0=states,
     )
+
+
+def _stride(sim: Simulator, reference: Array) -> Array:
+    """(ndx,) by what the reference moves on: a translation of the base."""
+    stride = sim.difference(reference[-1], reference[0])
+    if np.abs(stride[2:]).max() > 1e-6:
+        raise ValueError(
+            "problems.follow(periodic=True): expected a gait that ends as it began but for its place, in whole periods "
+            f"and without turning, got a largest difference of {np.abs(stride[2:]).max():.3g}"
+        )
+    stride[2:] = 0.0
+    return np.asarray(stride)
 
 
 def trot(
@@ -138,14 +160,14 @@ def jump(
     return _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
 
 
-_FOLLOW = ("guess", "substeps", "control_limits", "place", "attitude", "effort")
+_FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
 
 
 def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, Any], **keywords: Any) -> Problem:
     """The problem to follow a gait of the quadruped; `settings` are shared out between the model, gait and problem."""
-    follows = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
+    follows: dict[str, Any] = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
     follows |= {key: settings[key] for key in _FOLLOW if key in settings}
     rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / int(follows.get("substeps", 1)))
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / follows.get("substeps", 1))
     return follow(gait(sim, **keywords, **rest), **follows)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
+from dojo_opt.term import StateTerm, Term
 
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
+
+_LEAST = 1e-3  # of the largest unit: what a component gets at least
 
 
 class Objective:
@@ -34,16 +38,26 @@ class Objective:
                     "ilqr(warm_start=...): expected multipliers of shapes "
                     f"{[term.slope.shape for term in self.constraints]}, got {[a.shape for a in given]}"
                 )
-        first = self._options.penalty * self.unit()
         for i, term in enumerate(self.constraints):
+            first = self._options.penalty * self._unit(term)
             term.slope[:] = multipliers[i] if multipliers else 0.0
             term.weight[:] = 0.5 * (penalties[i] if penalties else first) * term.mask
         self._last = []
 
-    def unit(self) -> float:
-        """Largest curvature 2 w of a cost, the unit of penalties: a problem and its multiple are solved alike."""
-        largest = max((2.0 * float(term.weight.max(initial=0.0)) for term in self.costs), default=0.0)
-        return largest if largest > 0.0 else 1.0
+    def _unit(self, term: Term) -> Any:
+        """Unit of a constraint's penalties: curvature 2 w of the costs, so that a multiple of a problem is solved alike.
+
+        Of a state, component by component, that of its own weight; without one, and of anything else, the largest.
+        """
+        largest = max((2.0 * float(cost.weight.max(initial=0.0)) for cost in self.costs), default=0.0)
+        largest = largest if largest > 0.0 else 1.0
+        if not isinstance(term, StateTerm):
+            return largest
+        own = np.zeros(term.weight.shape[1])
+        for cost in self.costs:
+            if isinstance(cost, StateTerm):
+                own = np.maximum(own, 2.0 * cost.weight.max(axis=0))
+        return np.where(own > 0.0, np.maximum(own, _LEAST * largest), largest)
 
     def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
         """(cost, merit) at (xs, us)."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from sim.simulator import Simulator
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-__all__ = ["MPCS", "Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
+__all__ = ["Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
 
@@ -128,6 +127,3 @@ def quadruped_mpc(
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
     """The plant that belongs to an MPC: its own mechanism with a finer step and harder contact, and a perturbation."""
     return Plant(mpc.sim.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
-
-
-MPCS: dict[str, Callable[..., MPC]] = {"hopper_mpc": hopper_mpc, "quadruped_mpc": quadruped_mpc}  # for the command line
