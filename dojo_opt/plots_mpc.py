@@ -6,10 +6,11 @@ As in `dojo_opt.plots`: matplotlib is imported when a figure is made, and nothin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dojo_opt.axes import finish
 from dojo_opt.loop import ClosedLoop
 from dojo_opt.study import Study
 from dojo_opt.tick import Tick, milliseconds
@@ -50,7 +51,7 @@ def coordinate(result: ClosedLoop, index: int, ax: Axes | None = None, label: st
     if result.reference is not None:
         ax.plot(result.time, np.asarray(result.reference(result.time))[:, index], "--", color="0.4", label="reference")
     _mark(result.log, ax)
-    return _finish(ax, "time [s]", label or f"coordinate {index}")
+    return finish(ax, label or f"coordinate {index}", "time [s]")
 
 
 def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
@@ -60,7 +61,7 @@ def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
     for k, name in enumerate("xyz"[: min(3, error.shape[1])]):
         ax.plot(result.time, error[:, k], label=name)
     _mark(result.log, ax)
-    return _finish(ax, "time [s]", "off the reference [m]")
+    return finish(ax, "off the reference [m]", "time [s]")
 
 
 def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
@@ -72,7 +73,7 @@ def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
         rows = np.asarray(result.reference(result.time))
         ax.plot(rows[:, 0], rows[:, 1], "--", color="0.4", label="reference")
     ax.set_aspect("equal", adjustable="datalim")
-    return _finish(ax, "x [m]", "y [m]")
+    return finish(ax, "y [m]", "x [m]")
 
 
 def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None = None) -> Axes:
@@ -90,7 +91,7 @@ def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None
     if period is not None:
         ax.axhline(1e3 * period, color="0.4", label=f"period {1e3 * period:g} ms")
     ax.set_yscale("log")
-    return _finish(ax, "time [s]", "tick [ms]")
+    return finish(ax, "tick [ms]", "time [s]")
 
 
 def study(result: Study) -> Figure:
@@ -104,7 +105,7 @@ def study(result: Study) -> Figure:
     right.plot(ms, np.arange(1, ms.size + 1) / max(1, ms.size))
     right.axhline(0.99, color="0.4", ls="--", label="99 %")
     right.set_xscale("log")
-    _finish(right, "tick [ms]", "share of ticks")
+    finish(right, "share of ticks", "tick [ms]")
     return figure
 
 
@@ -126,7 +127,7 @@ def survival(studies: dict[str, Study], ax: Axes | None = None) -> Axes:
             color=line.get_color(),
         )
     ax.set_ylim(-0.05, 1.05)
-    return _finish(ax, "time [s]", "share that stands")
+    return finish(ax, "share that stands", "time [s]")
 
 
 def _mark(log: Sequence[Tick], ax: Axes) -> None:
@@ -134,12 +135,3 @@ def _mark(log: Sequence[Tick], ax: Axes) -> None:
     for tick in log:
         if tick.fallback:
             ax.axvline(tick.time, color="0.85", linewidth=1, zorder=0)
-
-
-def _finish(ax: Axes, xlabel: str, ylabel: str) -> Any:
-    ax.set_xlabel(xlabel)
-    ax.set_ylabel(ylabel)
-    ax.grid(alpha=0.3)
-    if ax.get_legend_handles_labels()[1]:
-        ax.legend(fontsize="small", framealpha=0.6)
-    return ax
