@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.policy import Policy
 from sim.layout import read_model
@@ -11,10 +11,12 @@ from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
 
 _TOUCHING = 5e-3  # gap of a contact that counts as touching [m]
 _PLANNED = 1e-2  # planned gap of a contact that is meant to stand [m]
 _STILL = 0.2  # speed of a contact point that stands [m/s]
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])  # cyclic, for cross products
 
 __all__ = ["Ground"]
 
@@ -33,8 +35,8 @@ class Ground:
         self.names = sim.mechanism.contact_names
         self._body = np.array([names.index(c.body) for c in contacts], dtype=np.int64)
         self._point = np.array([c.point for c in contacts], dtype=np.float64).reshape(-1, 3)
-        self._radius = np.array([c.radius for c in contacts], dtype=np.float64)
         self._normal = sim.mechanism.contact_normals
+        self._lowest = np.array([c.radius for c in contacts], dtype=np.float64)[:, None] * self._normal
         self.height = read_model(sim.model_floats, sim.model_ints).contact_height  # (ncontact,) [m], a view
         self._flat = self.height.copy()
 
@@ -47,20 +49,20 @@ class Ground:
         """Back to the heights at the beginning."""
         self.height[:] = self._flat
 
-    def points(self, x: Vector) -> Matrix:
-        """Lowest points of the contacts at x, (ncontact, 3) [m]."""
-        z = self._sim.maximal(x)[self._body]
-        w, r = z[:, 6:7], z[:, 7:10]
-        twice = 2.0 * np.cross(r, self._point)
-        turned = self._point + w * twice + np.cross(r, twice)
-        return np.asarray(z[:, :3] + turned - self._radius[:, None] * self._normal)
+    def points(self, xs: ArrayLike) -> Stack:
+        """Lowest points of the contacts at the states xs (..., nx), (..., ncontact, 3) [m]."""
+        z = self._sim.maximal(xs)[..., self._body, :]
+        w, r = z[..., 6:7], z[..., 7:10]
+        twice = 2.0 * _cross(r, self._point)
+        return np.asarray(z[..., :3] + self._point + w * twice + _cross(r, twice) - self._lowest)
 
-    def gaps(self, x: Vector) -> Vector:
-        """Distances of the contacts from their half-spaces at x, (ncontact,) [m]."""
-        return np.einsum("ci,ci->c", self._normal, self.points(x)) - self.height
+    def gaps(self, points: Stack) -> Matrix:
+        """Distances of the points (..., ncontact, 3) of the contacts from their half-spaces, (..., ncontact) [m]."""
+        return np.asarray((self._normal * points).sum(axis=-1) - self.height)
 
-    def touching(self, gaps: Vector) -> tuple[str, ...]:
-        """Names of the contacts that touch."""
+    def touching(self, x: Vector) -> tuple[str, ...]:
+        """Names of the contacts that touch at x."""
+        gaps = self.gaps(self.points(x))
         return tuple(name for name, gap in zip(self.names, gaps, strict=True) if gap < _TOUCHING)
 
     def learn(self, policy: Policy, time: float, x: Vector, before: tuple[float, Vector]) -> None:
@@ -68,7 +70,12 @@ class Ground:
         then, x0 = before
         if time <= then:
             return
-        points = self.points(x)
-        still = np.linalg.norm(points - self.points(x0), axis=1) < _STILL * (time - then)
-        stands = still & (self.gaps(policy.state(time)) < _PLANNED)
-        self.height[stands] = np.einsum("ci,ci->c", self._normal, points)[stands]
+        now, earlier, planned = self.points(np.stack([x, x0, policy.state(time)]))
+        still = ((now - earlier) ** 2).sum(axis=1) < (_STILL * (time - then)) ** 2
+        stands = still & (self.gaps(planned) < _PLANNED)
+        self.height[stands] += self.gaps(now)[stands]
+
+
+def _cross(a: Stack, b: Stack) -> Stack:
+    """Cross products along the last axis: for a few vectors, a tenth of the time of NumPy's."""
+    return a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]

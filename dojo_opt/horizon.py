@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.moving import References
 from dojo_opt.policy import Policy
-from dojo_opt.term import Term
+from dojo_opt.term import PickTerm, StateTerm, Term
 
 Matrix = NDArray[np.float64]
 
@@ -21,14 +21,13 @@ def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Ma
 
     The last ones, moved along with their references; states without one go where the last input takes them.
     """
-    sim, h = policy.sim, policy.knot_time
-    times = policy.time + h * (len(policy.u) + np.arange(count + 1.0))
+    sim, end = policy.sim, policy.time + policy.knot_time * len(policy.u)
     us = np.repeat(policy.u[-1:], count, axis=0)
-    if references.input is not None:
-        rows = np.asarray(references.input(times - h))
+    rows = references.rows(PickTerm, end - policy.knot_time, count + 1)
+    if rows is not None:
         us = us + rows[1:] - rows[0]
-    if references.state is not None:
-        rows = np.asarray(references.state(times))
+    rows = references.rows(StateTerm, end, count + 1)
+    if rows is not None:
         return sim.integrate(rows[1:], sim.difference(policy.x[-1], rows[0])), us
     moved = sim.rollout(policy.x[-1], np.repeat(us, policy.substeps, axis=0)).x[:: policy.substeps]
     xs = np.repeat(moved[-1:], count, axis=0)  # a rollout that stopped early stays where it stopped

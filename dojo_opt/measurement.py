@@ -30,10 +30,12 @@ class Measurement:
         self._sim = sim
         self._mean = mean
         self._samples: deque[tuple[float, Vector]] = deque()
+        self._now: Vector | None = None  # of `state()`, which is asked several times per sample
 
     def add(self, time: float, x: Vector) -> None:
         """Take a sample; those that no later one can need are dropped."""
         samples, h = self._samples, self._sim.time_step
+        self._now = None
         if samples and time <= samples[-1][0]:
             while samples and samples[-1][0] >= time:
                 samples.pop()
@@ -51,16 +53,24 @@ class Measurement:
         """The last sample."""
         return self._samples[-1]
 
-    def state(self, ahead: Iterable[tuple[float, Vector]] = (), interval: float | None = None) -> Vector:
-        """The last sample, or the last of those predicted to come, with its mean velocity over `interval` [s].
+    def state(self) -> Vector:
+        """The last sample, with its mean velocity over a step of the model."""
+        if self._now is None:
+            self._now = self._mean_over(list(self._samples), self._sim.time_step)
+        return self._now
 
-        The interval is by default a step of the model.
-        """
-        samples = [*self._samples, *ahead]
+    def over(self, interval: float) -> Vector:
+        """The last sample, with its mean velocity over `interval` [s]."""
+        return self._mean_over(list(self._samples), interval)
+
+    def after(self, ahead: Iterable[tuple[float, Vector]]) -> Vector:
+        """The last of the states that are predicted to come, with its mean velocity over a step of the model."""
+        return self._mean_over([*self._samples, *ahead], self._sim.time_step)
+
+    def _mean_over(self, samples: list[tuple[float, Vector]], h: float) -> Vector:
         now, x = samples[-1]
         if not self._mean or len(samples) < 2:
             return x
-        h = self._sim.time_step if interval is None else interval
         then, x0 = min(samples[:-1], key=lambda sample: abs(now - h - sample[0]))
         if abs(now - then - h) > _OFF * h:
             return x

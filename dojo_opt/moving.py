@@ -39,8 +39,16 @@ class Sampled:
         if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
             raise ValueError("Sampled(time): expected at least two times, growing")
         self._sim = sim
+        self._steps = np.diff(self.rows, axis=0) if sim is None else sim.difference(self.rows[1:], self.rows[:-1])
         size = self.rows.shape[1] if sim is None else sim.ndx
         self.cycle = None if cycle is None else checks.array("Sampled(cycle=...)", cycle, (size,))
+        self._one_move = sim is not None and self.cycle is not None and self._commutes(sim, self.cycle)
+
+    def _commutes(self, sim: Simulator, cycle: Vector) -> bool:
+        """Whether the cycle does not turn anything: then it can be added to the step between two rows."""
+        before, steps = self.rows[:-1], self._steps
+        apart = sim.integrate(sim.integrate(before, steps), cycle)
+        return bool(np.abs(apart - sim.integrate(before, steps + cycle)).max() < 1e-12)
 
     def __call__(self, times: ArrayLike) -> Matrix:
         """Rows (n, width) at the times (n,)."""
@@ -53,12 +61,14 @@ class Sampled:
         at = np.clip(t, first, last)
         i = np.clip(np.searchsorted(self.time, at, side="right") - 1, 0, len(self.time) - 2)
         f = ((at - self.time[i]) / (self.time[i + 1] - self.time[i]))[:, None]
-        before, after = self.rows[i], self.rows[i + 1]
+        before, step = self.rows[i], f * self._steps[i]
         if self._sim is None:
-            out = (1.0 - f) * before + f * after
-            return out if self.cycle is None else out + laps[:, None] * self.cycle
-        out = self._sim.integrate(before, f * self._sim.difference(after, before))
-        return out if self.cycle is None else self._sim.integrate(out, laps[:, None] * self.cycle)
+            return before + step if self.cycle is None else before + step + laps[:, None] * self.cycle
+        if self.cycle is None:
+            return self._sim.integrate(before, step)
+        if self._one_move:
+            return self._sim.integrate(before, step + laps[:, None] * self.cycle)
+        return self._sim.integrate(self._sim.integrate(before, step), laps[:, None] * self.cycle)
 
     def over(self, interval: float) -> Sampled:
         """The same states with velocities that are the mean ones over `interval` [s], such as the step of a model.
@@ -102,8 +112,8 @@ class References:
                 raise ValueError(f"{call}: a {term.name} has no reference that can move")
             self._moving.append((term, self._function(call, value, isinstance(term, StateTerm))))
         self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
-        self.input: Moving | None = next((f for term, f in self._moving if isinstance(term, PickTerm)), None)
         self._call_checked(0.0)
+        self._begin = np.nan  # [s] of the first knot
 
     def _function(self, call: str, value: Any, of_states: bool) -> Moving:
         if callable(value):
@@ -121,7 +131,22 @@ class References:
 
     def move(self, time: float, rise: float = 0.0) -> None:
         """Let the first knot of every reference be at `time` [s], and a floating base be higher by `rise` [m]."""
+        self._begin = time
         for term, function in self._moving:
             term.reference[:] = function(time + self._h * term.knots)
             if rise and isinstance(term, StateTerm):
                 term.reference[:, 2] += rise
+
+    def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
+        """Rows (count, width) of the first reference of that kind at begin, begin + h, ...; None when none moves.
+
+        Those of the present horizon are not computed again. States are `rise` higher then, as all others of it.
+        """
+        for term, function in self._moving:
+            if isinstance(term, kind):
+                first = (begin - self._begin) / self._h - term.knots[0]
+                k = round(first) if np.isfinite(first) else -1
+                if abs(first - k) < 1e-6 and 0 <= k <= len(term.knots) - count and np.all(np.diff(term.knots) == 1):
+                    return term.reference[k : k + count]
+                return np.asarray(function(begin + self._h * np.arange(float(count))))
+        return None

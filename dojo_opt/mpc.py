@@ -69,6 +69,8 @@ class MPC:
         if self.settings.delay:
             self._steps = int(np.ceil(self.settings.delay / _PREDICTION - 1e-9))
             self._fine = self.sim.replace(time_step=self.settings.delay / self._steps)
+        terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
+        self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
         self._ground = Ground(self.sim)
         self.reset()
@@ -132,12 +134,12 @@ class MPC:
         if self._fine is None:
             return self._measured.state()
         ends, h = [], self._fine.time_step
-        x = self._measured.state(interval=h)
+        x = self._measured.over(h)
         for k in range(self._steps):
             u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), self._first_input)
             x = self._fine.step(x, u).x
             ends.append((now + (k + 1) * h, x))
-        return self._measured.state(ends)
+        return self._measured.after(ends)
 
     def _begin(self, now: float) -> None:
         """The first plan."""
@@ -151,7 +153,7 @@ class MPC:
         self._solver.objective.reset(plan.multipliers)
         self.policy = self._policy(now, plan.x, plan.u, plan.K)
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
-        self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, 0.0)
+        self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, plan.x[0])
 
     def _start(self, now: float) -> None:
         self._due = now + self.period
@@ -162,7 +164,6 @@ class MPC:
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
         start = self._ahead(now)
-        gap = float(np.abs(self.sim.difference(start, old.state(now + self.settings.delay))).max())
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._start(now)
@@ -188,7 +189,7 @@ class MPC:
             solver.objective.update_multipliers(after.x, after.u)
             self.policy = self._policy(now, after.x, after.u, solver.descent.K.copy())
         cost = continuation.now.cost if taken else self.log[-1].cost
-        self._record(now, begin, status, not taken, len(history), cost, alpha, gap)
+        self._record(now, begin, status, not taken, len(history), cost, alpha, shifted.x[0])
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
@@ -230,15 +231,15 @@ class MPC:
         iterations: int,
         cost: float,
         alpha: float,
-        gap: float,
+        expected: Vector,
     ) -> None:
-        x = self._measured.state()
-        term = next((t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0), None)
-        nv = self.sim.nv
-        error = np.zeros(0) if term is None else self.sim.difference(x, term.reference[0])[:nv]
-        contacts = self._ground.touching(self._ground.gaps(x))
+        """Add to the log; expected: (nx,) where the plan before expected the start of this one."""
+        x, first = self.problem.start, not self.log
+        others = [expected] if self._tracking is None else [expected, self._tracking.reference[0]]
+        off = self.sim.difference(x, np.stack(others))
+        contacts = self._ground.touching(self._measured.last[1])
         ms, cpu = 1e3 * (clock.perf_counter() - begin[0]), 1e3 * (clock.thread_time() - begin[1])
-        first = not self.log
+        gap, error = float(np.abs(off[0]).max()), off[1:, : self.sim.nv].ravel()
         self.log.append(
             Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )

@@ -62,12 +62,12 @@ class Tick:
     iterations: int  # of the planner, rejected ones included
     cost: float  # of the plan that is in force, when it was made
     alpha: float  # last step size; 0 when it was rejected
-    gap: float  # largest entry of (measured (-) planned) state
+    gap: float  # largest entry of x (-) the state that the plan before expected
     status: Status
     fallback: bool
     contacts: tuple[str, ...]  # that touch the ground
-    error: Vector = field(repr=False)  # (nv,) measured (-) reference coordinates [m, rad]; empty without a reference
-    x: Vector = field(repr=False)  # (nx,) measured, in the convention of the model
+    error: Vector = field(repr=False)  # (nv,) coordinates of x (-) reference [m, rad]; empty without a reference
+    x: Vector = field(repr=False)  # (nx,) start of the plan: measured, as the model means it, after the delay
     first: bool = False  # the plan from which the others are warm-started
 
 
