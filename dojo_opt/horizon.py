@@ -1,7 +1,8 @@
-"""Horizon: what has to be made up when it moves on, at its end and for its constraints."""
+"""Horizon: the problem of a tick, and what has to be made up when it moves on, at its end and for its constraints."""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,11 +10,12 @@ from numpy.typing import NDArray
 
 from dojo_opt.moving import References
 from dojo_opt.policy import Policy
+from dojo_opt.problem import Problem
 from dojo_opt.term import PickTerm, StateTerm, Term
 
 Matrix = NDArray[np.float64]
 
-__all__ = ["shift_multipliers", "tail"]
+__all__ = ["shift_multipliers", "tail", "with_own_terms"]
 
 
 def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Matrix]:
@@ -44,3 +46,12 @@ def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
             first = np.minimum(np.arange(rows) + n, rows - 1)
             after = np.minimum(first + 1, rows - 1)
             term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
+
+
+def with_own_terms(problem: Problem) -> Problem:
+    """The problem with a simulator and terms of its own: MPC moves their references and learns its ground."""
+    own = copy.copy(problem)
+    own.sim = problem.sim.replace()
+    own.costs = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[0]]
+    own.constraints = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[1]]
+    return own

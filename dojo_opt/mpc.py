@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import time as clock
 from collections import deque
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.ground import Ground
-from dojo_opt.horizon import shift_multipliers, tail
+from dojo_opt.horizon import shift_multipliers, tail, with_own_terms
 from dojo_opt.line_search import Iterate
 from dojo_opt.measurement import Measurement
 from dojo_opt.moving import References
@@ -31,6 +30,7 @@ Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
+_LOST = 10.0  # times the merit of the shifted plan: a rollout worse than that has left it
 _PREDICTION = 5e-3  # longest step of the prediction over the delay [s]
 
 __all__ = ["MPC"]
@@ -59,7 +59,7 @@ class MPC:
             raise ValueError(f"MPC(iterations=...): expected a whole number >= 1, got {iterations!r}")
         self.settings = Settings(**settings)
         self._made_from = (problem, int(iterations), reference, plan, settings)
-        self.problem = _own(problem)
+        self.problem = with_own_terms(problem)
         self.sim = self.problem.sim
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
@@ -182,14 +182,23 @@ class MPC:
             status = continuation.run(solver.options.stages[0])
         history = continuation.history
         alpha = history[-1]["alpha"] if history else 1.0
-        # an iteration that was rejected from consistent states leaves a plan that is as good as it was
         taken = status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT) and self._usable()
-        if taken:
+        rolled = not taken and status in (Status.SOLVED, Status.LINE_SEARCH) and self._roll()
+        if taken or rolled:
             after = continuation.now
             solver.objective.update_multipliers(after.x, after.u)
             self.policy = self._policy(now, after.x, after.u, solver.descent.K.copy())
-        cost = continuation.now.cost if taken else self.log[-1].cost
+        cost = continuation.now.cost if taken or rolled else self.log[-1].cost
         self._record(now, begin, status, not taken, len(history), cost, alpha, shifted.x[0])
+
+    def _roll(self) -> bool:
+        """After a rejected step: the shifted plan with its gains, rolled out from the measured state.
+
+        It ends where the gains lead, which is consistent; False when that is nowhere near the plan.
+        """
+        continuation = self._solver.continuation
+        before = continuation.now.merit
+        return continuation.roll_with_gains(self.settings.kappa) and continuation.now.merit <= _LOST * before
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
@@ -243,15 +252,6 @@ class MPC:
         self.log.append(
             Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )
-
-
-def _own(problem: Problem) -> Problem:
-    """The problem with a simulator and terms of its own: MPC moves their references and learns its ground."""
-    own = copy.copy(problem)
-    own.sim = problem.sim.replace()
-    own.costs = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[0]]
-    own.constraints = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[1]]
-    return own
 
 
 def _rebuild(problem: Problem, iterations: int, reference: Any, plan: Plan | None, settings: dict[str, Any]) -> MPC:

@@ -14,6 +14,8 @@ from solvers.status import Status
 
 Vector = NDArray[np.float64]
 
+# penalties that grew with every tick would never stop
+_OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6)
 GUESSES = ("states", "feedback", "open loop")
 
 __all__ = ["GUESSES", "Settings", "Tick", "milliseconds"]
@@ -46,7 +48,7 @@ class Settings:
 
     def planner(self, iterations: int) -> Options:
         """Options of the planner for the iterations of one tick."""
-        base = self.options or Options(halvings=4, penalty_growth=1.0, tolerance=1e-6)
+        base = self.options or _OPTIONS
         stage = Stage(self.kappa, self.kappa_grad or self.kappa, base.tolerance, iterations)
         settings = {name: getattr(base, name) for name in base.__dataclass_fields__}
         return Options(**(settings | {"stages": (stage,), "time_limit": self.time_limit}))

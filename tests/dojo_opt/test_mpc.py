@@ -283,7 +283,7 @@ def test_a_model_that_cannot_be_solved_keeps_the_old_plan():
 
 
 def test_a_rejected_step_keeps_the_old_plan():
-    """Steps shorter than the full one are not allowed, and no decrease is enough: nothing can be accepted."""
+    """No step is short enough and no decrease large enough, and the gains do not lead back to the plan either."""
     mpc = dojo.MPC(standing_problem(), options=Options(halvings=0, armijo=1e9, ascent=0.0, penalty_growth=1.0))
     x = HOPPER.neutral()
     mpc(0.0, x)
@@ -291,6 +291,20 @@ def test_a_rejected_step_keeps_the_old_plan():
     mpc(0.05, HOPPER.integrate(x, 0.05 * np.eye(14)[0]))
     assert mpc.log[-1].fallback and mpc.log[-1].alpha == 0.0
     assert mpc.policy is before
+
+
+def test_a_rejected_step_near_the_plan_rolls_it_out_with_its_gains():
+    mpc = dojo.MPC(standing_problem(), options=Options(halvings=0, armijo=1e9, ascent=0.0, penalty_growth=1.0))
+    x = HOPPER.neutral()
+    mpc(0.0, x)
+    before = mpc.policy
+    mpc(0.05, HOPPER.integrate(x, 1e-4 * np.eye(14)[0]))
+    assert mpc.log[-1].fallback and mpc.log[-1].alpha == 0.0
+    now = mpc.policy
+    assert now is not before and now.time == 0.05
+    np.testing.assert_array_equal(now.x[0], mpc.log[-1].x)
+    again = HOPPER.closed_loop(now.x[0], now.u, kappa=mpc.settings.kappa).x
+    np.testing.assert_allclose(again, now.x, atol=1e-9)
 
 
 def test_first_plan_can_be_given_and_has_to_fit():
