@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.periodic import PeriodicTerm
 from dojo_opt.problem import Problem
-from solvers.riccati import Promise, Quadratic
-from solvers.status import Status
+from solvers.riccati import Quadratic
 
 Array = NDArray[np.float64]
 
@@ -34,8 +31,8 @@ class FreeStart:
 
     def solve(
         self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array
-    ) -> tuple[Array, Promise]:
-        """(k + S s, the promise of the step with s); `step` is s, in tangent coordinates at the present start."""
+    ) -> tuple[Array, float, float]:
+        """(k + S s, d0 and d1 of the step with s); `step` is s, in tangent coordinates at the present start."""
         T, m, n = K.shape
         X, W, w, ends = self._couple(n, xs, us)
         V, v = model.H[T, :n, :n], model.g[T, :n]
@@ -58,7 +55,7 @@ class FreeStart:
             V = Q[:n, :n] + K[t].T @ (Quu @ K[t] + Qux) + Qux.T @ K[t]
         self.step = self._newton(V + X + X.T + W, v + w, mu)
         k = k + S @ self.step
-        return k, self._predict(model, K, k, ends)
+        return k, *self._predict(model, K, k, ends)
 
     def _couple(self, n: int, xs: Array, us: Array) -> tuple[Array, Array, Array, list[tuple[Array, ...]]]:
         """X, W, w at the end."""
@@ -83,11 +80,10 @@ class FreeStart:
         step[self._free] = -vectors[:, curved] @ (along[curved] / (values[curved] * (1.0 + _TRUST * mu)))
         return step
 
-    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> Promise:
+    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> tuple[float, float]:
         """d0 and d1 of the step with s, from the linear rollout."""
         T, _, n = K.shape
         dx, d0, d1 = self.step, 0.0, 0.0
-        gradient = 0.0
         for t in range(T):
             z = np.concatenate([dx, k[t] + K[t] @ dx])
             d0 += float(model.g[t] @ z)
@@ -99,9 +95,4 @@ class FreeStart:
             r0, rT = start @ self.step, end @ dx
             d0 += float(first @ r0)
             d1 += float(second @ (r0 * (r0 + 2.0 * rT)))
-        return Promise(Status.SOLVED if np.isfinite(d0 + d1) else Status.NOT_FINITE, 0, d0, d1, gradient)
-
-
-def free_start_of(problem: Problem) -> Any:
-    """FreeStart, or None for a problem with a given start."""
-    return None if problem.free_start is None else FreeStart(problem)
+        return d0, d1

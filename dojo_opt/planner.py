@@ -106,7 +106,7 @@ class Solver:
             if status not in (Status.SOLVED, Status.LINE_SEARCH):
                 return status
             now = self.continuation.now
-            met = self.objective.violation(now.x, now.u) <= options.violation
+            met = self.objective.mismatch(now.x, now.u) <= options.violation
             if update >= last and met and now.gap <= options.gap:
                 return status
             self.objective.update_multipliers(now.x, now.u)
