@@ -60,7 +60,7 @@ class FreeStart:
     def _couple(self, n: int, xs: Array, us: Array) -> tuple[Array, Array, Array, list[tuple[Array, ...]]]:
         """X, W, w at the end."""
         X, W, w = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-        ends = []
+        ends: list[tuple[Array, ...]] = []
         for term in self._terms:
             end, start, first, second = term.coupling(xs, us)
             X += end.T @ (second[:, None] * start)

@@ -45,7 +45,7 @@ class Objective:
         self._last = []
 
     def _unit(self, term: Term) -> Any:
-        """Unit of a constraint's penalties: curvature 2 w of the costs, so that a multiple of a problem is solved alike.
+        """Unit of a constraint's penalties: the curvature 2 w of costs: a multiple of a problem is solved alike.
 
         Of a component of x or u, that of its own weight; without one, and of anything else, the largest.
         """
