@@ -108,9 +108,11 @@ class Descent:
         if now.gaps is not None:
             return promise
         k, d0, d1 = start.solve(model, self.K, self.k, self.mu, self._damping, now.x, now.u)
+        if not d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone promises more
+            start.step[:] = 0.0
+            return promise
         self.k[:] = k
-        status = Status.SOLVED if np.isfinite(d0 + d1) else Status.NOT_FINITE
-        return promise._replace(status=status, d0=d0, d1=d1)
+        return promise._replace(d0=d0, d1=d1)
 
     def raise_regularization(self) -> None:
         """After a failure: faster with every failure in a row."""

@@ -11,6 +11,7 @@ from solvers.riccati import Quadratic
 
 Array = NDArray[np.float64]
 
+_CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
 _TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
 
 
@@ -70,14 +71,15 @@ class FreeStart:
         return X, W, w, ends
 
     def _newton(self, H: Array, g: Array, mu: float) -> Array:
-        """-H^-1 g on the free components; directions without curvature are left alone."""
+        """-H^-1 g on the free components, each in units of its own curvature; directions without curvature are left."""
         step = np.zeros(len(g))
-        at = np.ix_(self._free, self._free)
-        values, vectors = np.linalg.eigh(0.5 * (H + H.T)[at])
-        scale = max(float(values.max()), 1e-300)
-        curved = values > 1e-12 * scale
-        along = vectors.T @ g[self._free]
-        step[self._free] = -vectors[:, curved] @ (along[curved] / (values[curved] * (1.0 + _TRUST * mu)))
+        H = 0.5 * (H + H.T)[np.ix_(self._free, self._free)]
+        own = np.diag(H)
+        unit = np.where(own > _CURVED**2 * own.max(), 1.0 / np.sqrt(np.maximum(own, 1e-100)), 0.0)
+        values, vectors = np.linalg.eigh(unit[:, None] * H * unit)
+        curved = values > _CURVED
+        along = vectors[:, curved].T @ (unit * g[self._free])
+        step[self._free] = -unit * (vectors[:, curved] @ (along / (values[curved] * (1.0 + _TRUST * mu))))
         return step
 
     def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> tuple[float, float]:
