@@ -25,7 +25,7 @@ _POOR_STEP = 0.1  # one shorter than this raises it
 _LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
 _SLOW = 2  # short steps in a row that bring next to nothing end a stage
 _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
-_PATIENCE = 2  # times the rejections allowed where only regularisation is left to try
+_PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
 _FITS = 2.0  # times the least sum of squared gaps: what counts as a good fit of a guess
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 

@@ -15,7 +15,7 @@ __all__ = ["equilibrium", "input_map", "potential_gradient"]
 
 _STEP = 1e-5
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
-_NEAR = 0.01  # [m] contacts nearer to the ground than this, and than the smoothing lets them float, may carry
+_NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 
 
 def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
@@ -58,7 +58,8 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     The contacts press straight down, so nothing creeps, and share the load as evenly as balance allows; the joints
     carry what gravity and springs leave. On the central path a contact with normal impulse g floats kappa / g above the
     ground: the state is moved to those heights. ValueError when no such forces exist: the centre of mass is not above
-    the feet, or a joint without input would have to carry something.
+    the feet, a joint without input would have to carry something, or the smoothing is so large that contacts far above
+    the ground carry the weight.
 
     Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
     """
@@ -67,24 +68,17 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     state = np.array(sim.neutral() if x is None else x, dtype=float)
     state[sim.nq :] = 0.0
     free = ~B.any(axis=1)
-    u = np.zeros(sim.nu)
+    u, left = np.zeros(sim.nu), np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
         down = np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
         gap = feet.gaps(state)
-        near = _NEAR + len(gap) * sim.kappa / (sim.time_step * weight)
-        afar = np.where(gap < near, 0.0, sim.kappa / (sim.time_step * np.maximum(gap, near)))
-        touching = gap < near
+        touching = gap < gap.min() + _NEAR
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * np.maximum(gap, _NEAR)))
         load = potential_gradient(sim, state) - stop_torques(sim, state) - down.T @ afar
         rows = np.concatenate([(down[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
         force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
         left = load - down.T @ force
-        if np.abs(left[free]).max() > 1e-3 * weight:
-            k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
-            raise ValueError(
-                f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
-                f"weight: {left[k]:.3g} N or N m is left at degree of freedom {k}"
-            )
         u = np.linalg.lstsq(B, left, rcond=None)[0]
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * force[loaded])
@@ -94,4 +88,10 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         move = np.zeros(sim.ndx)
         move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=None)[0]
         state = sim.integrate(state, move)
+    if np.abs(left[free]).max() > 1e-3 * weight:
+        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
+        raise ValueError(
+            f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
+            f"weight: {left[k]:.3g} N or N m is left at degree of freedom {k}"
+        )
     return state, u

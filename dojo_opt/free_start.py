@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.periodic import PeriodicTerm
 from dojo_opt.problem import Problem
-from solvers.riccati import Promise, Quadratic
-from solvers.status import Status
+from solvers.riccati import Quadratic
 
 Array = NDArray[np.float64]
 
+_CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
 _TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
 
 
@@ -34,8 +32,8 @@ class FreeStart:
 
     def solve(
         self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array
-    ) -> tuple[Array, Promise]:
-        """(k + S s, the promise of the step with s); `step` is s, in tangent coordinates at the present start."""
+    ) -> tuple[Array, float, float]:
+        """(k + S s, d0 and d1 of the step with s); `step` is s, in tangent coordinates at the present start."""
         T, m, n = K.shape
         X, W, w, ends = self._couple(n, xs, us)
         V, v = model.H[T, :n, :n], model.g[T, :n]
@@ -58,12 +56,12 @@ class FreeStart:
             V = Q[:n, :n] + K[t].T @ (Quu @ K[t] + Qux) + Qux.T @ K[t]
         self.step = self._newton(V + X + X.T + W, v + w, mu)
         k = k + S @ self.step
-        return k, self._predict(model, K, k, ends)
+        return k, *self._predict(model, K, k, ends)
 
     def _couple(self, n: int, xs: Array, us: Array) -> tuple[Array, Array, Array, list[tuple[Array, ...]]]:
         """X, W, w at the end."""
         X, W, w = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
-        ends = []
+        ends: list[tuple[Array, ...]] = []
         for term in self._terms:
             end, start, first, second = term.coupling(xs, us)
             X += end.T @ (second[:, None] * start)
@@ -73,21 +71,21 @@ class FreeStart:
         return X, W, w, ends
 
     def _newton(self, H: Array, g: Array, mu: float) -> Array:
-        """-H^-1 g on the free components; directions without curvature are left alone."""
+        """-H^-1 g on the free components, each in units of its own curvature; directions without curvature are left."""
         step = np.zeros(len(g))
-        at = np.ix_(self._free, self._free)
-        values, vectors = np.linalg.eigh(0.5 * (H + H.T)[at])
-        scale = max(float(values.max()), 1e-300)
-        curved = values > 1e-12 * scale
-        along = vectors.T @ g[self._free]
-        step[self._free] = -vectors[:, curved] @ (along[curved] / (values[curved] * (1.0 + _TRUST * mu)))
+        H = 0.5 * (H + H.T)[np.ix_(self._free, self._free)]
+        own = np.diag(H)
+        unit = np.where(own > _CURVED**2 * own.max(), 1.0 / np.sqrt(np.maximum(own, 1e-100)), 0.0)
+        values, vectors = np.linalg.eigh(unit[:, None] * H * unit)
+        curved = values > _CURVED
+        along = vectors[:, curved].T @ (unit * g[self._free])
+        step[self._free] = -unit * (vectors[:, curved] @ (along / (values[curved] * (1.0 + _TRUST * mu))))
         return step
 
-    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> Promise:
+    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> tuple[float, float]:
         """d0 and d1 of the step with s, from the linear rollout."""
         T, _, n = K.shape
         dx, d0, d1 = self.step, 0.0, 0.0
-        gradient = 0.0
         for t in range(T):
             z = np.concatenate([dx, k[t] + K[t] @ dx])
             d0 += float(model.g[t] @ z)
@@ -99,9 +97,4 @@ class FreeStart:
             r0, rT = start @ self.step, end @ dx
             d0 += float(first @ r0)
             d1 += float(second @ (r0 * (r0 + 2.0 * rT)))
-        return Promise(Status.SOLVED if np.isfinite(d0 + d1) else Status.NOT_FINITE, 0, d0, d1, gradient)
-
-
-def free_start_of(problem: Problem) -> Any:
-    """FreeStart, or None for a problem with a given start."""
-    return None if problem.free_start is None else FreeStart(problem)
+        return d0, d1

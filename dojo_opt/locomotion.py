@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from dojo_opt import gaits, models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.equilibrium import equilibrium
+from dojo_opt.feet import Feet
 from dojo_opt.gait import Gait
 from dojo_opt.options import CONTINUATION
 from dojo_opt.periodic import Periodic
@@ -66,7 +68,8 @@ def follow(
     if guess == "reference":
         controls = gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
     else:
-        still, torques = equilibrium(sim.replace(kappa=CONTINUATION[0].kappa_eval))
+        feet = replace(sim.mechanism, contacts=Feet(sim, gait.foot_names).contacts)
+        still, torques = equilibrium(sim.replace(mechanism=feet, kappa=CONTINUATION[0].kappa_eval))
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
     if control_limits is not None:
         controls = np.clip(controls, *control_limits)
