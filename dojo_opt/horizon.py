@@ -49,9 +49,9 @@ def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
 
 
 def with_own_terms(problem: Problem) -> Problem:
-    """The problem with a simulator and terms of its own: MPC moves their references and learns its ground."""
+    """The problem with a simulator and terms of its own, for MPC to move references and ground of; its start is given."""
     own = copy.copy(problem)
     own.sim = problem.sim.replace()
-    own.costs = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[0]]
-    own.constraints = [spec.bind(own.sim, own.horizon, own.layout) for spec in problem.specs[1]]
+    own.free_start = None
+    own.bind()
     return own

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections import deque
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,8 @@ class MPC:
 
     problem     its simulator is the model; the plant may be another one. Its start and guess are those of the first
                 plan only, which is solved to the end; its references are overwritten where `reference` is given.
-    iterations  of the planner per tick
+    iterations  of the planner per tick. One is enough for costs, control limits and equalities; an inequality among the
+                constraints is not seen by an iteration that starts on its good side, and takes about three
     reference   what to track over time, see `dojo_opt.moving.References`; without it, the problem's own at every tick
     plan        the first plan, at the time of the first call; without it, `ilqr` is called with its defaults
     settings    fields of `dojo_opt.tick.Settings` by name
@@ -58,7 +60,7 @@ class MPC:
         if int(iterations) != iterations or iterations < 1:
             raise ValueError(f"MPC(iterations=...): expected a whole number >= 1, got {iterations!r}")
         self.settings = Settings(**settings)
-        self._made_from = (problem, int(iterations), reference, plan, settings)
+        self._again = partial(MPC, problem, int(iterations), reference=reference, plan=plan, **settings)
         self.problem = with_own_terms(problem)
         self.sim = self.problem.sim
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
@@ -76,11 +78,11 @@ class MPC:
         self.reset()
 
     def __reduce__(self) -> Any:
-        return _rebuild, self._made_from
+        return self._again, ()
 
     def fresh(self) -> MPC:
         """Another one, made from the same arguments."""
-        return _rebuild(*self._made_from)
+        return self._again()
 
     def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> Study:
         """Closed loops under random perturbations; see `dojo_opt.study`."""
@@ -115,8 +117,7 @@ class MPC:
         policy, settings = self.policy, self.settings
         assert policy is not None
         u = policy.control(now + settings.delay)
-        fallen_back = self.log[-1].fallback
-        scale = 1.0 if fallen_back else settings.gain_scale
+        scale = 1.0 if self.log[-1].fallback else settings.gain_scale
         if scale > 0.0:
             u += scale * policy.feedback(now, self._measured.state())
         limits = self.problem.control_limits
@@ -144,7 +145,8 @@ class MPC:
     def _begin(self, now: float) -> None:
         """The first plan."""
         begin = clock.perf_counter(), clock.thread_time()
-        self._start(now)
+        self._due = now + self.period
+        self.references.move(now + self.settings.delay)
         self.problem.start = self._ahead(now)
         plan = self._first or Solver(self.problem).solve()
         shape = (self.problem.horizon, self.sim.nu)
@@ -155,10 +157,6 @@ class MPC:
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
         self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, plan.x[0])
 
-    def _start(self, now: float) -> None:
-        self._due = now + self.period
-        self.references.move(now + self.settings.delay, self._ground.rise)
-
     def _tick(self, now: float, old: Policy) -> None:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
@@ -166,7 +164,8 @@ class MPC:
         start = self._ahead(now)
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
-        self._start(now)
+        self._due = now + self.period
+        self.references.move(now + self.settings.delay, self._ground.rise)
         shifted = old.shifted(now + self.settings.delay, lambda count: tail(old, self.references, count))
         problem.start = start
         continuation = solver.continuation
@@ -186,16 +185,14 @@ class MPC:
         rolled = not taken and status in (Status.SOLVED, Status.LINE_SEARCH) and self._roll()
         if taken or rolled:
             after = continuation.now
-            solver.objective.update_multipliers(after.x, after.u)
+            if taken and after.gaps is None:  # what an inconsistent trajectory violates says little
+                solver.objective.update_multipliers(after.x, after.u)
             self.policy = self._policy(now, after.x, after.u, solver.descent.K.copy())
         cost = continuation.now.cost if taken or rolled else self.log[-1].cost
         self._record(now, begin, status, not taken, len(history), cost, alpha, shifted.x[0])
 
     def _roll(self) -> bool:
-        """After a rejected step: the shifted plan with its gains, rolled out from the measured state.
-
-        It ends where the gains lead, which is consistent; False when that is nowhere near the plan.
-        """
+        """After a rejected step: roll the shifted plan out with its gains; False when that leads nowhere near it."""
         continuation = self._solver.continuation
         before = continuation.now.merit
         return continuation.roll_with_gains(self.settings.kappa) and continuation.now.merit <= _LOST * before
@@ -208,8 +205,7 @@ class MPC:
 
     def _usable(self) -> bool:
         """Whether the present iterate is a trajectory of the model, up to what a short step leaves open."""
-        now = self._solver.continuation.now
-        history = self._solver.continuation.history
+        now, history = self._solver.continuation.now, self._solver.continuation.history
         moved = any(record["alpha"] > 0.0 for record in history)
         return bool(np.isfinite(now.merit)) and (moved or now.gaps is None)
 
@@ -252,7 +248,3 @@ class MPC:
         self.log.append(
             Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )
-
-
-def _rebuild(problem: Problem, iterations: int, reference: Any, plan: Plan | None, settings: dict[str, Any]) -> MPC:
-    return MPC(problem, iterations, reference=reference, plan=plan, **settings)

@@ -89,11 +89,22 @@ class Problem:
             for i, spec in enumerate(specs):
                 if not hasattr(spec, "bind"):
                     raise TypeError(f"Problem({argument}=...): entry {i} is a {type(spec).__name__}, not a term")
-        self.costs = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[0]]
-        self.constraints = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[1]]
+        self.bind()
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    def bind(self) -> None:
+        """Make the terms of `specs` anew, with arrays and compiled functions of their own."""
+        self.costs = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[0]]
+        self.constraints = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[1]]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("costs", "constraints")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.bind()  # loops around a user's function cannot be pickled
 
     @property
     def knot_time(self) -> float:

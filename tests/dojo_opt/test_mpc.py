@@ -12,6 +12,7 @@ from dojo_opt.moving import References, Sampled
 from dojo_opt.options import Options
 from dojo_opt.policy import Policy
 from dojo_opt.tick import Settings, milliseconds
+from solvers.jit import local_kernel
 from solvers.status import Status
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.05)
@@ -257,6 +258,19 @@ def test_runs_are_the_same_again_and_after_pickling():
     np.testing.assert_array_equal(first.x, copied.x)
 
 
+def test_problems_with_compiled_residuals_can_be_sent_to_other_processes():
+    def height(x, u, out):
+        out[0] = x[2] * u[2]
+
+    problem = standing_problem()
+    terms = [*problem.specs[0], dojo.cost.ResidualCost(local_kernel(height), 1)]
+    problem = dojo.Problem(HOPPER, problem.start, 8, cost=terms, controls0=problem.controls0)
+    xs = np.tile(problem.start, (9, 1))
+    copied = pickle.loads(pickle.dumps(problem))
+    assert copied.cost(xs, copied.controls0) == problem.cost(xs, problem.controls0) > 100.0
+    assert copied.costs[0].reference is not problem.costs[0].reference
+
+
 def test_a_tick_without_time_keeps_the_old_plan():
     mpc = dojo.MPC(standing_problem(), time_limit=1e-9)
     x = HOPPER.neutral()
@@ -326,6 +340,24 @@ def test_limits_hold_for_feedback_too():
     u = mpc(0.01, far)
     assert np.all(np.abs(u[:2]) <= 1.0) and 0.0 <= u[2] <= 45.0
     assert np.any(np.abs(u[:2]) == 1.0) or u[2] in (0.0, 45.0)
+
+
+def test_constraints_hold_in_closed_loop():
+    """The leg lifts the body by 5 cm: with 100 N at once, or with the 45 N that a constraint allows."""
+    start = HOPPER.neutral()
+    raised = start.copy()
+    raised[[2, 7]] += 0.05
+    hold = np.array([0.0, 0.0, 9.81 * 4.18])
+    tracking = dojo.cost.Tracking(raised, np.r_[10.0 * np.ones(7), 0.01 * np.ones(7)])
+    largest = []
+    for constraints in ([], [dojo.constraint.ControlBounds(-np.inf, 45.0, components=[2])]):
+        costs = [tracking, dojo.cost.Effort(1e-6, reference=hold)]
+        problem = dojo.Problem(HOPPER, start, 8, cost=costs, constraints=constraints, controls0=hold)
+        mpc = dojo.MPC(problem, iterations=3, gain_scale=0.0)
+        loop = dojo.closed_loop(mpc, dojo.Plant(HOPPER.replace(time_step=5e-3, kappa=1e-8)), 1.0)
+        assert loop.x[-1, 2] == pytest.approx(0.6, abs=2e-3)
+        largest.append(loop.u[:, 2].max())
+    assert largest[0] > 90.0 and largest[1] < 50.0  # the penalty of a tick is not the last word
 
 
 @pytest.mark.parametrize("guess", ["states", "feedback", "open loop"])
