@@ -49,7 +49,7 @@ def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
 
 
 def with_own_terms(problem: Problem) -> Problem:
-    """The problem with a simulator and terms of its own, for MPC to move references and ground of; its start is given."""
+    """The problem with a simulator and terms of its own: MPC moves their references and ground, and gives the start."""
     own = copy.copy(problem)
     own.sim = problem.sim.replace()
     own.free_start = None
