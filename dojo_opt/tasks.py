@@ -98,8 +98,8 @@ def quadruped_mpc(
 
     Tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the trunk weigh
     10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2; torques are limited to 33.5 N m.
-    damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of 5
-    to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
+    damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of
+    5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
     settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it.
     """
     knot, horizon, limit = 0.04, 20, 33.5
