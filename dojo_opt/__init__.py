@@ -21,14 +21,21 @@ __all__ = [
     "Body",
     "Box",
     "Capsule",
+    "ClosedLoop",
     "Contact",
     "Cylinder",
+    "Disturbances",
     "Input",
     "Joint",
     "Linearization",
+    "MPC",
     "Mechanism",
+    "Perturbation",
     "Plan",
+    "Plant",
     "Problem",
+    "Push",
+    "Sampled",
     "SimulationError",
     "Simulator",
     "Sphere",
@@ -37,13 +44,18 @@ __all__ = [
     "UrdfError",
     "UrdfMechanism",
     "UrdfWarning",
+    "closed_loop",
     "constraint",
     "cost",
+    "equilibrium",
+    "gaits",
     "ilqr",
     "load_urdf",
     "models",
+    "monte_carlo",
     "plots",
     "problems",
+    "tasks",
     "viewer",
 ]
 
@@ -52,14 +64,21 @@ _HOME: dict[str, str | None] = {
     "Body": "sim.parts",
     "Box": "sim.shapes",
     "Capsule": "sim.shapes",
+    "ClosedLoop": "dojo_opt.loop",
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
+    "Disturbances": "dojo_opt.disturbances",
     "Input": "sim.parts",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
+    "MPC": "dojo_opt.mpc",
     "Mechanism": "sim.mechanism",
+    "Perturbation": "dojo_opt.perturbation",
     "Plan": "dojo_opt.plan",
+    "Plant": "dojo_opt.plant",
     "Problem": "dojo_opt.problem",
+    "Push": "dojo_opt.perturbation",
+    "Sampled": "dojo_opt.moving",
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
@@ -68,21 +87,34 @@ _HOME: dict[str, str | None] = {
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
     "UrdfWarning": "sim.urdf",
+    "closed_loop": "dojo_opt.loop",
     "constraint": None,
     "cost": None,
+    "equilibrium": "dojo_opt.rest",
+    "gaits": None,
     "ilqr": "dojo_opt.planner",
     "load_urdf": "sim.urdf",
     "models": None,
+    "monte_carlo": "dojo_opt.study",
     "plots": None,
     "problems": None,
+    "tasks": None,
     "viewer": None,
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, models, plots, problems, viewer
+    from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
+    from dojo_opt.disturbances import Disturbances
+    from dojo_opt.rest import equilibrium
+    from dojo_opt.loop import ClosedLoop, closed_loop
+    from dojo_opt.moving import Sampled
+    from dojo_opt.mpc import MPC
+    from dojo_opt.perturbation import Perturbation, Push
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
+    from dojo_opt.plant import Plant
     from dojo_opt.problem import Problem
+    from dojo_opt.study import monte_carlo
     from sim.mechanism import Mechanism
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory

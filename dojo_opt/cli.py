@@ -15,8 +15,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import dojo_opt as dojo
 from dojo_opt.report import REPORTS, run_report
+from dojo_opt.tick import milliseconds
+
+# what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump")
+GAITS = ("trot", "bound", "pace", "walk", "turn", "jump")
+LOOPS = ("hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -24,10 +32,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"dojo-opt {dojo.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="plan a reference problem", description="Plan a reference problem.")
-    run.add_argument("name", metavar="NAME", help="a function of dojo_opt.problems, such as hop")
-    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem")
-    run.add_argument("--out", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
+    what = "Plan a reference problem, or run a closed-loop task."
+    run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=what)
+    run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS]))
+    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem or task")
+    run.add_argument("--perturb", action="append", default=[], metavar="KEY=VALUE", help="of the plant: payload=1.0")
+    run.add_argument("--seconds", type=float, default=4.0, metavar="S", help="length of a closed-loop task")
+    run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
 
@@ -56,7 +67,7 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
     for pair in pairs:
         key, equals, text = pair.partition("=")
         if not equals or not key.isidentifier():
-            raise ValueError(f"--set: expected KEY=VALUE, got {pair!r}")
+            raise ValueError(f"--set, --perturb: expected KEY=VALUE, got {pair!r}")
         try:
             arguments[key] = ast.literal_eval(text)
         except (SyntaxError, ValueError):
@@ -65,15 +76,18 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
 
 
 def _run(args: argparse.Namespace) -> int:
-    names = dojo.problems.__all__
-    if args.name not in names:
-        raise ValueError(f"run: no problem {args.name!r}; there are {', '.join(names)}")
-    problem = getattr(dojo.problems, args.name)(**_arguments(args.set))
+    if args.name in LOOPS:
+        return _run_loop(args)
+    name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
+    if name not in PROBLEMS:
+        raise ValueError(f"run: no problem or task {args.name!r}; there are {', '.join([*PROBLEMS, *LOOPS])}")
+    problem = getattr(dojo.problems, name)(**_arguments(args.set))
     start = time.perf_counter()
     plan = dojo.ilqr(problem, verbose=not args.json)
     seconds = time.perf_counter() - start
     if args.out:
-        dojo.plots.trajectory(plan).savefig(args.out, dpi=150)
+        figure = dojo.plots.gait(plan) if name in GAITS else dojo.plots.trajectory(plan)
+        figure.savefig(args.out, dpi=150)
     if args.html:
         dojo.viewer.save_html(plan, args.html)
     if args.json:
@@ -85,6 +99,30 @@ def _run(args: argparse.Namespace) -> int:
     else:
         print(f"{plan.message}  cost {plan.fun:.4g}, violation {plan.violation:.1e}, {seconds:.2f} s")
     return 0 if plan.success else 1
+
+
+def _run_loop(args: argparse.Namespace) -> int:
+    mpc = getattr(dojo.tasks, args.name)(**_arguments(args.set))
+    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **_arguments(args.perturb)), args.seconds)
+    if args.out:
+        dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)
+    if args.html:
+        dojo.viewer.save_html(loop, args.html)
+    ms, fallbacks = milliseconds(loop.log), sum(tick.fallback for tick in loop.log)
+    numbers = {"task": args.name, "survived": loop.survived, "message": loop.message, "seconds": loop.duration}
+    numbers |= {"rms_xy": loop.rms(), "ticks": len(loop.log), "fallbacks": fallbacks}
+    numbers |= {"tick_median_ms": float(np.median(ms)), "tick_99_ms": float(np.percentile(ms, 99))} if ms.size else {}
+    if args.json:
+        print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+    else:
+        print(f"{loop.message}  rms xy {loop.rms():.3f} m over {loop.duration:.2f} s")
+        if ms.size:
+            print(
+                "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back".format(
+                    **numbers
+                )
+            )
+    return 0 if loop.survived else 1
 
 
 def _report(args: argparse.Namespace) -> int:

@@ -25,7 +25,8 @@ _POOR_STEP = 0.1  # one shorter than this raises it
 _LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
 _SLOW = 2  # short steps in a row that bring next to nothing end a stage
 _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
-_PATIENCE = 2  # times the rejections allowed where only regularisation is left to try
+_PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
+_FITS = 2.0  # times the least sum of squared gaps: what counts as a good fit of a guess
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 
 
@@ -55,6 +56,23 @@ class Continuation:
         self.kappa = kappa
         self._kappa_grad = 0.0
         self._fresh = False  # the quadratic model belongs to `now`
+
+    def first_stage(self, stages: tuple[Stage, ...]) -> int:
+        """Which stage a guess of states begins with: the smoothest at which it fits nearly as well as at any.
+
+        A good reference leaves small gaps at a hard contact and large ones at a smooth one, where contact begins above
+        the ground; to smooth it first would only lead away from it. A poor one fits nowhere, and needs all the stages.
+        """
+        if self.kappa is not None or len(stages) == 1:
+            return 0
+        problem, now = self._problem, self.now
+        misfit = []
+        for stage in stages:
+            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
+            gaps = problem.sim.difference(linear.x_next, now.x[1:])
+            misfit.append(float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf)
+        best = min(misfit)
+        return next(i for i, value in enumerate(misfit) if value <= _FITS * best) if best < np.inf else 0
 
     def remeasure(self) -> None:
         """The multipliers have changed: the merit and the model of the objective are out of date."""
@@ -138,16 +156,21 @@ class Continuation:
                 rejected = 0
             elif rejected >= _PATIENCE * self._options.rejections:
                 return Status.LINE_SEARCH
-            if alpha > 0.0 and before.gaps is None:
-                slow = slow + 1 if before.merit - self.now.merit <= small else 0
-                if slow >= (1 if alpha >= _GOOD_STEP else _SLOW):
-                    return Status.SOLVED
+            if alpha > 0.0:
+                slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
+                if slow >= (1 if alpha >= _GOOD_STEP and before.gaps is None else _SLOW):
+                    if self.now.gaps is None or stage is not self._options.stages[-1]:
+                        return Status.SOLVED
+                    self._unstick(stage)  # the last stage does not leave gaps
+                    slow = 0
         return Status.SOLVED
 
     def _unstick(self, stage: Stage) -> bool:
         """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
         if self.now.gaps is not None:
-            return self.roll_with_gains(stage.kappa_eval)
+            # gains without the regularisation of the failures, which leads to open-loop rollouts
+            self._descent.reset_regularization()
+            return self._descent.gains(self.now).status == Status.SOLVED and self.roll_with_gains(stage.kappa_eval)
         if self._kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
             return False
         self._kappa_grad = max(_SHARPER * self._kappa_grad, stage.kappa_eval)
@@ -158,6 +181,7 @@ class Continuation:
     def _advance(self, stage: Stage, promise: Promise) -> float:
         """One line search, and the regularisation that follows from its step size."""
         descent = self._descent
+        self._line_search.start_step = descent.start_step
         alpha, self.now = self._line_search.search(self.now, promise, descent.k, descent.K, stage.kappa_eval)
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:

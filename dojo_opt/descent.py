@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.free_start import FreeStart
 from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
@@ -38,6 +39,12 @@ class Descent:
         self._no_gaps = np.zeros((T + 1, sim.ndx))
         self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
         self._linear: Any = None
+        self._start = None if problem.free_start is None else FreeStart(problem)
+
+    @property
+    def start_step(self) -> Any:
+        """Step (ndx,) of a free start, None when it is given."""
+        return None if self._start is None else self._start.step
 
     def reset(self) -> None:
         """Forget regularisation and gains of an earlier solve."""
@@ -89,9 +96,23 @@ class Descent:
             promise = backward(
                 model, Regularization(self.mu, value, self._damping), self.K, self.k, self._free, self._buffer
             )
+            if promise.status == Status.SOLVED and self._start is not None:
+                promise = self._free_the_start(self._start, model, promise, now)
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()
+
+    def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise, now: Iterate) -> Promise:
+        """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
+        start.step[:] = 0.0
+        if now.gaps is not None:
+            return promise
+        k, d0, d1 = start.solve(model, self.K, self.k, self.mu, self._damping, now.x, now.u)
+        if not d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone promises more
+            start.step[:] = 0.0
+            return promise
+        self.k[:] = k
+        return promise._replace(d0=d0, d1=d1)
 
     def raise_regularization(self) -> None:
         """After a failure: faster with every failure in a row."""

@@ -52,12 +52,17 @@ class LineSearch:
     def reset(self) -> None:
         """Try the full step first again."""
         self._first = 1.0
+        self.start_step: Any = None  # of a free start, at full length
 
     def roll(self, now: Iterate, k: Matrix | None, K: Stack | None, alpha: float, kappa: float) -> Any:
         """One rollout from the start of the problem; the simulator stops at the first step that it cannot solve."""
-        problem = self._problem
+        problem, start = self._problem, self._problem.start
+        if problem.free_start is not None:
+            start = now.x[0]
+            if k is not None:
+                start = problem.sim.integrate(start, alpha * self.start_step)
         return problem.sim.closed_loop(
-            problem.start,
+            start,
             now.u,
             xs=now.x,
             ks=k,

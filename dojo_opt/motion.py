@@ -36,7 +36,7 @@ class Motion:
 
 
 def motion(result: Any, simulator: Simulator | None = None) -> Motion:
-    """Motion of a Trajectory, or of a plan; the contact forces of a plan are those of its steps, solved once more.
+    """Motion of a Trajectory, a closed loop, or a plan; the contact forces of a plan come from its steps, solved again.
 
     simulator: the one the result was made with; only needed for a result that was read from a file.
     """
@@ -45,7 +45,11 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         raise ValueError(f"motion(simulator=...): this {type(result).__name__} does not know its simulator; give it")
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     substeps = getattr(result, "substeps", 1)
-    normal, friction = _contact_forces(sim, x, u, substeps)
+    known = getattr(result, "contacts", None)  # a plan has none
+    if known is None:
+        normal, friction = _contact_forces(sim, x, u, substeps)
+    else:
+        normal, friction = known.normal_force, known.friction_force
     z = sim.maximal(x)
     return Motion(
         mechanism=sim.mechanism,

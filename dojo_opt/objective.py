@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
+from dojo_opt.term import Term
 
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
+
+_LEAST = 1e-3  # of the largest unit: what a component gets at least
 
 
 class Objective:
@@ -35,9 +39,26 @@ class Objective:
                     f"{[term.slope.shape for term in self.constraints]}, got {[a.shape for a in given]}"
                 )
         for i, term in enumerate(self.constraints):
+            first = self._options.penalty * self._unit(term)
             term.slope[:] = multipliers[i] if multipliers else 0.0
-            term.weight[:] = 0.5 * (penalties[i] if penalties else self._options.penalty) * term.mask
+            term.weight[:] = 0.5 * (penalties[i] if penalties else first) * term.mask
         self._last = []
+
+    def _unit(self, term: Term) -> Any:
+        """Unit of a constraint's penalties: the curvature 2 w of costs: a multiple of a problem is solved alike.
+
+        Of a component of x or u, that of its own weight; without one, and of anything else, the largest.
+        """
+        largest = max((2.0 * float(cost.weight.max(initial=0.0)) for cost in self.costs), default=0.0)
+        largest = largest if largest > 0.0 else 1.0
+        if term.columns is None:
+            return largest
+        own = np.zeros(self.g.shape[1])
+        for cost in self.costs:
+            if cost.columns is not None:
+                np.maximum.at(own, cost.columns, 2.0 * cost.weight.max(axis=0))
+        own = own[term.columns]
+        return np.where(own > 0.0, np.maximum(own, _LEAST * largest), largest)
 
     def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
         """(cost, merit) at (xs, us)."""
@@ -64,16 +85,24 @@ class Objective:
             worst = max(worst, float(term.violation().max(initial=0.0)))
         return worst
 
+    def mismatch(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint, or of the complementarity of an inequality and its multiplier."""
+        worst = 0.0
+        for term in self.constraints:
+            term.update(xs, us)
+            worst = max(worst, float(term.mismatch().max(initial=0.0)))
+        return worst
+
     def update_multipliers(self, xs: Matrix, us: Matrix) -> None:
         """l <- l + rho r (kept >= 0 for inequalities); rho grows where the violation fell too little."""
         options = self._options
         now = []
         for i, term in enumerate(self.constraints):
             term.update(xs, us)
+            violation = term.mismatch()
             term.slope += 2.0 * term.weight * term.residual
             if term.one_sided:
                 np.maximum(term.slope, 0.0, out=term.slope)
-            violation = term.violation()
             now.append(violation)
             if self._last:
                 slow = (violation > options.sufficient * self._last[i]) & (violation > 0.1 * options.violation)

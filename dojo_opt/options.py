@@ -39,7 +39,7 @@ class Options:
     max_updates: int = 20  # multiplier updates before the constraints count as infeasible
     violation: float = 1e-3  # largest violation of a plan that counts as solved
     gap: float = 1e-8  # largest gap of a trajectory that counts as consistent
-    penalty: float = 100.0  # first penalty of every constraint: high, so that a goal is worth the effort of reaching it
+    penalty: float = 100.0  # first, in units of the curvature of the costs: a goal is worth its effort
     penalty_growth: float = 10.0
     penalty_max: float = 1e8
     sufficient: float = 0.25  # the penalty of an entry grows when its violation fell to more than this share

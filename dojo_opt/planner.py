@@ -27,6 +27,8 @@ from solvers.status import MESSAGES, Status
 
 __all__ = ["Solver", "ilqr"]
 
+_SOFTEN = 3  # times that a stuck last stage may go back to the one before it
+
 
 def ilqr(
     problem: Problem,
@@ -96,21 +98,31 @@ class Solver:
         return Status.SOLVED, ""
 
     def _run(self) -> Status:
-        """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit."""
+        """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
+
+        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened once more.
+        """
         options = self.options
         last = len(options.stages) - 1
-        for update in range(last + options.max_updates + 1):
-            status = self._stage(options.stages[min(update, last)], options.bisections)
-            if status == Status.SIMULATION_FAILED and update < last:
-                continue  # the next stage is another way down
+        index, softened = self.continuation.first_stage(options.stages), 0
+        for _ in range(last + options.max_updates + 1):
+            status = self._stage(options.stages[index], options.bisections)
+            if status == Status.SIMULATION_FAILED and index < last:
+                index += 1  # the next stage is another way down
+                continue
             if status not in (Status.SOLVED, Status.LINE_SEARCH):
                 return status
             now = self.continuation.now
-            met = self.objective.violation(now.x, now.u) <= options.violation
-            if update >= last and met and now.gap <= options.gap:
-                return status
+            if index == last:
+                met = self.objective.mismatch(now.x, now.u) <= options.violation
+                if met and now.gap <= options.gap:
+                    return status
+                if status == Status.LINE_SEARCH and last > 0 and softened < _SOFTEN:
+                    index, softened = last - 1, softened + 1
+                    continue
             self.objective.update_multipliers(now.x, now.u)
             self.continuation.remeasure()
+            index = min(index + 1, last)
         return Status.INFEASIBLE
 
     def _stage(self, stage: Stage, bisections: int) -> Status:

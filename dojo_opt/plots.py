@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from dojo_opt.axes import finish as _finish
+from dojo_opt.gait_plots import foot_paths, friction_use, gait, gait_diagram
 from dojo_opt.motion import Motion, motion
+from dojo_opt.plots_mpc import base_path, closed_loop, study, survival, tick_times, tracking
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
@@ -17,7 +20,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["contact_forces", "controls", "paths", "state", "trajectory", "velocities"]
+__all__ = [
+    "base_path",
+    "closed_loop",
+    "contact_forces",
+    "controls",
+    "foot_paths",
+    "friction_use",
+    "gait",
+    "gait_diagram",
+    "paths",
+    "state",
+    "study",
+    "survival",
+    "tick_times",
+    "tracking",
+    "trajectory",
+    "velocities",
+]
 
 
 @overload
@@ -105,16 +125,6 @@ def paths(m: Motion, ax: Axes) -> Axes:
         ax.axhline(m.mechanism.contacts[0].height, color="0.6", linewidth=1)
     ax.set_aspect("equal", adjustable="datalim")
     return _finish(ax, "height [m]", f"{'xy'[side]} [m]")
-
-
-def _finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
-    """Labels, grid, and a legend as long as it can be read."""
-    ax.set_xlabel(xlabel)
-    ax.set_ylabel(ylabel)
-    ax.grid(alpha=0.3)
-    if 0 < len(ax.get_legend_handles_labels()[1]) <= 12:
-        ax.legend(fontsize="small", framealpha=0.6)
-    return ax
 
 
 def _coordinates(m: Motion) -> list[tuple[str, Any]]:

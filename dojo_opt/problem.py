@@ -36,12 +36,25 @@ def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector
     return lo, hi
 
 
+def _components(call: str, chosen: Any, count: int) -> Any:
+    """Component numbers as an array; None for none, True for all."""
+    if chosen is None or chosen is False:
+        return None
+    numbers = np.arange(count) if chosen is True else np.unique(np.asarray(chosen, dtype=np.int64))
+    if numbers.ndim != 1 or numbers.size == 0 or numbers[0] < 0 or numbers[-1] >= count:
+        raise ValueError(f"{call}: expected components in [0, {count}), got {numbers.tolist()}")
+    return numbers
+
+
 class Problem:
     """min sum of costs over x (T + 1, nx), u (T, nu) with x_0 = start, the simulator's motion, constraints and limits.
 
     A knot spans `substeps` steps of `sim.time_step` with u held. `controls0` (T, nu) and `states0` (T + 1, nx) are the
     guesses that `ilqr` starts from: with states, the trajectory need not be consistent and its gaps are closed on the
     way; without, it is the rollout of the controls (zero by default).
+
+    free_start: tangent components of the start that the planner may change, or True for all; `start` is then a guess.
+    Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
     """
 
     def __init__(
@@ -56,6 +69,7 @@ class Problem:
         substeps: int = 1,
         controls0: ArrayLike | None = None,
         states0: ArrayLike | None = None,
+        free_start: Any = None,
     ) -> None:
         if int(horizon) != horizon or horizon < 1:
             raise ValueError(f"Problem(horizon=...): expected a positive number of knots, got {horizon}")
@@ -69,16 +83,28 @@ class Problem:
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
         self.start: Vector = table("Problem(start=...)", start, 1, sim.nx)[0]
         self.layout = tangent_layout(sim, self.start)
+        self.free_start = _components("Problem(free_start=...)", free_start, sim.ndx)
         self.specs = (tuple(cost), tuple(constraints))
         for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
             for i, spec in enumerate(specs):
                 if not hasattr(spec, "bind"):
                     raise TypeError(f"Problem({argument}=...): entry {i} is a {type(spec).__name__}, not a term")
-        self.costs = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[0]]
-        self.constraints = [spec.bind(sim, self.horizon, self.layout) for spec in self.specs[1]]
+        self.bind()
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    def bind(self) -> None:
+        """Make the terms of `specs` anew, with arrays and compiled functions of their own."""
+        self.costs = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[0]]
+        self.constraints = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[1]]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("costs", "constraints")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.bind()  # loops around a user's function cannot be pickled
 
     @property
     def knot_time(self) -> float:
@@ -96,7 +122,8 @@ class Problem:
         if np.shape(states) != (self.horizon + 1, self.sim.nx):
             raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {np.shape(states)}")
         checked = table(call, states, self.horizon + 1, self.sim.nx)
-        checked[0] = self.start
+        if self.free_start is None:
+            checked[0] = self.start
         return checked
 
     def cost(self, xs: Matrix, us: Matrix) -> float:

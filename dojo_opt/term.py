@@ -31,6 +31,7 @@ class Term:
         self.slope = np.zeros_like(weight)
         self.one_sided = one_sided
         self.residual = np.zeros_like(weight)
+        self.columns: Integers | None = None  # of z = (dx, du), that of each entry, where it belongs to a single one
         self._first = np.empty_like(weight)
         self._second = np.empty_like(weight)
 
@@ -57,6 +58,13 @@ class Term:
         size = np.maximum(self.residual, 0.0) if self.one_sided else np.abs(self.residual)
         return np.multiply(size, self.mask, out=size)
 
+    def mismatch(self) -> Matrix:
+        """As `violation`, but of inequalities |max(r, -l / rho)|: zero only where r l = 0 too, so that l is right."""
+        if not self.one_sided:
+            return self.violation()
+        slack = np.divide(self.slope, 2.0 * self.weight, out=np.zeros_like(self.slope), where=self.weight > 0.0)
+        return np.abs(np.maximum(self.residual, -slack)) * self.mask
+
 
 class StateTerm(Term):
     """r = x (-) reference on all tangent components."""
@@ -69,6 +77,7 @@ class StateTerm(Term):
         first = (layout < 0) & (np.append(0, layout[:-1]) != layout)
         self._column = np.where(first, -(column + 1), column)
         self._sign = np.ones(layout.size)
+        self.columns = column
 
     def update(self, xs: Matrix, us: Matrix) -> None:
         state_residual(self._layout, xs, self.knots, self.reference, self.residual)
@@ -95,6 +104,7 @@ class PickTerm(Term):
         super().__init__(name, knots, weight, one_sided)
         self.reference = reference
         self._of_state, self._address, self._column, self._sign = pick
+        self.columns = self._column
         self._whole = not self._of_state and np.array_equal(self._address, np.arange(weight.shape[1]))
 
     def update(self, xs: Matrix, us: Matrix) -> None:

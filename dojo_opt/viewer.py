@@ -20,6 +20,7 @@ from sim.simulator import Simulator
 __all__ = ["save_html"]
 
 FRAMES = 60  # per second of the animation
+_THICK = 0.002  # of a drawn plane [m]
 
 _PAGE = """<!DOCTYPE html>
 <html>
@@ -31,6 +32,10 @@ _PAGE = """<!DOCTYPE html>
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
 for (const text of [{commands}])
     viewer.handle_command_bytearray(Uint8Array.from(atob(text), c => c.charCodeAt(0)));
+viewer.camera.position.set({eye});
+viewer.controls.target.set({target});
+viewer.controls.update();
+viewer.set_dirty();
 </script></body></html>
 """
 
@@ -40,16 +45,48 @@ def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = No
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401
-    from umsgpack import packb
 
     m = motion(result, simulator)
-    commands = [*_scene(m), _animation(m)]
+    target = Path(path)
+    target.write_text(_page(m, [*_ground(m), *_scene(m), _animation(m)]), encoding="utf-8")
+    return target
+
+
+def _page(m: Motion, commands: list[Any]) -> str:
+    """The page that shows the commands, with the camera beside the motion."""
+    from umsgpack import packb
+
     encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
     viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
-    page = _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded)
-    target = Path(path)
-    target.write_text(page, encoding="utf-8")
-    return target
+    low, high = m.position.min(axis=(0, 1)), m.position.max(axis=(0, 1))
+    target = 0.5 * (low + high)
+    eye = target + max(1.0, float(np.linalg.norm(high - low))) * np.array([0.5, -1.0, 0.4])
+    # the axes of MeshCat's camera: y is up
+    places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", target))}
+    return _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded, **places)
+
+
+def _ground(m: Motion) -> list[Any]:
+    """Commands that draw every plane that contacts touch; level ground at height zero is MeshCat's grid."""
+    from meshcat import geometry
+    from meshcat.commands import SetObject, SetTransform
+    from meshcat.path import Path as Node
+
+    planes = dict.fromkeys((tuple(np.round(np.asarray(c.normal), 9)), c.height) for c in m.mechanism.contacts)
+    commands = []
+    earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
+    for k, (normal, height) in enumerate(planes):
+        if (normal, height) == ((0.0, 0.0, 1.0), 0.0):
+            continue
+        n = np.asarray(normal)
+        side = np.cross(n, [0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0])
+        side /= np.linalg.norm(side)
+        place = np.eye(4)
+        place[:3, :3] = np.stack([side, np.cross(n, side), n], axis=1)
+        place[:3, 3] = (height - 0.5 * _THICK) * n
+        node = Node(("meshcat", "ground", str(k)))
+        commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]
+    return commands
 
 
 def _scene(m: Motion) -> list[Any]:
@@ -110,10 +147,12 @@ def _animation(m: Motion) -> Any:
     from meshcat.path import Path as Node
 
     clips = {}
-    frames = [float(t * FRAMES) for t in m.time]
+    # a plant steps more often than a screen: keys that no frame would show only make the file larger
+    every = max(1, int(1.0 / (FRAMES * (m.time[1] - m.time[0])) + 1e-9)) if len(m.time) > 1 else 1
+    frames = [float(t * FRAMES) for t in m.time[::every]]
     for k, body in enumerate(m.mechanism.bodies):
         clip = AnimationClip(fps=FRAMES)
-        for frame, position, quaternion in zip(frames, m.position[:, k], m.quaternion[:, k], strict=True):
+        for frame, position, quaternion in zip(frames, m.position[::every, k], m.quaternion[::every, k], strict=True):
             clip.set_property(frame, "position", "vector3", position.tolist())
             clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
         clips[Node(("meshcat", "bodies", body.name))] = clip

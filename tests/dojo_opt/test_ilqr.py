@@ -329,3 +329,40 @@ def test_bad_problems(change, message):
 def test_terms_must_be_terms():
     with pytest.raises(TypeError, match=r"Problem\(cost=...\): entry 0 is a float, not a term"):
         Problem(DoubleIntegrator(), [1.0, 0.0], 5, cost=[1.0])
+
+
+# what it does not depend on
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_multiple_of_the_costs_is_solved_alike(scale):
+    up = np.array([np.pi, 0.0])
+
+    def solve(factor):
+        cost = [Tracking(up, 0.1, scale=factor), Effort(0.01, scale=factor)]
+        return ilqr(Problem(Pendulum(), np.zeros(2), 30, cost=cost, constraints=[Goal(up)]))
+
+    plan, other = solve(1.0), solve(scale)
+    assert plan.success and other.success and other.nit == plan.nit
+    np.testing.assert_allclose(other.fun, scale * plan.fun, rtol=1e-6)
+
+
+def test_penalties_are_in_units_of_the_cost():
+    problem = Problem(
+        DoubleIntegrator(), [1.0, 0.0], 5, cost=[Tracking(np.zeros(2), [2.0, 0.0])], constraints=[Goal([0.0, 0.0])]
+    )
+    solver = Solver(problem, Options(penalty=10.0))
+    solver.objective.reset()
+    # half the penalty: 10 times the curvature 4 of the position; the velocity has no weight and takes the largest
+    np.testing.assert_allclose(problem.constraints[0].weight, [[20.0, 20.0]])
+
+
+def test_a_good_guess_of_states_skips_the_smooth_stages():
+    problem = Problem(SmoothedWall(), [1.0, 0.0], 20, cost=[Tracking([-1.0, 0.0], 1.0), Effort(0.01)])
+    plan = ilqr(problem)
+    assert plan.history[0]["kappa_eval"] == 3e-2
+    again = ilqr(problem, controls=plan.u, states=plan.x)
+    assert {r["kappa_eval"] for r in again.history} <= {1e-6}
+    poor = ilqr(problem, controls=plan.u, states=np.tile([1.0, 0.0], (21, 1)))
+    assert poor.history[0]["kappa_eval"] == 3e-2
+    assert again.success and poor.success

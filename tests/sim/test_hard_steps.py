@@ -46,7 +46,6 @@ def robustness():
     del sys.modules[spec.name]
 
 
-@pytest.mark.xfail(reason="states that the reference solves and the interior point still misses", strict=False)
 @pytest.mark.parametrize("cell", CELLS, ids=str)
 def test_extreme_state(robustness, cell):
     name, friction, h, kappa, number = cell

@@ -1,0 +1,100 @@
+"""FreeStart: the first state as a decision of its own, and what the end has to do with it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.periodic import PeriodicTerm
+from dojo_opt.problem import Problem
+from solvers.riccati import Quadratic
+
+Array = NDArray[np.float64]
+
+_CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
+_TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
+
+
+class FreeStart:
+    """Newton step of x_0, from the value function of the backward pass at t = 0.
+
+    Terms that couple the end to the start make the value of a state depend on the start dx_0 = s as well:
+
+        V(dx, s) = v dx + 1/2 dx^T V dx + w s + 1/2 s^T W s + dx^T X s,     du = k + K dx + S s
+
+    K and k are those of the pass without s. At t = 0, where dx = s, the minimum over s is the step of the start.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._free = problem.free_start
+        self._terms = [term for term in problem.constraints if isinstance(term, PeriodicTerm)]
+        self.step = np.zeros(problem.sim.ndx)
+
+    def solve(
+        self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array
+    ) -> tuple[Array, float, float]:
+        """(k + S s, d0 and d1 of the step with s); `step` is s, in tangent coordinates at the present start."""
+        T, m, n = K.shape
+        X, W, w, ends = self._couple(n, xs, us)
+        V, v = model.H[T, :n, :n], model.g[T, :n]
+        S = np.zeros((T, m, n))
+        for t in range(T - 1, -1, -1):
+            F = np.concatenate([model.A[t], model.B[t]], axis=1)
+            v = v + V @ model.gaps[t + 1]
+            w = w + X.T @ model.gaps[t + 1]
+            Q, q, R = model.H[t] + F.T @ V @ F, model.g[t] + F.T @ v, F.T @ X
+            Quu, Qux = Q[n:, n:], Q[n:, :n]
+            held = (k[t] <= model.lo[t]) | (k[t] >= model.hi[t])
+            free = np.flatnonzero(~held)
+            if free.size:
+                firm = (Quu + mu * np.diag(damping))[np.ix_(free, free)]
+                S[t, free] = -np.linalg.solve(firm, R[n + free])
+            W = W + S[t].T @ Quu @ S[t] + S[t].T @ R[n:] + R[n:].T @ S[t]
+            w = w + S[t].T @ (Quu @ k[t] + q[n:]) + R[n:].T @ k[t]
+            X = R[:n] + K[t].T @ (Quu @ S[t] + R[n:]) + Qux.T @ S[t]
+            v = q[:n] + K[t].T @ (Quu @ k[t] + q[n:]) + Qux.T @ k[t]
+            V = Q[:n, :n] + K[t].T @ (Quu @ K[t] + Qux) + Qux.T @ K[t]
+        self.step = self._newton(V + X + X.T + W, v + w, mu)
+        k = k + S @ self.step
+        return k, *self._predict(model, K, k, ends)
+
+    def _couple(self, n: int, xs: Array, us: Array) -> tuple[Array, Array, Array, list[tuple[Array, ...]]]:
+        """X, W, w at the end."""
+        X, W, w = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
+        ends: list[tuple[Array, ...]] = []
+        for term in self._terms:
+            end, start, first, second = term.coupling(xs, us)
+            X += end.T @ (second[:, None] * start)
+            W += start.T @ (second[:, None] * start)
+            w += start.T @ first
+            ends.append((end, start, first, second))
+        return X, W, w, ends
+
+    def _newton(self, H: Array, g: Array, mu: float) -> Array:
+        """-H^-1 g on the free components, each in units of its own curvature; directions without curvature are left."""
+        step = np.zeros(len(g))
+        H = 0.5 * (H + H.T)[np.ix_(self._free, self._free)]
+        own = np.diag(H)
+        unit = np.where(own > _CURVED**2 * own.max(), 1.0 / np.sqrt(np.maximum(own, 1e-100)), 0.0)
+        values, vectors = np.linalg.eigh(unit[:, None] * H * unit)
+        curved = values > _CURVED
+        along = vectors[:, curved].T @ (unit * g[self._free])
+        step[self._free] = -unit * (vectors[:, curved] @ (along / (values[curved] * (1.0 + _TRUST * mu))))
+        return step
+
+    def _predict(self, model: Quadratic, K: Array, k: Array, ends: list[tuple[Array, ...]]) -> tuple[float, float]:
+        """d0 and d1 of the step with s, from the linear rollout."""
+        T, _, n = K.shape
+        dx, d0, d1 = self.step, 0.0, 0.0
+        for t in range(T):
+            z = np.concatenate([dx, k[t] + K[t] @ dx])
+            d0 += float(model.g[t] @ z)
+            d1 += float(z @ model.H[t] @ z)
+            dx = model.gaps[t + 1] + model.A[t] @ dx + model.B[t] @ z[n:]
+        d0 += float(model.g[T, :n] @ dx)
+        d1 += float(dx @ model.H[T, :n, :n] @ dx)
+        for end, start, first, second in ends:
+            r0, rT = start @ self.step, end @ dx
+            d0 += float(first @ r0)
+            d1 += float(second @ (r0 * (r0 + 2.0 * rT)))
+        return d0, d1

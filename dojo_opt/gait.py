@@ -1,0 +1,114 @@
+"""Gait: a reference motion of a legged robot, with the feet that should carry it and the torques that would."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from dojo_opt.rest import input_map
+from dojo_opt.feet import Feet
+from sim.parts import Input, Joint
+from sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+Booleans = NDArray[np.bool_]
+
+__all__ = ["Gait"]
+
+_ALOFT = 100.0  # [m] where no foot feels the ground
+_FAR = 1e3  # [rad, m] where no joint feels its stops
+_EVEN = 1e-4  # weight of small foot forces against the balance of the base
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A motion along the time steps of a simulator. It is a reference: feet and base agree, forces need not.
+
+    The velocity of row t is that of the interval from t - 1 to t, as in every state; x[0] has that of the interval
+    before the motion, which for a periodic gait is the last one of a period.
+    """
+
+    name: str
+    simulator: Simulator
+    time: Array  # (T + 1,) [s]
+    x: Array  # (T + 1, nx)
+    feet: Array  # (T + 1, k, 3) centres of the feet [m]
+    contact: Booleans  # (T + 1, k) whether a foot is on the ground
+    foot_names: tuple[str, ...]  # names of the contacts
+
+    def torques(self, *, iterations: int = 3) -> Array:
+        """(T, nu) inputs by inverse dynamics: what moves the joints as the reference says while its feet carry it.
+
+        The generalised forces of the motion come from steps of the same mechanism in the air with an input on every
+        degree of freedom. Those of the base are balanced, as far as they can be, by small forces inside the friction
+        pyramids of the feet that are on the ground.
+        """
+        sim = self.simulator
+        tau = self._generalised_forces(iterations)
+        feet, B = Feet(sim, self.foot_names), input_map(sim)
+        J = feet.jacobian(self.x[1:])  # the forces of a step act at its end
+        base = ~B.any(axis=1)
+        us = np.empty((len(tau), sim.nu))
+        edges = _pyramid(feet)
+        for t in range(len(tau)):
+            carrying = self.contact[t + 1]
+            push = np.einsum("kec,kcv->kev", edges[carrying], J[t, carrying]).reshape(-1, sim.nv)
+            left = tau[t]
+            if len(push):
+                rows = np.concatenate([push[:, base].T, _EVEN * np.eye(len(push))])
+                share, _ = nnls(rows, np.concatenate([left[base], np.zeros(len(push))]))
+                left = left - push.T @ share
+            us[t] = np.linalg.lstsq(B, left, rcond=None)[0]
+        return us
+
+    def _generalised_forces(self, iterations: int) -> Array:
+        """(T, nv) forces that lead from each state to the velocity of the next, without the ground."""
+        mech = self.simulator.mechanism
+        joints = [_with_far_stops(j) for j in mech.joints]
+        driven = replace(mech, joints=joints, inputs=[Input(j.name, dof=d) for j in mech.joints for d in range(j.nv)])
+        sim = self.simulator.replace(mechanism=driven)
+        x = self.x.copy()
+        x[:, 2] += _ALOFT
+        tau = np.zeros((len(x) - 1, sim.nv))
+        for _ in range(iterations):
+            linear = sim.linearize_trajectory(x[:-1], tau)
+            missing = x[1:, sim.nq :] - linear.x_next[:, sim.nq :]
+            if np.any(linear.status):
+                t = int(np.flatnonzero(linear.status)[0])
+                raise ValueError(f"Gait.torques({self.name}): the reference cannot be followed at step {t}")
+            tau += np.linalg.solve(linear.B[:, sim.nv :], missing[..., None])[..., 0]
+        return tau
+
+
+def _with_far_stops(joint: Joint) -> Joint:
+    """The joint with its stops out of reach: they push when met, and a first guess of the forces meets them."""
+    far = [(-_FAR if np.isfinite(lo) else lo, _FAR if np.isfinite(hi) else hi) for lo, hi in joint.limits or ()]
+    return replace(joint, limits=far)
+
+
+def _pyramid(feet: Feet) -> Array:
+    """(k, 4, 3) edges of a pyramid inside the friction cone of every foot, unit normal force."""
+    out = np.empty((len(feet.names), 4, 3))
+    for k, contact in enumerate(feet.contacts):
+        n = feet.normal[k]
+        first = np.cross(n, [0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0])
+        first /= np.linalg.norm(first)
+        second = np.cross(n, first)
+        friction = contact.friction if contact.law != "impact" else 0.0
+        out[k] = n + friction * np.array([first, -first, second, -second])
+    return out
+
+
+def assemble(sim: Simulator, name: str, base: Array, feet: Array, contact: Booleans, *, names: tuple[str, ...]) -> Gait:
+    """Gait from the pose of the base (T + 2, 7) and the feet (T + 2, k, 3) at times -h, 0, ..., T h."""
+    x = np.tile(sim.neutral(), (len(base), 1))
+    x[:, :7] = base
+    x = Feet(sim, names).place(x, feet)
+    steps = sim.difference(x[1:], x[:-1])[:, : sim.nv]
+    x = x[1:]
+    x[:, sim.nq :] = steps / sim.time_step
+    time = sim.time_step * np.arange(len(x), dtype=np.float64)
+    return Gait(name, sim, time, x, feet[1:], contact[1:], names)

@@ -1,0 +1,227 @@
+"""Reference gaits of legged robots: stand, walk, trot, pace, bound, hop, turn, jump.
+
+Every function takes a simulator and gives a `Gait` along its time steps: base, feet, joint angles by inverse
+kinematics, and velocities that belong to them. The robot's first joint is its floating base, its feet are the contacts
+of the bodies at the ends of the tree. The base looks along x.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.feet import Feet
+from dojo_opt.footfall import Footfall
+from dojo_opt.gait import Gait, assemble
+from sim import checks
+from sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["Gait", "bound", "hop", "jump", "pace", "stand", "trot", "turn", "walk"]
+
+# share of the period at which a foot comes down, by (in front, on the left)
+_TROT = {(True, False): 0.0, (False, True): 0.0, (True, True): 0.5, (False, False): 0.5}
+_PACE = {(True, False): 0.0, (False, False): 0.0, (True, True): 0.5, (False, True): 0.5}
+_BOUND = {(False, False): 0.0, (False, True): 0.0, (True, False): 0.5, (True, True): 0.5}
+_WALK = {(False, True): 0.0, (True, True): 0.25, (False, False): 0.5, (True, False): 0.75}
+_HOP = dict.fromkeys(_TROT, 0.0)
+
+
+def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
+    """Diagonal feet together. Keywords of all periodic gaits:
+
+    speed, lateral [m/s]   of the base, forward and to the left
+    heading_rate [rad/s]   positive turns left
+    period [s]             a whole number of time steps
+    duty                   share of the period that a foot is on the ground
+    cycles                 number of periods
+    step_height [m]        by which a swinging foot is lifted
+    height [m]             of the base, on average; default: that of the neutral state
+    footholds (k, 2) [m]   from the base in the middle of a stance, forward and to the left; default: as in the neutral
+                           state
+    tilt [rad]             largest roll and pitch that the base may take from the change of its feet
+
+    ValueError when a foot cannot reach, or a joint would go beyond its limits.
+    """
+    return _periodic(sim, "trot", _TROT, speed=speed, period=period, duty=duty, **gait)
+
+
+def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float = 0.5, **gait: Any) -> Gait:
+    """Feet of the same side together; keywords as for `trot`."""
+    return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
+
+
+def bound(
+    sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
+) -> Gait:
+    """Hind feet together, then front feet, with a flight in between for duty < 0.5; keywords as for `trot`."""
+    return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
+
+
+def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
+    """One foot after the other: left hind, left front, right hind, right front; keywords as for `trot`."""
+    return _periodic(sim, "walk", _WALK, speed=speed, period=period, duty=duty, **gait)
+
+
+def hop(sim: Simulator, *, speed: float = 0.0, period: float = 0.5, duty: float = 0.5, **gait: Any) -> Gait:
+    """All feet together, again and again; keywords as for `trot`."""
+    return _periodic(sim, "hop", _HOP, speed=speed, period=period, duty=duty, **gait)
+
+
+def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **gait: Any) -> Gait:
+    """A trot that turns, by default on the spot; keywords as for `trot`."""
+    return trot(sim, **{"speed": 0.0, **gait}, heading_rate=heading_rate, period=period)
+
+
+def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None) -> Gait:
+    """All feet on the ground below the neutral state's, for `duration` [s], the base at rest at `height` [m]."""
+    steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
+    feet, ground = Feet(sim), _ground(sim)
+    base = np.tile(sim.neutral()[:7], (steps + 2, 1))
+    base[:, 2] = base[0, 2] if height is None else height
+    places = np.tile(ground, (steps + 2, 1, 1))
+    return assemble(sim, "stand", base, places, np.ones(places.shape[:2], dtype=bool), names=feet.names)
+
+
+def jump(
+    sim: Simulator,
+    *,
+    distance: float = 0.3,
+    height: float = 0.2,
+    crouch: float = 0.1,
+    clearance: float = 0.08,
+    before: float = 0.3,
+    after: float = 0.4,
+) -> Gait:
+    """From standing to standing `distance` [m] ahead, with the base rising by `height` [m] above standing.
+
+    The base sinks by `crouch` [m] within `before` [s], is pushed at constant acceleration back to where it stood, flies
+    with its feet drawn in by `clearance` [m], and comes to rest in the same way, within `after` [s].
+    """
+    call, h = "gaits.jump", sim.time_step
+    for name, value in (("height", height), ("crouch", crouch), ("before", before), ("after", after)):
+        checks.number(f"{call}({name}=...)", value, above=0.0)
+    speed = np.sqrt(2.0 * 9.81 * height)
+    sink, push, fly, rest = (max(1, round(d / h)) for d in (before, 2.0 * crouch / speed, 2.0 * speed / 9.81, after))
+    ends = np.cumsum([0, sink, push, fly, push, rest]) * h
+    t = h * np.arange(-1, round(ends[-1] / h) + 1)
+    forward, up = _jump_path(np.clip(t, 0.0, None), ends, distance, crouch, height)
+    base = np.tile(sim.neutral()[:7], (len(t), 1))
+    base[:, 0] += forward
+    base[:, 2] += up
+    share = np.clip((t - ends[2]) / (ends[3] - ends[2]), 0.0, 1.0)
+    feet = np.tile(_ground(sim), (len(t), 1, 1))
+    feet[..., 0] += distance * (0.5 * (1.0 - np.cos(np.pi * share)))[:, None]
+    feet[..., 2] += (np.maximum(up, 0.0) + clearance * np.sin(np.pi * share) ** 2)[:, None]
+    contact = np.repeat(((t <= ends[2] + 1e-9) | (t >= ends[3] - 1e-9))[:, None], feet.shape[1], axis=1)
+    return assemble(sim, "jump", base, feet, contact, names=Feet(sim).names)
+
+
+def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: float) -> tuple[Array, Array]:
+    """Base forward and up [m] over time: cosine, constant acceleration, parabola, and the same backwards."""
+    rise = np.zeros_like(t)
+    half = 0.5 * (ends[2] + ends[3])
+    backwards = np.interp(t, [half, *ends[3:]], [half, *ends[2::-1]])
+    mirrored = np.where(t <= half, t, backwards)
+    sinking = mirrored <= ends[1]
+    rise[sinking] = -0.5 * crouch * (1.0 - np.cos(np.pi * mirrored[sinking] / ends[1]))
+    pushed = (mirrored > ends[1]) & (mirrored <= ends[2])
+    rise[pushed] = -crouch + crouch * ((mirrored[pushed] - ends[1]) / (ends[2] - ends[1])) ** 2
+    flown = mirrored > ends[2]
+    rise[flown] = height * (1.0 - ((half - mirrored[flown]) / (half - ends[2])) ** 2)
+    # forward at constant acceleration while pushed, constant speed in the air
+    push, fly = ends[2] - ends[1], ends[3] - ends[2]
+    speed = distance / (fly + push)
+    into = np.clip(t - ends[1], 0.0, push)
+    out = np.clip(t - ends[3], 0.0, push)
+    forward = speed * (0.5 * into**2 / push + np.clip(t - ends[2], 0.0, fly) + out - 0.5 * out**2 / push)
+    return forward, rise
+
+
+def _ground(sim: Simulator) -> Array:
+    """(k, 3) feet of the neutral state, put onto the ground."""
+    feet = Feet(sim)
+    places = feet.positions(sim.neutral())
+    places[:, 2] -= feet.gaps(sim.neutral())
+    return places
+
+
+def _whole(call: str, duration: float, step: float) -> int:
+    """Number of time steps of a duration."""
+    count = round(checks.number(call, duration, above=0.0) / step)
+    if count < 1 or abs(count * step - duration) > 1e-6 * duration:
+        raise ValueError(f"{call}: expected a whole number of time steps of {step:g} s, got {duration:g} s")
+    return count
+
+
+def _periodic(
+    sim: Simulator,
+    name: str,
+    offsets: dict[tuple[bool, bool], float],
+    *,
+    speed: float,
+    period: float,
+    duty: float,
+    lateral: float = 0.0,
+    heading_rate: float = 0.0,
+    cycles: int = 2,
+    step_height: float = 0.05,
+    height: float | None = None,
+    footholds: ArrayLike | None = None,
+    tilt: float = 0.2,
+) -> Gait:
+    """A periodic gait; see `trot`."""
+    call = f"gaits.{name}"
+    if not 0.0 < duty < 1.0:
+        raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
+    if int(cycles) != cycles or cycles < 1:
+        raise ValueError(f"{call}(cycles=...): expected a positive number of periods, got {cycles}")
+    checks.number(f"{call}(step_height=...)", step_height, at_least=0.0)
+    steps = _whole(f"{call}(period=...)", period, sim.time_step) * int(cycles)
+    feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
+    places = ground[:, :2] - neutral[:2]
+    if footholds is not None:
+        places = checks.array(f"{call}(footholds=...)", footholds, places.shape)
+    middle = places.mean(axis=0)
+    offset = np.array([offsets[bool(x > middle[0]), bool(y > middle[1])] for x, y in places])
+    pattern = Footfall(
+        offset, duty, period, step_height, complex(speed, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
+    )
+    t = sim.time_step * np.arange(-1, steps + 1)
+    spot, heading = pattern.base(t)
+    sway = pattern.sway(t, _inertia(sim), tilt)
+    base = np.empty((len(t), 7))
+    base[:, :3] = np.stack([spot.real, spot.imag, sway[:, 0] + (neutral[2] if height is None else height)], axis=1)
+    base[:, :2] += neutral[:2]
+    base[:, 3:] = _attitude(heading, sway[:, 2], sway[:, 1])
+    where, lift = pattern.feet(t)
+    targets = np.stack([where.real + neutral[0], where.imag + neutral[1], lift + ground[:, 2]], axis=2)
+    return assemble(sim, name, base, targets, pattern.contact(t), names=feet.names)
+
+
+def _attitude(yaw: Array, pitch: Array, roll: Array) -> Array:
+    """Quaternions (n, 4) of a turn about z, then y, then x, each in the axes of the one before."""
+    (a, b, c), (d, e, f) = (np.cos([yaw / 2, pitch / 2, roll / 2]), np.sin([yaw / 2, pitch / 2, roll / 2]))
+    return np.stack(
+        [a * b * c + d * e * f, a * b * f - d * e * c, a * e * c + d * b * f, d * b * c - a * e * f], axis=1
+    )
+
+
+def _inertia(sim: Simulator) -> tuple[float, float, float]:
+    """Mass [kg], and moments of inertia about x and y at the base [kg m^2], in the neutral configuration."""
+    x = sim.neutral()
+    mass = sum(body.mass for body in sim.mechanism.bodies)
+    rest = sim.momentum(x)[1]
+    moments = []
+    for axis in (0, 1):
+        spun = x.copy()
+        spun[:3] = 0.0
+        spun[sim.nq + 3 + axis] = 1e-3
+        still = x.copy()
+        still[:3] = 0.0
+        moments.append((sim.momentum(spun)[1][axis] - sim.momentum(still)[1][axis]) / 1e-3)
+    del rest
+    return float(mass), float(moments[0]), float(moments[1])

@@ -1,0 +1,133 @@
+"""`closed_loop`: a controller and a plant over time, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.plant import Plant
+from dojo_opt.tick import Tick
+from sim import checks
+from sim.results import Contacts
+from sim.simulator import Simulator
+from solvers.status import MESSAGES, Status
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Controller = Callable[[float, Vector], ArrayLike]
+
+__all__ = ["ClosedLoop", "closed_loop"]
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """What happened, up to the end, a fall, or the first step of the plant that could not be solved."""
+
+    simulator: Simulator  # of the plant, perturbation included
+    time: Vector  # (N + 1,) [s]
+    x: Matrix  # (N + 1, nx) true states
+    u: Matrix  # (N, nu of the plant) inputs that acted, pushes included [N, N m]
+    status: Integers  # (N,) or (N + 1,) Status of every step that was tried
+    contacts: Contacts  # of every step, world axes
+    survived: bool
+    message: str
+    softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
+    log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
+    reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
+
+    @property
+    def duration(self) -> float:
+        """How long it lasted [s]."""
+        return float(self.time[-1])
+
+    def error(self) -> Matrix:
+        """(N + 1, nv) true (-) reference coordinates over time [m, rad]."""
+        if self.reference is None:
+            raise ValueError("ClosedLoop.error: there is no reference; give closed_loop(reference=...)")
+        sim = self.simulator
+        return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
+
+    def rms(self, components: ArrayLike = (0, 1)) -> float:
+        """Root of the mean square of the distance from the reference in these coordinates [m], x and y by default."""
+        return float(np.sqrt(np.mean(np.sum(self.error()[:, np.asarray(components)] ** 2, axis=1))))
+
+
+def closed_loop(
+    controller: Controller,
+    plant: Plant,
+    duration: float,
+    *,
+    control_step: float | None = None,
+    reference: Any = None,
+    fallen: Callable[[Vector], bool] | None = None,
+) -> ClosedLoop:
+    """Run u = controller(time, measured state) on the plant, from the start of both, for `duration` [s].
+
+    controller    an `MPC`, which is reset, or any function; asked every control_step [s], by default every time step of
+                  the plant, its answer held in between
+    reference     times (n,) -> states (n, nx) for the error; that of the controller by default
+    fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
+    """
+    h = plant.sim.time_step
+    steps = round(checks.number("closed_loop(duration)", duration, above=0.0) / h)
+    every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)
+    if every < 1 or (control_step is not None and abs(every * h - control_step) > 1e-9):
+        raise ValueError(
+            f"closed_loop(control_step=...): expected a multiple of the plant's step {h:g} s, got {control_step}"
+        )
+    lies = plant.fallen if fallen is None else fallen
+    plant.reset()
+    if hasattr(controller, "reset"):
+        controller.reset()
+    xs, us = [plant.x], []
+    touches: list[Contacts] = []
+    status: list[int] = []
+    message, survived = "Ran to the end.", True
+    command = np.zeros(plant.sim.nu)
+    for k in range(steps):
+        if k % every == 0:
+            command = checks.array(
+                "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
+            )
+        u, result = plant.step(command)
+        status.append(int(result.status))
+        if result.status != Status.SOLVED:
+            message, survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
+            break
+        xs.append(plant.x)
+        us.append(u)
+        touches.append(result.contacts)
+        if lies(plant.x):
+            message, survived = f"Fell at {plant.time:.3f} s.", False
+            break
+    if reference is None:
+        reference = getattr(getattr(controller, "references", None), "state", None)
+    return ClosedLoop(
+        simulator=plant.simulator,
+        time=h * np.arange(len(xs), dtype=np.float64),
+        x=np.array(xs),
+        u=np.array(us).reshape(len(us), plant.simulator.nu),
+        status=np.array(status, dtype=np.int64),
+        contacts=_stacked(plant.simulator, touches),
+        survived=survived,
+        message=message,
+        softened=plant.softened,
+        log=tuple(getattr(controller, "log", ())),
+        reference=reference,
+    )
+
+
+def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:
+    """The contacts of single steps, one after the other."""
+    shapes = {"impulse": (3,), "point": (3,), "gap": (), "slip": ()}
+    arrays = {
+        name: np.array([getattr(c, name) for c in steps], dtype=np.float64).reshape(len(steps), sim.ncontact, *shape)
+        for name, shape in shapes.items()
+    }
+    mech = sim.mechanism
+    return Contacts(mech.contact_names, mech.contact_normals, sim.time_step, **arrays)

@@ -1,0 +1,152 @@
+"""Moving references: what a receding horizon is to track, as functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.problem import Problem
+from dojo_opt.term import PickTerm, StateTerm
+from sim import checks
+from sim.simulator import Simulator
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
+
+_ROUNDING = 1e-9  # laps: times are sums of floating-point steps
+
+__all__ = ["References", "Sampled"]
+
+
+class Sampled:
+    """A trajectory as a function of time: rows at `time`, on the way between two of them, the last one from then on.
+
+    rows (n, nx) are states of `sim` and interpolated on their manifold; with sim=None they are any numbers. With a
+    `cycle`, a state change (ndx,) or a change of a row such as the advance of a gait, the trajectory goes round: its
+    last row is its first one, moved on, and it has neither beginning nor end.
+    """
+
+    def __init__(
+        self, time: ArrayLike, rows: ArrayLike, sim: Simulator | None = None, cycle: ArrayLike | None = None
+    ) -> None:
+        self.time = checks.array("Sampled(time)", time, (None,))
+        width = None if sim is None else sim.nx
+        self.rows = checks.array("Sampled(rows)", rows, (len(self.time), width))
+        if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
+            raise ValueError("Sampled(time): expected at least two times, growing")
+        self._sim = sim
+        self._steps = np.diff(self.rows, axis=0) if sim is None else sim.difference(self.rows[1:], self.rows[:-1])
+        size = self.rows.shape[1] if sim is None else sim.ndx
+        self.cycle = None if cycle is None else checks.array("Sampled(cycle=...)", cycle, (size,))
+        self._one_move = sim is not None and self.cycle is not None and self._commutes(sim, self.cycle)
+
+    def _commutes(self, sim: Simulator, cycle: Vector) -> bool:
+        """Whether the cycle does not turn anything: then it can be added to the step between two rows."""
+        before, steps = self.rows[:-1], self._steps
+        apart = sim.integrate(sim.integrate(before, steps), cycle)
+        return bool(np.abs(apart - sim.integrate(before, steps + cycle)).max() < 1e-12)
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """Rows (n, width) at the times (n,)."""
+        t = np.asarray(times, dtype=np.float64)
+        first, last = self.time[0], self.time[-1]
+        laps = np.zeros(len(t))
+        if self.cycle is not None:
+            laps = np.floor((t - first) / (last - first) + _ROUNDING)
+            t = t - laps * (last - first)
+        at = np.clip(t, first, last)
+        i = np.clip(np.searchsorted(self.time, at, side="right") - 1, 0, len(self.time) - 2)
+        f = ((at - self.time[i]) / (self.time[i + 1] - self.time[i]))[:, None]
+        before, step = self.rows[i], f * self._steps[i]
+        if self._sim is None:
+            return before + step if self.cycle is None else before + step + laps[:, None] * self.cycle
+        if self.cycle is None:
+            return self._sim.integrate(before, step)
+        if self._one_move:
+            return self._sim.integrate(before, step + laps[:, None] * self.cycle)
+        return self._sim.integrate(self._sim.integrate(before, step), laps[:, None] * self.cycle)
+
+    def over(self, interval: float) -> Sampled:
+        """The same states with velocities that are the mean ones over `interval` [s], such as the step of a model.
+
+        A gait sampled finely has its touchdowns where they are, but the velocities of its own short steps.
+        """
+        if self._sim is None or self.cycle is None:
+            raise ValueError(
+                "Sampled.over: needs states (sim=...) and a cycle, so that there is a time before the first"
+            )
+        sim, h = self._sim, checks.number("Sampled.over(interval)", interval, above=0.0)
+        then = self(self.time - h)
+        rows = self.rows.copy()
+        rows[:, sim.nq :] = sim.difference(rows, then)[:, : sim.nv] / h
+        return Sampled(self.time, rows, sim, self.cycle)
+
+
+class References:
+    """The costs of a problem whose references move, and the functions that move them.
+
+    given: one function or trajectory for all `Tracking` costs, or {index of a cost: function or trajectory} for
+    `Tracking` and `Effort`. A function takes times (n,) [s] and returns rows (n, nx) or (n, nu); a trajectory is rows
+    one knot apart, or anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero.
+    """
+
+    def __init__(self, problem: Problem, given: Any) -> None:
+        self._h = problem.knot_time
+        self._sim = problem.sim
+        table = dict(given) if isinstance(given, Mapping) else {}
+        if given is not None and not table:
+            table = {i: given for i, term in enumerate(problem.costs) if isinstance(term, StateTerm)}
+            if not table:
+                raise ValueError("MPC(reference=...): the problem has no Tracking cost")
+        self._moving: list[tuple[StateTerm | PickTerm, Moving]] = []
+        for index, value in table.items():
+            call = f"MPC(reference={{{index!r}: ...}})"
+            if not isinstance(index, int | np.integer) or not 0 <= index < len(problem.costs):
+                raise ValueError(f"{call}: expected the index of a cost, 0 to {len(problem.costs) - 1}")
+            term = problem.costs[index]
+            if not isinstance(term, StateTerm | PickTerm):
+                raise ValueError(f"{call}: a {term.name} has no reference that can move")
+            self._moving.append((term, self._function(call, value, isinstance(term, StateTerm))))
+        self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
+        self._call_checked(0.0)
+        self._begin = np.nan  # [s] of the first knot
+
+    def _function(self, call: str, value: Any, of_states: bool) -> Moving:
+        if callable(value):
+            return value
+        if hasattr(value, "x") and hasattr(value, "time"):
+            return Sampled(value.time, value.x, self._sim)
+        rows = checks.array(call, value, (None, self._sim.nx if of_states else self._sim.nu))
+        return Sampled(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)
+
+    def _call_checked(self, time: float) -> None:
+        """Once at the border: every function returns what its cost can use."""
+        for term, function in self._moving:
+            times = time + self._h * term.knots
+            checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
+
+    def move(self, time: float, rise: float = 0.0) -> None:
+        """Let the first knot of every reference be at `time` [s], and a floating base be higher by `rise` [m]."""
+        self._begin = time
+        for term, function in self._moving:
+            term.reference[:] = function(time + self._h * term.knots)
+            if rise and isinstance(term, StateTerm):
+                term.reference[:, 2] += rise
+
+    def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
+        """Rows (count, width) of the first reference of that kind at begin, begin + h, ...; None when none moves.
+
+        Those of the present horizon are not computed again. States are `rise` higher then, as all others of it.
+        """
+        for term, function in self._moving:
+            if isinstance(term, kind):
+                first = (begin - self._begin) / self._h - term.knots[0]
+                k = round(first) if np.isfinite(first) else -1
+                if abs(first - k) < 1e-6 and 0 <= k <= len(term.knots) - count and np.all(np.diff(term.knots) == 1):
+                    return term.reference[k : k + count]
+                return np.asarray(function(begin + self._h * np.arange(float(count))))
+        return None

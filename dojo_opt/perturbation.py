@@ -1,0 +1,156 @@
+"""Perturbation: in what a plant differs from the model that MPC plans with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.mechanism import Mechanism, with_contacts
+from sim.parts import Input
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["Perturbation", "Push"]
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force on a body at its centre of mass for `duration` [s] from `time` [s] on, with the given impulse [N s].
+
+    impulse: (3,) world axes. body: by name; the first one by default.
+    """
+
+    time: float
+    impulse: ArrayLike
+    body: str | None = None
+    duration: float = 0.02
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", checks.number("Push(time=...)", self.time))
+        object.__setattr__(self, "impulse", checks.vector("Push(impulse=...)", self.impulse, 3))
+        object.__setattr__(self, "duration", checks.number("Push(duration=...)", self.duration, above=0.0))
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Differences between plant and model; every field on its own, all zero or None by default."""
+
+    offset: ArrayLike = ()  # (ndx,) change of the initial state; () for none
+    pushes: Sequence[Push] = ()
+    payload: float = 0.0  # mass added to `payload_body` at its centre of mass [kg]
+    payload_body: str | None = None  # by name; the first body by default
+    payload_inertia: ArrayLike = 0.0  # added likewise: a number or (3,) principal moments [kg m^2]
+    friction: float | None = None  # coefficient of all contacts
+    damping: float = 1.0  # factor of the dampers of all joints
+    slope: float = 0.0  # the ground rises by this angle [rad]
+    slope_heading: float = 0.0  # towards this direction, from x to y [rad]
+    ground_height: float = 0.0  # [m]
+    delay: float = 0.0  # from a command to the moment it acts [s]
+    noise: ArrayLike = 0.0  # standard deviation of the measured state: a number or (ndx,) [m, rad, m/s, rad/s]
+    control_limits: tuple[ArrayLike, ArrayLike] | None = None  # of what the actuators do with a command
+    seed: int = 0  # of the noise
+
+    def __post_init__(self) -> None:
+        call = "Perturbation"
+        for name in ("payload", "damping", "delay"):
+            checks.number(f"{call}({name}=...)", getattr(self, name), at_least=0.0)
+        if self.friction is not None:
+            checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
+        if not abs(checks.number(f"{call}(slope=...)", self.slope)) < 0.5 * np.pi:
+            raise ValueError(f"{call}(slope=...): expected less than a right angle, got {self.slope:g} rad")
+        for push in self.pushes:
+            if not isinstance(push, Push):
+                raise TypeError(f"{call}(pushes=...): expected a sequence of Push, got {push!r}")
+        object.__setattr__(self, "pushes", tuple(self.pushes))
+
+    @property
+    def normal(self) -> Vector:
+        """(3,) outward normal of the ground."""
+        sine = np.sin(self.slope)
+        level = np.array([np.cos(self.slope_heading), np.sin(self.slope_heading), 0.0])
+        return np.cos(self.slope) * np.array([0.0, 0.0, 1.0]) - sine * level
+
+    def pushed(self, mechanism: Mechanism) -> tuple[str, ...]:
+        """Names of the bodies that are pushed."""
+        names = (
+            checks.one_of("Push(body=...)", p.body or mechanism.body_names[0], mechanism.body_names)
+            for p in self.pushes
+        )
+        return tuple(dict.fromkeys(names))
+
+    def mechanism(self, mechanism: Mechanism) -> Mechanism:
+        """The mechanism of the plant; three inputs, forces along x, y, z, are added for every body that is pushed."""
+        bodies = list(mechanism.bodies)
+        if self.payload > 0.0 or np.any(self.payload_inertia):
+            name = checks.one_of(
+                "Perturbation(payload_body=...)", self.payload_body or bodies[0].name, mechanism.body_names
+            )
+            i = mechanism.body_names.index(name)
+            added = np.diag(np.broadcast_to(np.asarray(self.payload_inertia, dtype=float), (3,)))
+            inertia = np.asarray(bodies[i].inertia) + added
+            bodies[i] = replace(bodies[i], mass=bodies[i].mass + self.payload, inertia=inertia)
+        joints = [replace(j, damper=self.damping * np.asarray(j.damper)) for j in mechanism.joints]
+        contacts: Any = mechanism.contacts
+        if self.slope or self.ground_height:
+            turn = _rotation(self.slope, self.slope_heading)
+            contacts = [
+                replace(c, normal=turn @ np.asarray(c.normal), height=c.height + self.ground_height) for c in contacts
+            ]
+        inputs = list(mechanism.inputs or ())
+        for name in self.pushed(mechanism):
+            for axis, force in zip("xyz", np.eye(3), strict=True):
+                inputs.append(Input(body=name, force=force, name=f"push {name} {axis}"))
+        changed = replace(mechanism, bodies=bodies, joints=joints, contacts=contacts, inputs=inputs)
+        return changed if self.friction is None else with_contacts(changed, "friction", self.friction)
+
+    def push_forces(self, mechanism: Mechanism, begin: float, end: float) -> Vector:
+        """Mean forces over [begin, end] of the inputs that `mechanism` adds, (3 pushed bodies,) [N]."""
+        names = self.pushed(mechanism)
+        out = np.zeros((len(names), 3))
+        for push in self.pushes:
+            overlap = min(end, push.time + push.duration) - max(begin, push.time)
+            if overlap > 0.0:
+                share = overlap / (push.duration * (end - begin))
+                out[names.index(push.body or mechanism.body_names[0])] += share * np.asarray(push.impulse)
+        return out.ravel()
+
+    def on_ground(self, mechanism: Mechanism, x: Vector) -> Vector:
+        """The state x of a robot on level ground, moved and turned with the ground: the same feet touch it."""
+        if not (self.slope or self.ground_height):
+            return x
+        first = mechanism.joints[0]
+        if first.kind != "floating":
+            raise ValueError(
+                f"Perturbation(slope=..., ground_height=...): needs a robot on a floating base, but joint "
+                f"{first.name!r} is {first.kind}"
+            )
+        turn = _rotation(self.slope, self.slope_heading)
+        axis = np.array([np.sin(self.slope_heading), -np.cos(self.slope_heading), 0.0])
+        half = 0.5 * self.slope
+        out, v = x.copy(), mechanism.nq
+        out[:3] = turn @ x[:3] + self.ground_height * turn[:, 2]
+        out[3:7] = _product(np.concatenate([[np.cos(half)], np.sin(half) * axis]), x[3:7])
+        out[v : v + 3] = turn @ x[v : v + 3]
+        return out
+
+
+def _rotation(slope: float, heading: float) -> Matrix:
+    """Turns level ground into ground that rises by `slope` towards `heading`."""
+    c, s, u, w = np.cos(slope), np.sin(slope), np.cos(heading), np.sin(heading)
+    along, across, up = np.array([u, w, 0.0]), np.array([-w, u, 0.0]), np.array([0.0, 0.0, 1.0])
+    new = c * along + s * up, across, c * up - s * along
+    return np.asarray(np.outer(new[0], along) + np.outer(new[1], across) + np.outer(new[2], up))
+
+
+def _product(a: Vector, b: Vector) -> Vector:
+    """Hamilton product of two quaternions."""
+    out = np.empty(4)
+    out[0] = a[0] * b[0] - a[1:] @ b[1:]
+    out[1:] = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return out

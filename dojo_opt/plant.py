@@ -1,0 +1,125 @@
+"""Plant: what a controller controls, a simulator that differs from the controller's model."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.perturbation import Perturbation
+from sim import checks
+from sim.results import StepResult
+from sim.simulator import Simulator
+
+Vector = NDArray[np.float64]
+
+__all__ = ["Plant"]
+
+_SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
+_LOW = 0.5  # fallen: below this share of the first height,
+_TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
+
+
+class Plant:
+    """A robot in the world: measured, commanded, pushed.
+
+    sim           mechanism, time step and smoothing of the plant before the perturbation: usually those of the model
+                  with a time step five to fifty times shorter and kappa=1e-8
+    start         state (nx,) at time zero on level ground; the standing one by default
+    perturbation  what is different; or its fields by name:  Plant(sim, payload=3.0, delay=0.02)
+
+    `simulator` is the perturbed one. It has three more inputs for every body that is pushed. A step that it cannot
+    solve is tried again with softer contact, up to a thousand times its kappa; `softened` counts those steps.
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        start: ArrayLike | None = None,
+        perturbation: Perturbation | None = None,
+        **fields: Any,
+    ) -> None:
+        if perturbation is not None and fields:
+            raise ValueError(f"Plant(perturbation=...): give either it or its fields, got also {', '.join(fields)}")
+        self.sim = sim
+        self.start = sim.neutral() if start is None else checks.array("Plant(start=...)", start, (sim.nx,))
+        self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation
+        self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
+        self.normal = p.normal
+        self._noise = np.array(np.broadcast_to(np.asarray(p.noise, dtype=float), (sim.ndx,)))
+        lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
+        self._limits = tuple(np.broadcast_to(np.asarray(b, dtype=float), (sim.nu,)) for b in (lo, hi))
+        self._late = round(p.delay / sim.time_step)
+        if abs(self._late * sim.time_step - p.delay) > 1e-9:
+            raise ValueError(
+                f"Plant(delay=...): expected a multiple of the time step {sim.time_step:g} s, got {p.delay:g} s"
+            )
+        x = self.start if len(np.atleast_1d(p.offset)) == 0 else sim.integrate(self.start, p.offset)
+        self._x0 = p.on_ground(sim.mechanism, x)
+        self.reset()
+
+    def perturbed(self, perturbation: Perturbation) -> Plant:
+        """The same robot under another perturbation."""
+        return Plant(self.sim, self.start, perturbation)
+
+    def reset(self) -> None:
+        """Back to the start."""
+        self.x = self._x0.copy()
+        self.steps = 0
+        self.softened = 0
+        self._random = np.random.default_rng(self.perturbation.seed)
+        self._waiting: deque[Vector] = deque()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self.steps * self.sim.time_step
+
+    def measure(self) -> Vector:
+        """The state (nx,) with noise."""
+        if not self._noise.any():
+            return self.x
+        return self.sim.integrate(self.x, self._noise * self._random.standard_normal(self.sim.ndx))
+
+    def step(self, command: Vector) -> tuple[Vector, StepResult]:
+        """(inputs that acted, result) of one time step; a step that is not solved leaves the state as it was."""
+        self._waiting.append(command)
+        if len(self._waiting) > self._late:
+            acting = self._waiting.popleft()
+        else:
+            acting = self._waiting[0]  # what was commanded first also acted before
+        u = np.clip(acting, *self._limits)
+        if self.perturbation.pushes:
+            end = self.time + self.sim.time_step
+            u = np.concatenate([u, self.perturbation.push_forces(self.sim.mechanism, self.time, end)])
+        result = self.simulator.step(self.x, u)
+        if not result.success:
+            result = self._soften(u, result)
+        if result.success:
+            self.x = result.x
+            self.steps += 1
+        return u, result
+
+    def _soften(self, u: Vector, result: StepResult) -> StepResult:
+        """The step with the hardest contact at which it can be solved."""
+        for factor in _SOFTER:
+            softer = self.simulator.replace(kappa=factor * self.simulator.kappa).step(self.x, u)
+            if softer.success:
+                self.softened += 1
+                return softer
+        return result
+
+    def fallen(self, x: Vector) -> bool:
+        """Whether a robot on a floating base lies: below half its first height, or tilted by more than 60 degrees.
+
+        A robot without a floating base never does.
+        """
+        if self.sim.mechanism.joints[0].kind != "floating":
+            return False
+        w, i, j, k = x[3:7]
+        up = np.array([2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)])
+        floor = self.perturbation.ground_height
+        height = self.normal @ x[:3] - floor
+        return bool(height < _LOW * (self.normal @ self._x0[:3] - floor) or up @ self.normal < _TILTED)

@@ -1,0 +1,97 @@
+"""Equilibrium: a state in which a robot stands still, and the joint torques that hold it there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from dojo_opt.feet import Feet
+from sim.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["equilibrium", "input_map", "potential_gradient"]
+
+_STEP = 1e-5
+_EVEN = 1e-6  # weight of the sharing of the load against its balance
+_NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
+
+
+def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
+    """dV/dq (..., nv) of gravity and springs at the coordinates of x (..., nx), by central differences [N, N m]."""
+    rest = np.array(x, dtype=float)
+    rest[..., sim.nq :] = 0.0
+    steps = np.zeros((2 * sim.nv, sim.ndx))
+    steps[: sim.nv, : sim.nv] = _STEP * np.eye(sim.nv)
+    steps[sim.nv :] = -steps[: sim.nv]
+    moved = sim.integrate(rest[..., None, :], steps)
+    V = np.asarray(sim.energy(moved)) - np.asarray(sim.kinetic_energy(moved))
+    return np.asarray((V[..., : sim.nv] - V[..., sim.nv :]) / (2.0 * _STEP))
+
+
+def input_map(sim: Simulator) -> Array:
+    """(nv, nu) generalised forces per unit of every input; ValueError when one acts on a body."""
+    out = np.zeros((sim.nv, sim.nu))
+    for k, part in enumerate(sim.mechanism.inputs or ()):
+        if part.joint is None:
+            raise ValueError(f"equilibrium({sim.mechanism.name}): input {part.name!r} acts on a body, not on a joint")
+        out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = 1.0
+    return out
+
+
+def stop_torques(sim: Simulator, x: Array) -> Array:
+    """(nv,) mean torque of the joint stops at rest, kappa / (h distance) away from each [N, N m]."""
+    out = np.zeros(sim.nv)
+    for joint in sim.mechanism.joints:
+        if joint.nrot == 3:
+            continue
+        q, at = x[sim.mechanism.q_slice(joint.name)], sim.mechanism.v_slice(joint.name)
+        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
+        out[at] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
+    return out
+
+
+def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
+    """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
+
+    The contacts press straight down, so nothing creeps, and share the load as evenly as balance allows; the joints
+    carry what gravity and springs leave. On the central path a contact with normal impulse g floats kappa / g above the
+    ground: the state is moved to those heights. ValueError when no such forces exist: the centre of mass is not above
+    the feet, a joint without input would have to carry something, or the smoothing is so large that contacts far above
+    the ground carry the weight.
+
+    Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
+    """
+    mech = sim.mechanism
+    feet, B = Feet(sim, mech.contact_names), input_map(sim)
+    state = np.array(sim.neutral() if x is None else x, dtype=float)
+    state[sim.nq :] = 0.0
+    free = ~B.any(axis=1)
+    u, left = np.zeros(sim.nu), np.zeros(sim.nv)
+    weight = float(np.abs(potential_gradient(sim, state)).max())
+    for _ in range(iterations):
+        down = np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
+        gap = feet.gaps(state)
+        touching = gap < gap.min() + _NEAR
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * np.maximum(gap, _NEAR)))
+        load = potential_gradient(sim, state) - stop_torques(sim, state) - down.T @ afar
+        rows = np.concatenate([(down[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
+        force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
+        left = load - down.T @ force
+        u = np.linalg.lstsq(B, left, rcond=None)[0]
+        loaded = force > 1e-3 * weight
+        wanted = sim.kappa / (sim.time_step * force[loaded])
+        error = wanted - gap[loaded]
+        if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
+            break
+        move = np.zeros(sim.ndx)
+        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=None)[0]
+        state = sim.integrate(state, move)
+    if np.abs(left[free]).max() > 1e-3 * weight:
+        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
+        raise ValueError(
+            f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
+            f"weight: {left[k]:.3g} N or N m is left at degree of freedom {k}"
+        )
+    return state, u

@@ -1,0 +1,151 @@
+"""Monte Carlo: closed loops under disturbances drawn from a seed, and how many the robot survives."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.loop import closed_loop
+from dojo_opt.perturbation import Perturbation
+from dojo_opt.plant import Plant
+from dojo_opt.tick import Tick, milliseconds
+from sim import checks
+
+Vector = NDArray[np.float64]
+Sampler = Callable[[np.random.Generator], Perturbation]
+
+__all__ = ["Outcome", "Study", "monte_carlo", "wilson_interval"]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run."""
+
+    survived: bool
+    message: str
+    duration: float  # [s]
+    rms: float  # distance from the reference in x and y over time [m]; NaN without a reference
+    x: Vector  # (nx,) last state
+    log: Sequence[Tick]
+    perturbation: Perturbation
+    softened: int  # steps of the plant that needed softer contact than its own, see `Plant`
+
+
+@dataclass(frozen=True)
+class Study:
+    """All runs, in the order of their numbers."""
+
+    outcomes: Sequence[Outcome]
+    duration: float  # that each run was meant to last [s]
+    seed: int
+
+    @property
+    def survived(self) -> int:
+        """Number of runs that lasted."""
+        return sum(outcome.survived for outcome in self.outcomes)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the probability to survive."""
+        return wilson_interval(self.survived, len(self.outcomes))
+
+    @property
+    def milliseconds(self) -> Vector:
+        """Times of all ticks but the first of every run [ms]."""
+        return np.concatenate([milliseconds(outcome.log) for outcome in self.outcomes] or [np.zeros(0)])
+
+    @property
+    def rms(self) -> Vector:
+        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m]."""
+        return np.array([o.rms if o.survived else np.nan for o in self.outcomes])
+
+    def summary(self) -> str:
+        """One line."""
+        lo, hi = self.interval
+        text = f"{self.survived} of {len(self.outcomes)} survive {self.duration:g} s (95 %: {lo:.3f} to {hi:.3f})"
+        ms, lasted = self.milliseconds, self.rms[np.isfinite(self.rms)]
+        if lasted.size:
+            text += f", rms xy median {np.median(lasted):.3f} m, largest {lasted.max():.3f} m"
+        if ms.size:
+            fallbacks = sum(tick.fallback for o in self.outcomes for tick in o.log)
+            text += f"; tick median {np.median(ms):.2f} ms, 99 % {np.percentile(ms, 99):.2f} ms, {fallbacks} fallbacks"
+        return text
+
+
+def monte_carlo(
+    controller: Any,
+    plant: Plant,
+    sampler: Sampler,
+    duration: float,
+    *,
+    runs: int = 100,
+    seed: int = 0,
+    executor: Executor | None = None,
+    control_step: float | None = None,
+) -> Study:
+    """Run the closed loop `runs` times for `duration` [s], each under a perturbation drawn by the sampler.
+
+    controller  an `MPC`, or a function of (time, x) without memory
+    sampler     generator -> Perturbation; with an executor that uses processes, a function or object they can import
+    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
+                context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
+
+    Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
+    number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
+    """
+    count = checks.number("monte_carlo(runs=...)", runs, above=0.0)
+    if count != int(count):
+        raise ValueError(f"monte_carlo(runs=...): expected a whole number, got {runs!r}")
+    children = np.random.SeedSequence(seed).spawn(int(count))
+    tasks = [(controller, plant, sampler, float(duration), control_step, child) for child in children]
+    if executor is None:
+        return Study([_run(*task) for task in tasks], float(duration), seed)
+    futures = [executor.submit(_run, *task) for task in tasks]
+    return Study([future.result() for future in futures], float(duration), seed)
+
+
+def _run(
+    controller: Any,
+    plant: Plant,
+    sampler: Sampler,
+    duration: float,
+    control_step: float | None,
+    seed: np.random.SeedSequence,
+) -> Outcome:
+    """One run; at module level, so that other processes can import it."""
+    perturbation = sampler(np.random.default_rng(seed))
+    own = controller.fresh() if hasattr(controller, "fresh") else copy.copy(controller)
+    loop = closed_loop(own, plant.perturbed(perturbation), duration, control_step=control_step)
+    return Outcome(
+        survived=loop.survived,
+        message=loop.message,
+        duration=loop.duration,
+        rms=float("nan") if loop.reference is None else loop.rms(),
+        x=loop.x[-1],
+        log=loop.log,
+        perturbation=perturbation,
+        softened=loop.softened,
+    )
+
+
+def wilson_interval(successes: int, runs: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Interval of a probability after `successes` in `runs` trials.   Wilson 1927.
+
+    (p + z^2/2n +- z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n),   p = successes/n
+    """
+    if not 0 <= successes <= runs or runs < 1:
+        raise ValueError(f"wilson_interval: expected 0 <= successes <= runs and runs >= 1, got {successes} of {runs}")
+    z = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+    p, n = successes / runs, float(runs)
+    centre = p + z * z / (2.0 * n)
+    spread = z * np.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n))
+    scale = 1.0 + z * z / n
+    lo, hi = float((centre - spread) / scale), float((centre + spread) / scale)
+    return (lo if successes else 0.0), (hi if successes < runs else 1.0)  # exactly, whatever the rounding

@@ -1,0 +1,130 @@
+"""Closed-loop reference tasks: an MPC with its reference, ready to run on a plant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt import gaits, models
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.moving import Sampled
+from dojo_opt.mpc import MPC
+from dojo_opt.plant import Plant
+from dojo_opt.problem import Problem
+from sim import checks
+from sim.simulator import Simulator
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
+
+_GRAVITY = 9.81  # [m/s^2]
+
+
+class Hopping:
+    """Reference states of a hopper that hops on the spot or along the ground, as a function of time.
+
+        stance  of `stance` [s]:  z = z0 - d sin(pi s / stance),  the leg shortens with the body, the foot stands
+        flight  of 2 v / g:       z = z0 + v s - g s^2 / 2,       the leg has its first length,  v = sqrt(2 g height)
+
+    d = v stance / pi makes the velocity continuous. The body moves at the constant velocity (vx, vy) [m/s] throughout.
+    """
+
+    def __init__(self, start: ArrayLike, velocity: ArrayLike, height: float, stance: float) -> None:
+        self.start = np.asarray(start, dtype=np.float64)
+        self.velocity = np.array(checks.vector("Hopping(velocity)", velocity, 2))
+        self.height = checks.number("Hopping(height)", height, above=0.0)
+        self.stance = checks.number("Hopping(stance)", stance, above=0.0)
+        self.speed = float(np.sqrt(2.0 * _GRAVITY * height))  # vertical, at lift-off
+        self.period = stance + 2.0 * self.speed / _GRAVITY
+
+    def __call__(self, times: Vector) -> Matrix:
+        """(n, 15) states at the times (n,) [s]."""
+        times = np.asarray(times, dtype=np.float64)
+        x = np.tile(self.start, (len(times), 1))
+        phase = np.mod(times, self.period)
+        stands = phase < self.stance
+        dip = -self.speed * self.stance / np.pi * np.sin(np.pi * phase / self.stance)
+        flight = phase - self.stance
+        rise = np.where(stands, dip, self.speed * flight - 0.5 * _GRAVITY * flight**2)
+        vertical = np.where(stands, -self.speed * np.cos(np.pi * phase / self.stance), self.speed - _GRAVITY * flight)
+        x[:, :2] += self.velocity * times[:, None]
+        x[:, 2] += rise
+        x[:, 7] += np.where(stands, rise, 0.0)
+        x[:, 8:10] = self.velocity
+        x[:, 10] = vertical
+        x[:, 14] = np.where(stands, vertical, 0.0)
+        return x
+
+
+def hopper_mpc(
+    velocity: ArrayLike = (0.2, 0.0), height: float = 0.25, stance: float = 0.2, *, substeps: int = 5, **settings: Any
+) -> MPC:
+    """Raibert's hopper hops `height` [m] at a velocity [m/s]: 20 knots of 50 ms, each of `substeps` steps of the model.
+
+    Squares of position and leg weigh 10, attitude 1 (yaw .1), velocities .01, impulses .01 per (N s)^2; inputs are
+    limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
+    """
+    knot, horizon = 0.05, 20
+    sim = Simulator(models.raiberthopper(), time_step=knot / substeps)
+    start = sim.neutral()
+    weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 10.0] + [0.01] * 7)
+    limits = np.array([50.0, 50.0, 500.0])
+    problem = Problem(
+        sim,
+        start,
+        horizon,
+        cost=[Tracking(start, weight), Effort(0.01 * knot**2)],
+        control_limits=(-limits, limits),
+        substeps=substeps,
+        controls0=np.array([0.0, 0.0, 9.81 * sim.mechanism.bodies[0].mass]),
+    )
+    return MPC(problem, reference=Hopping(start, velocity, height, stance), **settings)
+
+
+def quadruped_mpc(
+    speed: float = 0.2,
+    period: float = 0.48,
+    *,
+    step_height: float = 0.05,
+    damper: float = 0.5,
+    substeps: int = 1,
+    **settings: Any,
+) -> MPC:
+    """The quadruped trots at a speed [m/s]: 20 knots of 40 ms, the ground learnt from the feet that stand.
+
+    Tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the trunk weigh
+    10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2; torques are limited to 33.5 N m.
+    damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of
+    5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
+    settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it.
+    """
+    knot, horizon, limit = 0.04, 20, 33.5
+    sim = Simulator(models.quadruped(damper=damper), time_step=knot / substeps)
+    fine = gaits.trot(sim.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
+    advance = sim.difference(fine.x[-1], fine.x[0])
+    advance[6:] = 0.0  # joints and velocities come round
+    reference = Sampled(fine.time, fine.x, sim, advance).over(sim.time_step)
+    torque = gaits.trot(sim, speed=speed, period=period, cycles=1, step_height=step_height).torques()
+    held = Sampled(sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu))
+    weight = np.array([10.0] * 6 + [1.0] * 12 + [0.1] * 6 + [0.01] * 12)
+    times = knot * np.arange(horizon + 1)
+    problem = Problem(
+        sim,
+        reference([0.0])[0],
+        horizon,
+        cost=[Tracking(reference(times), weight), Effort(1e-4)],
+        control_limits=(-limit, limit),
+        substeps=substeps,
+        controls0=np.clip(held(times[:-1]), -limit, limit),
+        states0=reference(times),
+    )
+    return MPC(problem, reference={0: reference, 1: held}, **{"learn_ground": True, "kappa": 1e-3, **settings})
+
+
+def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
+    """The plant that belongs to an MPC: its own mechanism with a finer step and harder contact, and a perturbation."""
+    return Plant(mpc.sim.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)

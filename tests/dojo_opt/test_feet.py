@@ -1,0 +1,114 @@
+"""Feet: where they are, how they move, inverse kinematics; and the equilibrium of a robot on its feet."""
+
+import numpy as np
+import pytest
+
+from dojo_opt import models
+from dojo_opt.rest import equilibrium, potential_gradient
+from dojo_opt.feet import Feet
+from sim.simulator import Simulator
+
+
+@pytest.fixture(scope="module")
+def sim():
+    return Simulator(models.quadruped(damper=0.5), time_step=0.02)
+
+
+def bent(sim, rng):
+    """A state in the air, everything turned a little."""
+    dx = np.zeros(sim.ndx)
+    dx[: sim.nv] = 0.2 * rng.normal(size=sim.nv)
+    dx[2] = 0.3
+    return sim.integrate(sim.neutral(), dx)
+
+
+def test_positions_are_those_of_the_contacts(sim, rng):
+    x = bent(sim, rng)
+    step = sim.step(x)
+    feet = Feet(sim)
+    assert feet.names == sim.mechanism.contact_names
+    np.testing.assert_allclose(feet.gaps(step.x), step.contacts.gap, atol=1e-12)
+    under = feet.positions(step.x) - feet.radius[:, None] * feet.normal
+    np.testing.assert_allclose(under, step.contacts.point, atol=1e-12)
+
+
+def test_contacts_at_the_ends_of_the_tree_are_the_feet():
+    robot = Simulator(models.quadruped(contacts="all"), time_step=0.02)
+    assert Feet(robot).names == ("FR_foot", "FL_foot", "RR_foot", "RL_foot")
+    with pytest.raises(ValueError, match="'paw' is not one of"):
+        Feet(robot, ["paw"])
+    with pytest.raises(ValueError, match="no body at the end of the tree has a contact"):
+        Feet(Simulator(models.pendulum(), time_step=0.02))
+
+
+def test_jacobian_is_the_velocity_of_the_feet(sim, rng):
+    x, feet = bent(sim, rng), Feet(sim)
+    J = feet.jacobian(x)
+    dx = np.zeros(sim.ndx)
+    dx[: sim.nv] = rng.normal(size=sim.nv)
+    h = 1e-4
+    slope = (feet.positions(sim.integrate(x, h * dx)) - feet.positions(sim.integrate(x, -h * dx))) / (2 * h)
+    np.testing.assert_allclose(J @ dx[: sim.nv], slope, atol=1e-7)
+
+
+def test_inverse_kinematics_reaches(sim, rng):
+    feet, x = Feet(sim), sim.neutral()
+    targets = feet.positions(x) + rng.uniform(-0.04, 0.04, size=(20, 4, 3))
+    placed = feet.place(x, targets)
+    np.testing.assert_allclose(feet.positions(placed), targets, atol=1e-9)
+    np.testing.assert_array_equal(placed[:, :7], np.tile(x[:7], (20, 1)))
+    assert np.all(placed[:, 9:19:3] < -1.0)  # knees stay bent to their side
+
+
+def test_inverse_kinematics_names_what_it_cannot_reach(sim):
+    feet, x = Feet(sim), sim.neutral()
+    far = feet.positions(x)[None]
+    far[0, 2, 2] -= 0.5
+    with pytest.raises(ValueError, match="'RR_foot' comes no nearer than 0.3"):
+        feet.place(x, far)
+    low = feet.positions(x)[None]
+    low[0, 1, 2] -= 0.1  # within the length of the leg, not of its stops
+    with pytest.raises(ValueError, match=r"joint 'FL_calf' would have to go .* rad beyond its limits \[-2.5, -1\]"):
+        feet.place(x, low)
+
+
+def test_potential_gradient_is_the_weight(sim):
+    mass = sum(body.mass for body in sim.mechanism.bodies)
+    np.testing.assert_allclose(potential_gradient(sim, sim.neutral())[:3], [0.0, 0.0, 9.81 * mass], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "contacts, kappa", [("feet", 1e-6), ("feet", 1e-4), ("feet", 3e-2), ("all", 1e-6), ("all", 1e-4)]
+)
+def test_equilibrium_stays(contacts, kappa):
+    robot = Simulator(models.quadruped(damper=0.5, spring=0.5, contacts=contacts), time_step=0.02, kappa=kappa)
+    x, u = equilibrium(robot)
+    step = robot.step(x, u)
+    # stops and lifted contacts push with kappa over their distance, which the state counts to first order
+    assert np.abs(step.x[robot.nq :]).max() < 1e-7 + 1e-2 * kappa
+    mass = sum(body.mass for body in robot.mechanism.bodies)
+    np.testing.assert_allclose(step.contacts.normal_force.sum(), 9.81 * mass, rtol=1e-4)
+    assert step.contacts.friction_force.max() < 1e-3 + 100.0 * kappa
+    assert np.abs(u).max() < 10.0
+
+
+def test_equilibrium_of_another_stance(sim):
+    x = sim.neutral()
+    feet = Feet(sim)
+    moved = x.copy()
+    moved[0] += 0.05  # the trunk forward over its feet
+    x = feet.place(moved, feet.positions(x)[None])[0]
+    still, u = equilibrium(sim, x)
+    step = sim.step(still, u)
+    assert np.abs(step.x[sim.nq :]).max() < 1e-7
+    assert step.contacts.normal_force[:2].sum() > step.contacts.normal_force[2:].sum()  # on its front feet
+
+
+def test_no_equilibrium_is_said(sim):
+    feet, x = Feet(sim), sim.neutral()
+    lifted = feet.positions(x)[None]
+    lifted[0, :2, 2] += 0.05  # both front feet off the ground
+    with pytest.raises(ValueError, match="no vertical forces at 'FR_foot'.* balance the weight"):
+        equilibrium(sim, feet.place(x, lifted)[0])
+    with pytest.raises(ValueError, match="acts on a body, not on a joint"):
+        equilibrium(Simulator(models.block(), time_step=0.02))

@@ -1,0 +1,153 @@
+"""Gaits of the quadruped with the default settings, held to the numbers that they are published with."""
+
+import numpy as np
+import pytest
+
+from dojo_opt import gait_plots, gaits, models, problems
+from dojo_opt.motion import motion
+from dojo_opt.planner import ilqr
+from sim.simulator import Simulator
+
+
+def upright(x):
+    """Cosine of the angle between the z axis of the base and the vertical."""
+    return 1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)
+
+
+def replayed(problem, plan):
+    """The plan under its own gains, at a fifth of its time step."""
+    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
+    shot = fine.closed_loop(
+        problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5 * problem.substeps, limits=problem.control_limits
+    )
+    assert shot.status == 0
+    return fine, shot
+
+
+def check(problem, plan, iterations, tilt=0.99, off=0.02):
+    """Converged, upright, within the torque limits, and not only at this time step."""
+    assert plan.success, plan.summary()
+    assert plan.nit <= iterations
+    assert plan.violation <= 1e-3
+    assert upright(plan.x).min() > tilt
+    _, shot = replayed(problem, plan)
+    assert np.abs(shot.u).max() <= 33.5
+    assert upright(shot.x).min() > tilt - 0.01
+    assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < off
+
+
+def lowest_foot(problem, plan):
+    """(N,) distance of the lowest foot from the ground at a fifth of the time step."""
+    fine, shot = replayed(problem, plan)
+    steps = [fine.rollout(x, np.tile(u, (5, 1))).contacts for x, u in zip(shot.x[:-1], shot.u, strict=True)]
+    return np.concatenate([contacts.gap.min(axis=1) for contacts in steps])
+
+
+@pytest.mark.parametrize("damping, iterations", [(5.0, 8), (0.5, 30)])
+def test_trot_from_its_reference(damping, iterations):
+    problem = problems.trot(damping=damping)
+    plan = ilqr(problem)
+    check(problem, plan, iterations)
+    reference = problem.costs[0].reference
+    assert np.abs(problem.sim.difference(plan.x[-1], reference[-1])[:6]).max() <= 5e-3
+    assert plan.fun < 0.0192  # MuJoCo and the same weights: .016 at damping 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", [0.0, 0.1, 0.4])
+def test_trot_at_several_speeds(speed):
+    problem = problems.trot(speed=speed)
+    plan = ilqr(problem)
+    check(problem, plan, 30)
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(2.0 * speed, abs=5e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", [5.0, 0.5])
+@pytest.mark.parametrize("speed", [0.0, 0.2, 0.4])
+def test_trot_from_standing_still(damping, speed):
+    problem = problems.trot(damping=damping, speed=speed, guess="standing")
+    plan = ilqr(problem)
+    check(problem, plan, 60)
+    assert np.ptp(problem.states0[1:], axis=0).max() == 0.0
+
+
+@pytest.mark.parametrize("name, iterations", [("pace", 40), ("walk", 20), ("turn", 30)])
+def test_other_gaits(name, iterations):
+    problem = getattr(problems, name)()
+    check(problem, ilqr(problem), iterations, tilt=0.96)
+
+
+@pytest.mark.parametrize("guess, iterations", [("reference", 30), ("standing", 60)])
+def test_bound_leaves_the_ground(guess, iterations):
+    problem = problems.bound(guess=guess)
+    plan = ilqr(problem)
+    check(problem, plan, iterations, tilt=0.9, off=0.06)
+    assert lowest_foot(problem, plan).max() > 0.01
+    loaded = motion(plan).normal_force > 2.0
+    front, hind = loaded[:, 0] | loaded[:, 1], loaded[:, 2] | loaded[:, 3]
+    assert (front & ~hind).any() and (hind & ~front).any()
+
+
+@pytest.mark.parametrize("guess, iterations", [("reference", 10), ("standing", 60)])
+def test_jump_leaves_the_ground(guess, iterations):
+    problem = problems.jump(distance=0.3, height=0.2, guess=guess)
+    plan = ilqr(problem)
+    check(problem, plan, iterations)
+    assert lowest_foot(problem, plan).max() > 0.15
+    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.17
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.3, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_jump_up():
+    problem = problems.jump(distance=0.0, height=0.3, crouch=0.12)
+    plan = ilqr(problem)
+    check(problem, plan, 10)
+    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.29
+
+
+@pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])
+def test_periodic_gaits_choose_their_start(name, settings):
+    problem = getattr(problems, name)(periodic=True, cycles=1, **settings)
+    plan = ilqr(problem)
+    assert plan.success, plan.summary()
+    assert plan.nit <= 40 and upright(plan.x).min() > 0.96
+    moved = problem.sim.difference(plan.x[-1], plan.x[0])
+    assert np.abs(moved[1:]).max() <= 1e-3
+    reference = problem.costs[0].reference
+    assert moved[0] == pytest.approx(reference[-1, 0] - reference[0, 0], abs=1e-3)
+    start = problem.sim.difference(plan.x[0], problem.start)
+    assert np.abs(start).max() > 1e-3 and np.abs(start[[0, 1, 5]]).max() < 1e-4  # 5: its rotation is not small
+
+
+def test_a_gait_that_turns_is_not_periodic():
+    with pytest.raises(ValueError, match="ends as it began but for its place"):
+        problems.turn(periodic=True)
+
+
+def test_substeps_take_the_gait_at_the_time_step_of_the_simulator():
+    problem = problems.trot(substeps=5, cycles=1)
+    assert problem.horizon == 20 and problem.sim.time_step == 0.01
+    assert ilqr(problem).success
+    gait = gaits.stand(Simulator(models.quadruped(), time_step=0.02), duration=0.1)
+    with pytest.raises(ValueError, match="5 time steps are no multiple of 2"):
+        problems.follow(gait, substeps=2)
+    with pytest.raises(ValueError, match="'flying' is not one of"):
+        problems.follow(gait, guess="flying")
+
+
+def test_figure_of_a_gait_shows_what_the_contacts_do():
+    plan = ilqr(problems.trot(damping=5.0, cycles=1))
+    figure = gait_plots.gait(plan)
+    diagram, forces, paths, friction = figure.axes
+    m = motion(plan)
+    filled = sum(path.get_extents().width for bars in diagram.collections for path in bars.get_paths())
+    loaded = (m.normal_force > 0.02 * m.normal_force.max()).sum() * problems.trot().knot_time
+    assert filled == pytest.approx(loaded, rel=1e-9)
+    assert [label.get_text() for label in diagram.get_yticklabels()] == list(m.mechanism.contact_names)
+    np.testing.assert_allclose(forces.patches[1].get_data().values, m.normal_force[:, 1])
+    shares = np.array([line.get_ydata() for line in friction.lines[:4]])
+    assert np.nanmax(shares) <= 1.0 + 1e-3 and np.nanmin(shares) >= 0.0
+    lowest = min(line.get_ydata().min() for line in paths.lines)
+    assert lowest == pytest.approx(0.0, abs=2e-3)

@@ -1,0 +1,263 @@
+"""Plant and perturbation: pushes, payload, slope, friction, delay, noise, limits; closed loops and Monte Carlo."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.ground import Ground
+from dojo_opt.perturbation import Perturbation, Push
+from dojo_opt.plant import Plant
+from dojo_opt.policy import Policy
+from dojo_opt.study import wilson_interval
+from solvers.status import Status
+
+HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)
+BLOCK = dojo.Simulator(dojo.models.block(friction=0.5), time_step=5e-3, kappa=1e-8)
+
+
+def gaps(sim, x):
+    ground = Ground(sim)
+    return ground.gaps(ground.points(x))
+
+
+def high(sim):
+    x = sim.neutral()
+    x[2] += 5.0
+    return x
+
+
+def test_push_gives_its_impulse_whatever_the_steps():
+    """Momentum at the node changes by the impulse, also when the push begins and ends between steps."""
+    plant = Plant(HOPPER, high(HOPPER), pushes=[Push(0.0113, (1.0, -2.0, 0.5), duration=0.0171)])
+    before = HOPPER.momentum(plant.x)[0]
+    loop = dojo.closed_loop(lambda t, x: np.zeros(3), plant, 0.05, fallen=lambda x: False)
+    change = HOPPER.momentum(loop.x[-1])[0] - before
+    weight = 4.7 * 9.81 * 0.05
+    np.testing.assert_allclose(change, [1.0, -2.0, 0.5 - weight], atol=1e-9)
+    assert loop.u.shape == (10, 6)
+    np.testing.assert_allclose(loop.u[:, 3:].sum(axis=0) * 5e-3, [1.0, -2.0, 0.5], atol=1e-12)
+
+
+def test_payload_weighs_and_turns():
+    body = Perturbation(payload=2.0, payload_inertia=(0.1, 0.2, 0.3), payload_body="foot").mechanism(HOPPER.mechanism)
+    np.testing.assert_allclose([b.mass for b in body.bodies], [4.18, 2.52])
+    added = np.asarray(body.bodies[1].inertia) - np.asarray(HOPPER.mechanism.bodies[1].inertia)
+    np.testing.assert_allclose(added, np.diag([0.1, 0.2, 0.3]), atol=1e-12)
+    assert HOPPER.mechanism.bodies[1].mass == 0.52
+
+
+def test_friction_damping_and_inputs_of_the_plant():
+    perturbation = Perturbation(friction=0.1, damping=3.0, pushes=[Push(0.0, (1, 0, 0)), Push(1.0, (0, 1, 0), "foot")])
+    mech = perturbation.mechanism(HOPPER.mechanism)
+    assert [c.friction for c in mech.contacts] == [0.1, 0.1]
+    assert mech.joints[1].damper == (3 * 0.1,)
+    assert mech.input_names[3:] == tuple(f"push {b} {a}" for b in ("body", "foot") for a in "xyz")
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, np.pi])
+def test_block_on_a_slope_stays_or_slides_as_coulomb_says(heading):
+    """It slides at angles above atan(friction), along the slope, at g (sin - mu cos)."""
+    for angle, slides in ((0.4, False), (0.6, True)):
+        plant = Plant(BLOCK, slope=angle, slope_heading=heading)
+        loop = dojo.closed_loop(lambda t, x: np.zeros(BLOCK.nu), plant, 0.4, fallen=lambda x: False)
+        moved = loop.x[-1, :3] - loop.x[0, :3]
+        assert abs(plant.normal @ moved) < 1e-3
+        expected = 0.5 * 9.81 * (np.sin(angle) - 0.5 * np.cos(angle)) * 0.4**2 if slides else 0.0
+        downhill = -np.array([np.cos(heading) * np.cos(angle), np.sin(heading) * np.cos(angle), np.sin(angle)])
+        np.testing.assert_allclose(moved @ downhill, expected, atol=5e-3)
+
+
+def test_start_on_a_slope_touches_as_on_level_ground():
+    sim = dojo.Simulator(dojo.models.quadruped(), time_step=5e-3, kappa=1e-8)
+    plant = Plant(sim, slope=0.2, slope_heading=0.7, ground_height=0.3)
+    flat = gaps(sim, sim.neutral())
+    np.testing.assert_allclose(gaps(plant.simulator, plant.x), flat, atol=1e-12)
+
+
+def test_delay_holds_commands_back():
+    plant = Plant(HOPPER, high(HOPPER), delay=0.01)
+    loop = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, round(t / 5e-3)]), plant, 0.03, fallen=lambda x: False)
+    np.testing.assert_array_equal(loop.u[:, 2], [0, 0, 0, 1, 2, 3])
+
+
+def test_actuators_do_what_they_can():
+    plant = Plant(HOPPER, high(HOPPER), control_limits=(-1.0, [2.0, 2.0, 3.0]))
+    loop = dojo.closed_loop(lambda t, x: np.array([-5.0, 5.0, 5.0]), plant, 0.01, fallen=lambda x: False)
+    np.testing.assert_array_equal(loop.u, [[-1.0, 2.0, 3.0]] * 2)
+
+
+def test_noise_is_of_the_measurement_and_repeats():
+    plant = Plant(HOPPER, noise=np.r_[0.01 * np.ones(7), np.zeros(7)], seed=5)
+    first = [plant.measure() for _ in range(200)]
+    assert np.array_equal(plant.x, HOPPER.neutral())
+    spread = HOPPER.difference(np.array(first), plant.x)
+    np.testing.assert_allclose(spread[:, :7].std(axis=0), 0.01, rtol=0.3)
+    np.testing.assert_array_equal(spread[:, 7:], 0.0)
+    plant.reset()
+    np.testing.assert_array_equal(plant.measure(), first[0])
+
+
+def test_closed_loop_stops_at_a_fall_and_at_an_unsolved_step():
+    tilted = HOPPER.integrate(HOPPER.neutral(), 0.3 * np.eye(14)[3])
+    fall = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER, tilted), 3.0)
+    assert not fall.survived and fall.message.startswith("Fell at") and fall.duration < 3.0
+    assert len(fall.x) == len(fall.time) == len(fall.u) + 1 == len(fall.status) + 1
+    wild = HOPPER.neutral()
+    wild[11] = 1e4
+    stop = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER, wild), 1.0)
+    assert not stop.survived and stop.status[-1] != Status.SOLVED and "step 0" in stop.message
+    assert len(stop.x) == 1 and stop.u.shape == (0, 3)
+
+
+def test_a_step_that_cannot_be_solved_is_softened_and_counted():
+    """With one iteration less than it needs, a block that lies on the ground is only solved with softer contact."""
+    limited = BLOCK.replace(max_iterations=BLOCK.step(BLOCK.neutral()).iterations - 1)
+    assert not limited.step(BLOCK.neutral()).success
+    assert limited.replace(kappa=1e3 * BLOCK.kappa).step(BLOCK.neutral()).success
+    loop = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(limited), 5e-3, fallen=lambda x: False)
+    assert loop.survived and loop.softened == 1
+
+
+def test_error_is_measured_from_the_reference():
+    loop = dojo.closed_loop(
+        lambda t, x: np.array([0.0, 0.0, 41.0]),
+        Plant(HOPPER),
+        0.05,
+        reference=lambda t: np.tile(HOPPER.integrate(HOPPER.neutral(), 0.3 * np.eye(14)[0]), (len(t), 1)),
+    )
+    assert loop.rms() == pytest.approx(0.3, abs=1e-3)
+    bare = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER), 0.01)
+    with pytest.raises(ValueError, match="no reference"):
+        bare.error()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Plant(HOPPER, delay=0.0123), "multiple of the time step"),
+        (lambda: Plant(HOPPER, pushes=[Push(0.0, (1, 0, 0), body="arm")]), "'arm' is not one of"),
+        (lambda: Plant(HOPPER, pushes=[(0.0, 1.0)]), "sequence of Push"),
+        (lambda: Plant(HOPPER, payload=1.0, payload_body="arm"), "payload_body"),
+        (lambda: Plant(HOPPER, slope=2.0), "less than a right angle"),
+        (lambda: Plant(HOPPER, Perturbation(), payload=-1.0), r"expected shape|real numbers|payload"),
+        (lambda: Plant(HOPPER, None, Perturbation(), payload=1.0), "either it or its fields"),
+        (lambda: dojo.closed_loop(lambda t, x: np.zeros(2), Plant(HOPPER), 0.01), "controller's u"),
+        (lambda: dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER), 0.1, control_step=0.007), "multiple"),
+    ],
+)
+def test_mistakes_are_named(make, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        make()
+
+
+def test_slope_needs_a_floating_base():
+    sim = dojo.Simulator(dojo.models.cartpole(), time_step=0.01)
+    with pytest.raises(ValueError, match="floating base"):
+        Plant(sim, slope=0.1)
+
+
+def test_ground_is_learnt_from_a_foot_that_stands():
+    sim = HOPPER.replace()
+    ground = Ground(sim)
+    x = sim.neutral()
+    policy = Policy(sim, 0.0, np.tile(x, (3, 1)), np.zeros((2, 3)), np.zeros((2, 3, 14)))
+    higher = x.copy()
+    higher[2] += 0.03
+    ground.learn(policy, 0.0, higher, (-0.005, higher))
+    assert ground.height[0] == pytest.approx(0.03, abs=1e-12)
+    assert ground.rise == pytest.approx(0.015)  # foot and body; the body does not stand
+    assert ground.touching(higher) == ("foot",)
+    moving = higher.copy()
+    moving[2] += 0.01
+    ground.learn(policy, 0.0, moving, (-0.005, higher))
+    assert ground.height[0] == pytest.approx(0.03, abs=1e-12)
+    r = sim.step(higher, np.array([0.0, 0.0, 41.0]))  # the step of this simulator knows it, that of others does not
+    assert r.contacts.normal_force[0] > 10.0 and Ground(HOPPER).height[0] == 0.0
+    ground.forget()
+    np.testing.assert_array_equal(ground.height, 0.0)
+
+
+def test_wilson_interval_is_the_one_of_the_score_test():
+    """Its ends are the p at which the observed share is 1.96 standard deviations away."""
+    for k, n in ((0, 10), (3, 10), (95, 100), (100, 100)):
+        lo, hi = wilson_interval(k, n)
+        for p in (lo, hi):
+            if 1e-12 < p < 1.0 - 1e-12:
+                assert abs(k / n - p) == pytest.approx(1.959964 * np.sqrt(p * (1 - p) / n), rel=1e-6)
+        assert lo <= k / n <= hi
+    with pytest.raises(ValueError, match="11 of 10"):
+        wilson_interval(11, 10)
+
+
+def test_disturbances_are_in_their_ranges_and_paired():
+    wide = dojo.Disturbances(
+        7, velocity=0.2, push=(2.0, 4.0), payload=(1.0, 2.0), friction=(0.2, 0.4), slope=(0.0, 0.1)
+    )
+    other = dojo.Disturbances(7, velocity=0.2, push=(4.0, 8.0))
+    for i in range(50):
+        a, b = (d(np.random.default_rng(i)) for d in (wide, other))
+        assert 1.0 <= a.payload <= 2.0 and 0.2 <= a.friction <= 0.4 and 0.0 <= a.slope <= 0.1
+        assert 2.0 <= np.linalg.norm(a.pushes[0].impulse) <= 4.0 and a.pushes[0].impulse[2] == 0.0
+        assert np.abs(a.offset).max() <= 0.2 and np.count_nonzero(a.offset) <= 2
+        np.testing.assert_array_equal(a.offset, b.offset)
+        assert b.payload == 0.0 and b.friction is None and not b.slope
+
+
+def _hold(time, x):
+    """Keeps the hopper up and lets it tip over."""
+    return np.array([-3.0 * x[4] - 0.4 * x[11], -3.0 * x[5] - 0.4 * x[12], 45.0])
+
+
+def _study(executor=None, runs=6):
+    sampler = dojo.Disturbances(7, velocity=0.4, push=(0.0, 8.0), push_time=(0.1, 0.2))
+    return dojo.monte_carlo(_hold, Plant(HOPPER), sampler, 0.6, runs=runs, seed=11, executor=executor)
+
+
+def _same(a, b):
+    assert [o.survived for o in a.outcomes] == [o.survived for o in b.outcomes]
+    for one, two in zip(a.outcomes, b.outcomes, strict=True):
+        np.testing.assert_array_equal(one.x, two.x)
+
+
+def test_monte_carlo_is_the_same_with_threads_and_again():
+    study = _study()
+    assert 0 < study.survived < 6, "the runs should not all end alike"
+    assert f"{study.survived} of 6 survive" in study.summary()
+    _same(study, _study())
+    with ThreadPoolExecutor(2) as pool:
+        _same(study, _study(pool))
+    for one, two in zip(_study(runs=3).outcomes, study.outcomes, strict=False):
+        np.testing.assert_array_equal(one.x, two.x)
+
+
+@pytest.mark.slow
+def test_monte_carlo_of_mpc_is_the_same_in_processes():
+    mpc = dojo.tasks.hopper_mpc(substeps=2)
+    plant = dojo.tasks.plant(mpc, 5e-3)
+    sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
+    here = mpc.monte_carlo(plant, sampler, 0.4, runs=3, seed=1)
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        there = mpc.monte_carlo(plant, sampler, 0.4, runs=3, seed=1, executor=pool)
+    _same(here, there)
+    assert here.milliseconds.size == 3 * 7
+    assert np.isfinite(here.rms).all()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_monte_carlo_is_the_same_on_a_dask_cluster():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        mpc = dojo.tasks.hopper_mpc(substeps=2)
+        plant = dojo.tasks.plant(mpc, 5e-3)
+        sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
+        here = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2)
+        there = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2, executor=client.get_executor())
+    _same(here, there)

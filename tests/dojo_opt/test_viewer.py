@@ -1,0 +1,113 @@
+"""The animation, looked at in a real browser: the robot is drawn, and it moves."""
+
+import shutil
+import time
+from io import BytesIO
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt import viewer
+from dojo_opt.motion import motion
+
+# a browser process that is closed leaves sockets to the garbage collector
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+DRAWN = 500  # pixels of 480 x 360 that a robot covers at least
+
+
+@pytest.fixture(scope="module")
+def page():
+    """A page of a headless Chromium, that of the system or playwright's own, which draws without a graphics card."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = next((found for found in map(shutil.which, names) if found), None)
+    arguments = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"]
+    with playwright.sync_playwright() as session:
+        try:
+            browser = session.chromium.launch(executable_path=path, args=arguments)
+        except playwright.Error as error:
+            pytest.skip(f"no Chromium: {error}")
+        yield browser.new_page(viewport={"width": 480, "height": 360})
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def quadruped():
+    """Half a second in which the robot falls from 20 cm and lands."""
+    sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
+    x = sim.neutral()
+    x[2] += 0.2
+    return sim.rollout(x, np.zeros((50, sim.nu)))
+
+
+def shot(page):
+    """The screen as (360, 480, 3) numbers, without the menu at its top right."""
+    from matplotlib.image import imread
+
+    image = imread(BytesIO(page.screenshot()))[..., :3]
+    image[:40, 200:] = 0.0
+    return image
+
+
+def changed(a, b):
+    """Number of pixels that differ."""
+    return int((np.abs(a - b).max(axis=2) > 0.1).sum())
+
+
+def shown(page, path, empty=None, seconds=20.0):
+    """The screen after loading; given the empty scene, as soon as a robot is on it, or when time is up."""
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(path.as_uri())
+    end = time.monotonic() + seconds
+    image = shot(page)
+    while empty is not None and changed(image, empty) < DRAWN and time.monotonic() < end:
+        time.sleep(0.2)
+        image = shot(page)
+    assert not errors
+    return image
+
+
+@pytest.mark.slow
+def test_the_robot_is_drawn_and_moves(page, quadruped, tmp_path):
+    path = viewer.save_html(quadruped, tmp_path / "fall.html")
+    (tmp_path / "empty.html").write_text(viewer._page(motion(quadruped), []))
+    shown(page, tmp_path / "empty.html")
+    time.sleep(2.0)
+    empty = shot(page)
+    assert np.ptp(empty) > 0.3, "not even the background"
+    assert changed(empty, shot(page)) == 0, "the empty scene stands still"
+
+    first = shown(page, path, empty)
+    assert changed(first, empty) > DRAWN, "the robot is not drawn"
+    later = []
+    for _ in range(6):
+        time.sleep(0.15)
+        later.append(changed(shot(page), first))
+    assert max(later) > DRAWN // 5, "the robot does not move"
+
+
+@pytest.mark.slow
+def test_sloping_ground_is_drawn(page, tmp_path):
+    sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.01)
+    images = []
+    for name, slope in (("flat", 0.0), ("slope", 0.2)):
+        plant = dojo.Plant(sim, slope=slope)
+        loop = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, 41.0]), plant, 0.05)
+        shown(page, viewer.save_html(loop, tmp_path / f"{name}.html"))
+        time.sleep(2.0)
+        images.append(shot(page))
+    assert changed(*images) > 20_000
+
+
+def test_a_plant_with_short_steps_does_not_make_a_long_file(tmp_path):
+    sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=1e-3)
+    us = np.tile([0.0, 0.0, 41.0], (400, 1))
+    short = viewer.save_html(sim.rollout(sim.neutral(), us), tmp_path / "a.html").stat().st_size
+    coarse = sim.replace(time_step=16e-3)
+    long = viewer.save_html(coarse.rollout(sim.neutral(), us[:25]), tmp_path / "b.html").stat().st_size
+    assert abs(short - long) < 5_000
