@@ -105,7 +105,6 @@ _HOME: dict[str, str | None] = {
 if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
     from dojo_opt.disturbances import Disturbances
-    from dojo_opt.rest import equilibrium
     from dojo_opt.loop import ClosedLoop, closed_loop
     from dojo_opt.moving import Sampled
     from dojo_opt.mpc import MPC
@@ -114,6 +113,7 @@ if TYPE_CHECKING:
     from dojo_opt.planner import ilqr
     from dojo_opt.plant import Plant
     from dojo_opt.problem import Problem
+    from dojo_opt.rest import equilibrium
     from dojo_opt.study import monte_carlo
     from sim.mechanism import Mechanism
     from sim.parts import Body, Contact, Input, Joint

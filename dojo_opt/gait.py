@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from dojo_opt.rest import input_map
 from dojo_opt.feet import Feet
+from dojo_opt.rest import input_map
 from sim.parts import Input, Joint
 from sim.simulator import Simulator
 

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.policy import Policy
-from sim.layout import read_model
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -37,7 +36,7 @@ class Ground:
         self._point = np.array([c.point for c in contacts], dtype=np.float64).reshape(-1, 3)
         self._normal = sim.mechanism.contact_normals
         self._lowest = np.array([c.radius for c in contacts], dtype=np.float64)[:, None] * self._normal
-        self.height = read_model(sim.model_floats, sim.model_ints).contact_height  # (ncontact,) [m], a view
+        self.height = sim.model.contact_height  # (ncontact,) [m], a view
         self._flat = self.height.copy()
 
     @property

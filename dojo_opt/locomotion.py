@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt import gaits, models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.rest import equilibrium
 from dojo_opt.feet import Feet
 from dojo_opt.gait import Gait
 from dojo_opt.options import CONTINUATION
 from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
+from dojo_opt.rest import equilibrium
 from sim import checks
 from sim.simulator import Simulator
 

@@ -267,7 +267,8 @@ def try_from(
             if smoothing < before:
                 patience = max(patience, iterations + _PATIENCE // 2)
         merit = Merit(merit.residual, max(merit.violation, slip), merit.mean)
-        if merit.residual < options.tolerance and merit.violation < spread and smoothing <= kappa:
+        solved = merit.residual < options.tolerance and merit.violation < spread and smoothing <= kappa
+        if solved and iterations > 0:  # a guess within the tolerance gets one step too: the error is squared
             return Outcome(_SOLVED, iterations, merit.residual, merit.violation)
         if iterations >= options.max_iterations:
             return Outcome(_MAX_ITERATIONS, iterations, merit.residual, merit.violation)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dojo_opt import models
-from dojo_opt.rest import equilibrium, potential_gradient
 from dojo_opt.feet import Feet
+from dojo_opt.rest import equilibrium, potential_gradient
 from sim.simulator import Simulator
 
 
