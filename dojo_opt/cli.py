@@ -19,8 +19,8 @@ import dojo_opt as dojo
 from dojo_opt.report import REPORTS, run_report
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
-PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump")
-GAITS = ("trot", "bound", "pace", "walk", "turn", "jump")
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
+GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 
 
 def _parser() -> argparse.ArgumentParser:
