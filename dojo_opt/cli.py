@@ -22,8 +22,8 @@ from dojo_opt.report import REPORTS, run_report
 from dojo_opt.tick import milliseconds
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
-PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump")
-GAITS = ("trot", "bound", "pace", "walk", "turn", "jump")
+PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
+GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
 
 

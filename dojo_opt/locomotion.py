@@ -22,7 +22,7 @@ from sim.simulator import Simulator
 
 Array = NDArray[np.float64]
 
-__all__ = ["bound", "follow", "jump", "pace", "trot", "turn", "walk"]
+__all__ = ["bound", "follow", "jump", "leap", "pace", "trot", "turn", "walk"]
 
 TORQUE_LIMIT = 33.5  # of every hinge of the A1 [N m]
 # weights of squares per second: base place (x, y, z), its rotation vector, angles, base velocities, joint rates
@@ -161,6 +161,46 @@ def jump(
     """
     settings = {"place": 1.0, "attitude": 0.3, **settings}
     return _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+
+
+def leap(
+    *,
+    distance: float = 0.3,
+    height: float = 0.2,
+    duration: float = 1.0,
+    damping: float = 0.5,
+    time_step: float = 0.02,
+    **model: Any,
+) -> Problem:
+    """The quadruped gets `distance` [m] ahead from rest with nothing but a goal: no gait, no contact sequence.
+
+    As in `hop`: the first half of `duration` [s] tracks the standing pose at the goal, `height` [m] up, the second half
+    the pose itself; squares of place weigh 1, 1, 5, attitude .3, angles .02 per second, the rest as in `follow`, and
+    the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
+    shooting. It asks for the height and does not insist: at .2 m it leaves the ground by about half of that.
+    """
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step)
+    horizon = max(2, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
+    start, torques = equilibrium(sim)
+    goal = start.copy()
+    goal[0] += distance
+    apex = goal.copy()
+    apex[2] += height
+    half = horizon // 2
+    legs = sim.nv - 6
+    parts = [np.array([1.0, 1.0, 5.0]), np.full(3, 0.3), np.full(legs, 0.02), np.full(6, VELOCITY), np.full(legs, RATE)]
+    return Problem(
+        sim,
+        start,
+        horizon,
+        cost=[
+            Tracking(np.array([apex] * half + [goal] * (horizon + 1 - half)), time_step * np.concatenate(parts)),
+            Effort(time_step * EFFORT),
+        ],
+        constraints=[Goal(goal, components=np.arange(6))],
+        control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
+        controls0=torques,
+    )
 
 
 _FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")

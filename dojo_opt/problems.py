@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
+from dojo_opt.locomotion import bound, follow, jump, leap, pace, trot, turn, walk
 from dojo_opt.problem import Problem
 from sim.simulator import Simulator
 
-__all__ = ["block", "bound", "follow", "hop", "jump", "pace", "swingup", "trot", "turn", "walk"]
+__all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
 
 
 def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:

@@ -107,6 +107,15 @@ def test_jump_up():
     assert plan.x[:, 2].max() - plan.x[0, 2] > 0.29
 
 
+def test_leap_is_found_from_standing_and_a_goal():
+    problem = problems.leap(distance=0.3, height=0.2)
+    assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
+    plan = ilqr(problem)
+    check(problem, plan, 90)
+    assert lowest_foot(problem, plan).max() > 0.04
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.3, abs=2e-3)
+
+
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])
 def test_periodic_gaits_choose_their_start(name, settings):
     problem = getattr(problems, name)(periodic=True, cycles=1, **settings)
