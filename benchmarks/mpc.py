@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.tick import milliseconds
+from dojo_opt.mpc.tick import milliseconds
 
 MASS = 4.7  # of the hopper [kg]
 HOPPER = {

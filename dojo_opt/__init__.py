@@ -64,21 +64,21 @@ _HOME: dict[str, str | None] = {
     "Body": "sim.parts",
     "Box": "sim.shapes",
     "Capsule": "sim.shapes",
-    "ClosedLoop": "dojo_opt.loop",
+    "ClosedLoop": "dojo_opt.plant.loop",
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
-    "Disturbances": "dojo_opt.disturbances",
+    "Disturbances": "dojo_opt.plant.disturbances",
     "Input": "sim.parts",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
-    "MPC": "dojo_opt.mpc",
+    "MPC": "dojo_opt.mpc.controller",
     "Mechanism": "sim.mechanism",
-    "Perturbation": "dojo_opt.perturbation",
+    "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
-    "Plant": "dojo_opt.plant",
+    "Plant": "dojo_opt.plant.plant",
     "Problem": "dojo_opt.problem",
-    "Push": "dojo_opt.perturbation",
-    "Sampled": "dojo_opt.moving",
+    "Push": "dojo_opt.plant.perturbation",
+    "Sampled": "dojo_opt.mpc.moving",
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
@@ -87,7 +87,7 @@ _HOME: dict[str, str | None] = {
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
     "UrdfWarning": "sim.urdf",
-    "closed_loop": "dojo_opt.loop",
+    "closed_loop": "dojo_opt.plant.loop",
     "constraint": None,
     "cost": None,
     "equilibrium": "dojo_opt.rest",
@@ -95,7 +95,7 @@ _HOME: dict[str, str | None] = {
     "ilqr": "dojo_opt.planner",
     "load_urdf": "sim.urdf",
     "models": None,
-    "monte_carlo": "dojo_opt.study",
+    "monte_carlo": "dojo_opt.plant.study",
     "plots": None,
     "problems": None,
     "tasks": None,
@@ -104,17 +104,17 @@ _HOME: dict[str, str | None] = {
 
 if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
-    from dojo_opt.disturbances import Disturbances
-    from dojo_opt.loop import ClosedLoop, closed_loop
-    from dojo_opt.moving import Sampled
-    from dojo_opt.mpc import MPC
-    from dojo_opt.perturbation import Perturbation, Push
+    from dojo_opt.mpc.controller import MPC
+    from dojo_opt.mpc.moving import Sampled
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
-    from dojo_opt.plant import Plant
+    from dojo_opt.plant.disturbances import Disturbances
+    from dojo_opt.plant.loop import ClosedLoop, closed_loop
+    from dojo_opt.plant.perturbation import Perturbation, Push
+    from dojo_opt.plant.plant import Plant
+    from dojo_opt.plant.study import monte_carlo
     from dojo_opt.problem import Problem
     from dojo_opt.rest import equilibrium
-    from dojo_opt.study import monte_carlo
     from sim.mechanism import Mechanism
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.mpc.tick import milliseconds
 from dojo_opt.report import REPORTS, run_report
-from dojo_opt.tick import milliseconds
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")

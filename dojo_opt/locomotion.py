@@ -12,7 +12,7 @@ from dojo_opt import gaits, models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
-from dojo_opt.gait import Gait
+from dojo_opt.gaits.gait import Gait
 from dojo_opt.options import CONTINUATION
 from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.moving import Sampled
-from dojo_opt.mpc import MPC
-from dojo_opt.plant import Plant
+from dojo_opt.mpc.controller import MPC
+from dojo_opt.mpc.moving import Sampled
+from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim import checks
 from sim.simulator import Simulator

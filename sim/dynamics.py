@@ -100,6 +100,19 @@ def world_inertia(model: Model, rot: Matrix, out: Matrix) -> None:
 
 
 @kernel
+def turns(first: Matrix, second: Matrix, out: Matrix) -> None:
+    """out[i] = (cos, sin * axis) of half the rotation from first[i] to second[i], world axes.  (nbody, 4)"""
+    for i in range(out.shape[0]):
+        a = first[i]
+        b = second[i]
+        c, x, y, z = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+        out[i, 0] = c
+        out[i, 1] = x
+        out[i, 2] = y
+        out[i, 3] = z
+
+
+@kernel
 def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> bool:
     """Everything of a step that does not depend on its unknown: configurations 1 and 2, incoming momenta and impulses.
 
@@ -117,16 +130,10 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
     tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
     tree_poses(model, work.theta1, q, work.origin, work.pos1, work.quat1, work.rot1, work.S1)
     world_inertia(model, work.rot2, work.inertia_world)
+    turns(work.quat1, work.quat2, work.turn_in)
     representable = True
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = quat_turn(
-            work.quat1[i, 0], work.quat1[i, 1], work.quat1[i, 2], work.quat1[i, 3],
-            work.quat2[i, 0], work.quat2[i, 1], work.quat2[i, 2], work.quat2[i, 3],
-        )  # fmt: skip
-        work.turn_in[i, 0] = c
-        work.turn_in[i, 1] = x
-        work.turn_in[i, 2] = y
-        work.turn_in[i, 3] = z
+        c, x, y, z = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
         px, py, pz = angular_momentum(work.inertia_world, i, h, c, -x, -y, -z)
         work.momentum_in[i, 3] = -px
         work.momentum_in[i, 4] = -py
@@ -186,16 +193,10 @@ def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
     """
     displace(model, q, work.nu, h, work.theta3)
     tree_poses(model, work.theta3, q, work.origin, work.pos3, work.quat3, work.rot3, work.S3)
+    turns(work.quat2, work.quat3, work.turn)
     inside = True
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = quat_turn(
-            work.quat2[i, 0], work.quat2[i, 1], work.quat2[i, 2], work.quat2[i, 3],
-            work.quat3[i, 0], work.quat3[i, 1], work.quat3[i, 2], work.quat3[i, 3],
-        )  # fmt: skip
-        work.turn[i, 0] = c
-        work.turn[i, 1] = x
-        work.turn[i, 2] = y
-        work.turn[i, 3] = z
+        c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         inside = inside and c > 1e-3
         tx, ty, tz = angular_momentum(work.inertia_world, i, h, c, x, y, z)
         m = model.body_mass[i] / h

@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.central_path import first_attempt, residuals, start
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
-from sim.elimination import factor, project, solve, subtree_sums
+from sim.elimination import factor, solve
 from sim.inequalities import (
-    apply_inequalities,
-    apply_limits,
     boundary_step,
     condense_inequalities,
     inequality_kinematics,
@@ -32,12 +31,11 @@ from sim.inequalities import (
     products_ahead,
     recover_inequalities,
     slip_error,
-    start_inequalities,
 )
-from sim.joints import joint_blocks, joint_impulses
+from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.model import Goal, Model, Options, Outcome, Vector, Work
-from sim.newton import norm, residual_scale
+from sim.newton import residual_scale
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -47,11 +45,7 @@ _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
-_AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _SHORT = 0.1  # a step below this share of the Newton step is short
-_GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
-_GROWTHS = 8  # attempts
-_GOLDEN = 0.6180339887498949
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
 _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
@@ -65,20 +59,6 @@ class Merit(NamedTuple):
     residual: float  # largest equality residual, momenta relative to their scale
     violation: float  # largest |product - kappa|, or violation of the friction law at the present smoothing
     mean: float  # of the complementarity products
-
-
-@kernel
-def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
-    """Largest generalized residual, and largest |gap - slack|; fills residual, wrench, subtree."""
-    for i in range(work.balance.shape[0]):
-        for k in range(6):
-            work.wrench[i, k] = work.balance[i, k]
-    e = apply_inequalities(model, work)
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    joint_impulses(model, work, h, q, v, u)
-    apply_limits(model, work)
-    return norm(work.residual), e
 
 
 @kernel
@@ -139,56 +119,6 @@ def follow(model: Model, work: Work, least: float, smoothing: float, ratio: floa
         smoothing = max(least, ratio * smoothing)
         slip = slip_error(model, work, smoothing)
     return smoothing, slip, ratio
-
-
-@kernel
-def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float) -> bool:
-    """nu = share v, slowed down until no body turns by half a turn; False if that fails."""
-    for _ in range(30):
-        for d in range(v.shape[0]):
-            work.nu[d] = share * v[d]
-            work.nu_trial[d] = work.nu[d]
-        if momentum_balance(model, work, h, q):
-            inequality_kinematics(model, work, h)
-            return True
-        share *= 0.7
-    return False
-
-
-@kernel
-def first_attempt(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Vector
-) -> int:
-    """0, the start at kappa itself, where the guess all but balances with its impulses; 1 everywhere else.
-
-    The gap of a pressing contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution,
-    and so does a step whose solution is known.   Leaves the iterate at the start of attempt 0.
-    """
-    q, v, u = inputs
-    if not place(model, work, options.h, q, v, 1.0):
-        return 1
-    start_inequalities(model, work, options.h, options.kappa, 1.0)
-    soft, _ = residuals(model, work, options.h, q, v, u)
-    if not place(model, work, options.h, q, guess, 1.0):
-        return 1
-    start_inequalities(model, work, options.h, options.kappa, 0.0)
-    hard, _ = residuals(model, work, options.h, q, v, u)
-    return 0 if hard < _AT_REST * soft else 1
-
-
-@kernel
-def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, attempt: int) -> float:
-    """Start on the central path: attempt 0 at kappa itself (see above), 1 at the usual kappa0, then at others.
-
-    nu is the incoming velocity at first, from attempt 2 on a share of it: 1/2 and on by the golden ratio, modulo 1.
-    Returns the kappa of the start, 0 if there is none.
-    """
-    if attempt == 0:
-        return options.kappa
-    share = 1.0 if attempt < 2 else (0.5 + _GOLDEN * (attempt - 2)) % 1.0
-    if not place(model, work, options.h, q, v, share):
-        return 0.0
-    return start_inequalities(model, work, options.h, options.kappa, _GROWTH ** ((attempt - 1) % _GROWTHS))
 
 
 @kernel

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from sim.dynamics import _turns_below_half, momentum_balance_jacobian
+from sim.dynamics import _turns_below_half, momentum_balance_jacobian, turns
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.energy import add_spring_momentum, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
-from sim.rotation import quat_turn
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -57,11 +56,9 @@ def momentum_error(model: Model, work: Work, h: float, x: Vector, target: Vector
 @kernel
 def _turn_back(work: Work) -> None:
     """The interval 1-2 read backwards, as `momentum_balance_jacobian` reads the interval 2-3."""
+    turns(work.quat1, work.quat2, work.turn_in)
+    turns(work.quat2, work.quat1, work.turn)
     for i in range(work.pos1.shape[0]):
-        a, b = work.quat1[i], work.quat2[i]
-        c, x, y, z = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-        work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3] = c, x, y, z
-        work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3] = c, -x, -y, -z
         for k in range(3):
             work.pos3[i, k] = work.pos1[i, k]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dojo_opt import gait_plots, gaits, models, problems
+from dojo_opt import gaits, models, plots, problems
 from dojo_opt.motion import motion
 from dojo_opt.planner import ilqr
 from sim.simulator import Simulator
@@ -148,7 +148,7 @@ def test_substeps_take_the_gait_at_the_time_step_of_the_simulator():
 
 def test_figure_of_a_gait_shows_what_the_contacts_do():
     plan = ilqr(problems.trot(damping=5.0, cycles=1))
-    figure = gait_plots.gait(plan)
+    figure = plots.gait(plan)
     diagram, forces, paths, friction = figure.axes
     m = motion(plan)
     filled = sum(path.get_extents().width for bars in diagram.collections for path in bars.get_paths())

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.horizon import shift_multipliers, tail
-from dojo_opt.measurement import Measurement
-from dojo_opt.moving import References, Sampled
+from dojo_opt.mpc.horizon import shift_multipliers, tail
+from dojo_opt.mpc.measurement import Measurement
+from dojo_opt.mpc.moving import References, Sampled
+from dojo_opt.mpc.policy import Policy
+from dojo_opt.mpc.tick import Settings, milliseconds
 from dojo_opt.options import Options
-from dojo_opt.policy import Policy
-from dojo_opt.tick import Settings, milliseconds
 from solvers.jit import local_kernel
 from solvers.status import Status
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.ground import Ground
-from dojo_opt.perturbation import Perturbation, Push
-from dojo_opt.plant import Plant
-from dojo_opt.policy import Policy
-from dojo_opt.study import wilson_interval
+from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.policy import Policy
+from dojo_opt.plant.perturbation import Perturbation, Push
+from dojo_opt.plant.plant import Plant
+from dojo_opt.plant.study import wilson_interval
 from solvers.status import Status
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)

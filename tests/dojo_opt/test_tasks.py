@@ -7,7 +7,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.cli import main
-from dojo_opt.study import Outcome, Study
+from dojo_opt.plant.study import Outcome, Study
 
 
 @pytest.fixture(scope="module")

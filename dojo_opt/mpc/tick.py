@@ -32,7 +32,7 @@ class Settings:
     gain_scale: float = 1.0  # of the feedback between plans; 0 applies the planned inputs as they are
     delay: float = 0.0  # from a measurement to the input it causes [s]; plans start that much later
     time_limit: float = float("inf")  # of a tick [s]; looked at before each iteration
-    mean_velocity: bool = True  # see `dojo_opt.measurement`
+    mean_velocity: bool = True  # see `dojo_opt.mpc.measurement`
     learn_ground: bool = False  # take the height of the ground from the contacts that stand
     options: Options | None = None  # of the planner in a tick; its stages are made from kappa and kappa_grad
 

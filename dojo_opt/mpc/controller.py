@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.ground import Ground
-from dojo_opt.horizon import shift_multipliers, tail, with_own_terms
 from dojo_opt.line_search import Iterate
-from dojo_opt.measurement import Measurement
-from dojo_opt.moving import References
+from dojo_opt.mpc.ground import Ground
+from dojo_opt.mpc.horizon import shift_multipliers, tail, with_own_terms
+from dojo_opt.mpc.measurement import Measurement
+from dojo_opt.mpc.moving import References
+from dojo_opt.mpc.policy import Policy
+from dojo_opt.mpc.tick import Settings, Tick
 from dojo_opt.plan import Plan
 from dojo_opt.planner import Solver
-from dojo_opt.plant import Plant
-from dojo_opt.policy import Policy
+from dojo_opt.plant.plant import Plant
+from dojo_opt.plant.study import Sampler, Study, monte_carlo
 from dojo_opt.problem import Problem
-from dojo_opt.study import Sampler, Study, monte_carlo
 from dojo_opt.term import StateTerm
-from dojo_opt.tick import Settings, Tick
 from sim import checks
 from solvers.status import Status
 
@@ -85,7 +85,7 @@ class MPC:
         return self._again()
 
     def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> Study:
-        """Closed loops under random perturbations; see `dojo_opt.study`."""
+        """Closed loops under random perturbations; see `dojo_opt.plant.study`."""
         return monte_carlo(self, plant, sampler, duration, **settings)
 
     def reset(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dojo_opt.perturbation import Perturbation, Push
+from dojo_opt.plant.perturbation import Perturbation, Push
 
 __all__ = ["Disturbances"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.policy import Policy
+from dojo_opt.mpc.policy import Policy
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dojo_opt.axes import finish
-from dojo_opt.loop import ClosedLoop
-from dojo_opt.study import Study
-from dojo_opt.tick import Tick, milliseconds
+from dojo_opt.mpc.tick import Tick, milliseconds
+from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.study import Study
+from dojo_opt.plots.axes import finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.feet import Feet
-from dojo_opt.footfall import Footfall
-from dojo_opt.gait import Gait, assemble
+from dojo_opt.gaits.footfall import Footfall
+from dojo_opt.gaits.gait import Gait, assemble
 from sim import checks
 from sim.simulator import Simulator
 

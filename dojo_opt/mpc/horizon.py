@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.moving import References
-from dojo_opt.policy import Policy
+from dojo_opt.mpc.moving import References
+from dojo_opt.mpc.policy import Policy
 from dojo_opt.problem import Problem
 from dojo_opt.term import PickTerm, StateTerm, Term
 

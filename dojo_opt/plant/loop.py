@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.plant import Plant
-from dojo_opt.tick import Tick
+from dojo_opt.mpc.tick import Tick
+from dojo_opt.plant.plant import Plant
 from sim import checks
 from sim.results import Contacts
 from sim.simulator import Simulator

@@ -1,7 +1,4 @@
-"""Figures. Every function takes the figure or axes to draw on, returns it, and shows nothing.
-
-matplotlib is imported when the first figure is made, without pyplot: no window, no global state.
-"""
+"""Figures of a motion: state, controls, contact forces, paths."""
 
 from __future__ import annotations
 
@@ -9,35 +6,14 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from dojo_opt.axes import finish as _finish
-from dojo_opt.gait_plots import foot_paths, friction_use, gait, gait_diagram
 from dojo_opt.motion import Motion, motion
-from dojo_opt.plots_mpc import base_path, closed_loop, study, survival, tick_times, tracking
+from dojo_opt.plots.axes import finish as _finish
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
-
-__all__ = [
-    "base_path",
-    "closed_loop",
-    "contact_forces",
-    "controls",
-    "foot_paths",
-    "friction_use",
-    "gait",
-    "gait_diagram",
-    "paths",
-    "state",
-    "study",
-    "survival",
-    "tick_times",
-    "tracking",
-    "trajectory",
-    "velocities",
-]
 
 
 @overload

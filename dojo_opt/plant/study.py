@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.loop import closed_loop
-from dojo_opt.perturbation import Perturbation
-from dojo_opt.plant import Plant
-from dojo_opt.tick import Tick, milliseconds
+from dojo_opt.mpc.tick import Tick, milliseconds
+from dojo_opt.plant.loop import closed_loop
+from dojo_opt.plant.perturbation import Perturbation
+from dojo_opt.plant.plant import Plant
 from sim import checks
 
 Vector = NDArray[np.float64]

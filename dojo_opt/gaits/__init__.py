@@ -1,0 +1,6 @@
+"""References for legged robots: gaits, standing, turning, jumps; by inverse kinematics, torques by inverse dynamics."""
+
+from dojo_opt.gaits.gait import Gait
+from dojo_opt.gaits.references import bound, hop, jump, pace, stand, trot, turn, walk
+
+__all__ = ["Gait", "bound", "hop", "jump", "pace", "stand", "trot", "turn", "walk"]

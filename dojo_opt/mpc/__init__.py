@@ -1,0 +1,1 @@
+"""Planning in closed loop: the controller and what it is made of."""
