@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from sim.dynamics import momentum_balance
 from sim.elimination import project, subtree_sums
-from sim.inequalities import apply_inequalities, apply_limits, inequality_kinematics, start_inequalities
+from sim.inequalities import (
+    apply_inequalities,
+    apply_limits,
+    inequality_kinematics,
+    keep_inequalities,
+    move_inequalities,
+    start_inequalities,
+)
 from sim.joints import joint_impulses
-from sim.model import Model, Options, Vector, Work
+from sim.model import Guess, Model, Options, Vector, Work
 from sim.newton import norm
 from solvers.jit import kernel
 
@@ -46,22 +53,30 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
 
 @kernel
 def first_attempt(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Vector
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
 ) -> int:
-    """0, the start at kappa itself, where the guess all but balances with its impulses; 1 everywhere else.
+    """0, the start at kappa itself, where the guess all but balances; 1 everywhere else.
 
-    The gap of a pressing contact encodes its impulse, kappa / gap: a robot that stands still starts at its solution,
-    and so does a step whose solution is known.   Leaves the iterate at the start of attempt 0.
+    Its impulses are those of the gaps, kappa / gap, with which a step whose solution is known starts there; or those of
+    the step before where they balance better: the gap of a pressing contact changes too much, its impulse does not.
+    Leaves the iterate at the start of attempt 0.
     """
     q, v, u = inputs
+    keep_inequalities(model, work)
     if not place(model, work, options.h, q, v, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 1.0)
     soft, _ = residuals(model, work, options.h, q, v, u)
-    if not place(model, work, options.h, q, guess, 1.0):
+    if not place(model, work, options.h, q, guess.velocity, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 0.0)
     hard, _ = residuals(model, work, options.h, q, v, u)
+    if guess.impulses:
+        move_inequalities(model, work, 0.0)
+        last, _ = residuals(model, work, options.h, q, v, u)
+        if last < min(hard, soft):
+            return 0
+        start_inequalities(model, work, options.h, options.kappa, 0.0)
     return 0 if hard < _AT_REST * soft else 1
 
 

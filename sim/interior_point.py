@@ -34,7 +34,7 @@ from sim.inequalities import (
 )
 from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
-from sim.model import Goal, Model, Options, Outcome, Vector, Work
+from sim.model import Goal, Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale
 from solvers.jit import kernel
 from solvers.status import Status
@@ -217,9 +217,9 @@ def try_from(
 
 @kernel
 def interior_point(
-    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Vector
+    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:
-    """Solve the step for v25 with all complementarity products at kappa; guess: (nv,) of v25, may be far off.
+    """Solve the step for v25 with all complementarity products at kappa; the guess may be far off.
 
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """

@@ -161,6 +161,13 @@ class Options(NamedTuple):
     max_iterations: int
 
 
+class Guess(NamedTuple):
+    """Where a step may start to look for its solution; how good a guess it is, is found out."""
+
+    velocity: Vector  # (nv,) of v25
+    impulses: bool  # work holds the impulses of the step before
+
+
 class Goal(NamedTuple):
     """What a Newton step of the interior point aims at."""
 

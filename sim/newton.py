@@ -6,7 +6,7 @@ from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints import joint_blocks, joint_impulses
 from sim.kinematics import velocity_columns
-from sim.model import Model, Options, Outcome, Vector, Work
+from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -38,15 +38,15 @@ def norm(x: Vector) -> float:
 
 
 @kernel
-def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Vector) -> Outcome:
-    """Solve R(v25) = 0 from v25 = guess; halve steps that leave the domain or let the residual grow.
+def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+    """Solve R(v25) = 0 from the guess of v25; halve steps that leave the domain or let the residual grow.
 
     Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
     """
     h = options.h
     scale = residual_scale(work)
     for d in range(v.shape[0]):
-        work.nu_trial[d] = guess[d]
+        work.nu_trial[d] = guess.velocity[d]
         work.dnu[d] = 0.0
     alpha = 1.0
     last = 1e300

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from sim.gradients import gradient
 from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Options, Vector, Work
+from sim.model import Guess, Integers, Matrix, Options, Vector, Work
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
@@ -68,7 +68,10 @@ def roll(
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
     for t in range(us.shape[0]):
-        if step(model, work, options, xs[t], us[t], xs[t, nq:], xs[t + 1], reports[t], hard, smooth) != _SOLVED:
+        if (
+            step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t], hard, smooth)
+            != _SOLVED
+        ):
             return t
         if hard is not None:
             report_contacts(model, work, contacts[t])
@@ -120,10 +123,10 @@ def closed_loop(
         b = xs[t + 1]
         for k in range(x.shape[0]):
             b[k] = xs[t, k]
-        for _ in range(substeps):
+        for s in range(substeps):
             for k in range(x.shape[0]):
                 work.step_x[0, k] = b[k]
-            guess = xs_ref[t + 1, nq:] if substeps == 1 else work.step_x[0, nq:]
+            guess = Guess(xs_ref[t + 1, nq:] if substeps == 1 else work.step_x[0, nq:], t + s > 0)
             if step(model, work, options, work.step_x[0], u_out[t], guess, b, report, hard, smooth) != _SOLVED:
                 return t
         if alpha < 1.0:
@@ -190,7 +193,8 @@ def linearize(
         for s in range(substeps):
             for k in range(x.shape[0]):
                 x[k] = x_next[k]
-            guess = line.xs[t + 1, nq:] if substeps == 1 and t + 1 < line.xs.shape[0] else x[nq:]
+            known = substeps == 1 and t + 1 < line.xs.shape[0]
+            guess = Guess(line.xs[t + 1, nq:] if known else x[nq:], s > 0)
             if step(model, work, options, x, line.us[t], guess, x_next, report, hard, smooth) != _SOLVED:
                 break
             Js = A if s == 0 else work.step_A
@@ -239,7 +243,9 @@ def _roll_one(
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
     for t in range(us.shape[0]):
-        status = step(model, work, options, xs[t], us[t], xs[t, nq:], xs[t + 1], work.report, hard, smooth)
+        status = step(
+            model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report, hard, smooth
+        )
         if status != _SOLVED:
             return status, t
     return _SOLVED, us.shape[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.dynamics import begin_step
 from sim.inequalities import worst_contact
 from sim.interior_point import interior_point
-from sim.model import Model, Options, Outcome, Vector, Work
+from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import newton
 from solvers.jit import kernel
 from solvers.status import Status
@@ -22,7 +22,7 @@ def step(
     options: Options,
     x: Vector,
     u: Vector,
-    guess: Vector,
+    guess: Guess,
     out: Vector,
     report: Vector,
     hard: int | None,
@@ -30,7 +30,7 @@ def step(
 ) -> int:
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
-    guess: (nv,) where the search for the next velocity may start, x[nq:] when nothing better is known.
+    guess: of the next velocity, x[nq:] when nothing better is known.
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
     last iterate when the status is not SOLVED; nobody must use it.
     Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of
