@@ -15,13 +15,13 @@ from sim.limits import add_limit_blocks
 from sim.model import InputKind, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)
 
 
-@kernel
+@inlined
 def gradient(
     model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix, hard: int | None
 ) -> bool:

@@ -36,7 +36,7 @@ from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.model import Goal, Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -215,7 +215,7 @@ def try_from(
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
-@kernel
+@inlined
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:

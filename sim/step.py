@@ -7,7 +7,7 @@ from sim.inequalities import worst_contact
 from sim.interior_point import interior_point
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import newton
-from solvers.jit import kernel
+from solvers.jit import inlined
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -15,7 +15,7 @@ _NOT_FINITE = int(Status.NOT_FINITE)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 
 
-@kernel
+@inlined
 def step(
     model: Model,
     work: Work,

@@ -22,7 +22,16 @@ from typing import Any, TypeVar
 import numba
 from numba import prange
 
-__all__ = ["cache_folder", "compiled_signatures", "kernel", "local_kernel", "parallel_kernel", "prange", "threads"]
+__all__ = [
+    "cache_folder",
+    "compiled_signatures",
+    "inlined",
+    "kernel",
+    "local_kernel",
+    "parallel_kernel",
+    "prange",
+    "threads",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -104,6 +113,13 @@ def kernel(func: F) -> F:
     """
     inner = not {"Model", "Work"}.isdisjoint(func.__annotations__.values())
     return _compile(func, _nrt=False, no_cpython_wrapper=inner, no_cfunc_wrapper=True)
+
+
+def inlined(func: F) -> F:
+    """A kernel whose text becomes part of its callers: for the few that stand around a long one, which the compiler
+    would otherwise optimise once more on their account. Called from kernels only.
+    """
+    return _compile(func, _nrt=False, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 def local_kernel(func: F) -> F:
