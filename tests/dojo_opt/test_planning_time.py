@@ -66,12 +66,12 @@ def test_mujoco_and_numpy_plan_the_same_trot(trot):
 
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 def test_derivatives_of_a_knot_are_chained_over_its_steps():
-    """The hopper tumbles in the air: five steps of 10 ms against central differences over all five."""
+    """The hopper tumbles in the air: four steps against central differences over all four."""
     hop = dojo.problems.hop()
     start = hop.sim.integrate(hop.start, np.random.default_rng(1).normal(size=hop.sim.ndx))
     start[2] += 5.0
     solver = planning_time.MujocoIlqr(dojo.Problem(hop.sim, start, 2, cost=hop.specs[0][1:], controls0=[0.5, 0.3, 4.0]))
-    assert solver.substeps == 5
+    assert solver.substeps == 4
     xs, us = solver._guess()
     A, B, gaps = solver._linearize(xs, us)
     np.testing.assert_allclose(gaps, 0.0, atol=1e-12)
