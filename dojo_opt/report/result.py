@@ -73,7 +73,7 @@ def machine() -> dict[str, Any]:
     if hasattr(os, "getloadavg"):
         facts["load"] = round(os.getloadavg()[0], 1)
     facts["python"] = platform.python_version()
-    for name in ("dojo-opt", "numba", "numpy", "mujoco"):
+    for name in ("dojo-opt", "numba", "numpy", "mujoco", "crocoddyl", "pin"):
         try:
             facts[name] = version(name)
         except PackageNotFoundError:

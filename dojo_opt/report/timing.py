@@ -1,4 +1,4 @@
-"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; beside MuJoCo.
+"""Report `timing`: microseconds per step and gradient, per link of a chain, per planner iteration; beside peers.
 
 One core, processor time, whole horizons per call so that no Python is inside the clock. Every case runs once per
 round; times are medians over the rounds, ratios medians of the ratios taken round by round.
@@ -21,6 +21,7 @@ import numpy as np
 import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave, ratio, slope
+from dojo_opt.report.planning_time import add_planning
 from dojo_opt.report.result import Report, Row
 from sim.model import Vector
 from sim.simulator import Simulator
@@ -55,7 +56,7 @@ def measure(*, quick: bool = False) -> Report:
         _scene(report, "the same with 24 limits, 20 ms", sim, start, np.zeros(sim.nu), rounds, Bars())
         _landing(report, rounds)
         _chains(report, rounds)
-        _planner(report, rounds=2 if quick else 15)
+        add_planning(report, quick=quick)
     _batch(report, rounds)
     report.notes.append("step, gradient: microseconds of processor time; iterations: Newton iterations per step")
     if find_spec("mujoco") is None:
@@ -66,9 +67,9 @@ def measure(*, quick: bool = False) -> Report:
 def _standing(time_step: float, *, limits: bool = False) -> tuple[Simulator, Vector]:
     """A quadruped of 13 bodies, and the state in which its sprung joints hold it on its four feet."""
     mechanism = dojo.models.quadruped(spring=80.0, damper=4.0, limits=limits)
-    settle = Simulator(mechanism, time_step=0.02)
-    x = _solved("quadruped", settle.rollout(settle.neutral(), np.zeros((200, settle.nu)))).x[-1]
-    return Simulator(mechanism, time_step=time_step), np.ascontiguousarray(x)
+    sim = Simulator(mechanism, time_step=time_step)  # at rest for this time step: at another it still moves
+    x = _solved("quadruped", sim.rollout(sim.neutral(), np.zeros((round(4.0 / time_step), sim.nu)))).x[-1]
+    return sim, np.ascontiguousarray(x)
 
 
 def _scene(report: Report, name: str, sim: Simulator, x: Vector, u: Vector, rounds: int, bars: Bars) -> None:
@@ -177,21 +178,10 @@ def _chains(report: Report, rounds: int) -> None:
     report.rows.append(Row("chains: log-log slope", slope(np.array(LINKS), per_iteration), "", 1.1, note="10 to 200"))
 
 
-def _planner(report: Report, rounds: int) -> None:
-    """ILQR on the hop: the whole solve divided by its iterations, the rejected ones included."""
-    problem = dojo.problems.hop()
-    plan = dojo.ilqr(problem)
-    seconds = interleave({"hop": lambda: dojo.ilqr(problem)}, rounds)["hop"]
-    per_iteration = 1e3 * float(np.median(seconds)) / plan.nit
-    report.details["planner"] = {"seconds": seconds.tolist(), "iterations": plan.nit, "knots": len(plan.u)}
-    note = f"{len(plan.u)} knots, {plan.nit} iterations, {1e3 * float(np.median(seconds)):.3g} ms per solve"
-    report.rows.append(Row("hopper: iLQR iteration", per_iteration, "ms", 0.8, note=note))
-
-
 def _batch(report: Report, rounds: int) -> None:
     """Rollouts of 64 quadrupeds on two threads against one, by the clock on the wall."""
-    if (os.cpu_count() or 1) < 2:
-        report.notes.append("batch: left out, there is one core")
+    if int(os.environ.get("NUMBA_NUM_THREADS", os.cpu_count() or 1)) < 2:
+        report.notes.append("batch: left out, there is one core, or NUMBA_NUM_THREADS is 1")
         return
     sim, start = _standing(0.02)
     x = np.tile(start, (64, 1))
