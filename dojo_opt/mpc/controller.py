@@ -44,7 +44,7 @@ class MPC:
                 plan only, which is solved to the end; its references are overwritten where `reference` is given.
     iterations  of the planner per tick. One is enough for costs, control limits and equalities; an inequality among the
                 constraints is not seen by an iteration that starts on its good side, and takes about three
-    reference   what to track over time, see `dojo_opt.mpc.moving.References`; without it, the problem's own at every tick
+    reference   what to track over time, see `mpc.moving.References`; without it, the problem's own at every tick
     plan        the first plan, at the time of the first call; without it, `ilqr` is called with its defaults
     settings    fields of `dojo_opt.mpc.tick.Settings` by name
 

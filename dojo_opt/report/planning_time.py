@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.mpc.tick import milliseconds
 from dojo_opt.problem import Problem
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.crocoddyl_trot import CrocoddylTrot
 from dojo_opt.report.mujoco_ilqr import MujocoIlqr
 from dojo_opt.report.result import Report, Row
-from dojo_opt.tick import milliseconds
 
 CROCODDYL, PIN = "3.2.1", "4.0.0"  # wheels that fit one another: with others crocoddyl ends the process
 
