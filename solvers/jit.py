@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -44,7 +45,9 @@ def _sources() -> list[Path]:
     """Every file whose text can end up inside a compiled kernel; a loader of files (sim/urdf) is not among them."""
     root = Path(__file__).resolve().parent.parent
     files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name != "urdf")]
-    files += [f for f in root.glob("dojo_opt/**/*.py") if b"solvers.jit" in f.read_bytes()]
+    files += [
+        f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
+    ]
     return sorted(files)
 
 
