@@ -15,7 +15,7 @@ from sim.inequalities import (
 from sim.joints import joint_impulses
 from sim.model import Guess, Model, Options, Vector, Work
 from sim.newton import norm
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
@@ -80,7 +80,7 @@ def first_attempt(
     return 0 if hard < _AT_REST * soft else 1
 
 
-@kernel
+@inlined
 def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, attempt: int) -> float:
     """Start on the central path: attempt 0 at kappa itself (see above), 1 at the usual kappa0, then at others.
 

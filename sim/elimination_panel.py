@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.model import Matrix, Model, Work
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 from solvers.lu import lu_solve_rows
 
 
@@ -65,7 +65,7 @@ def _pass_up(P: Matrix, child: int, parent: int) -> None:
             s[k] += p[k]
 
 
-@kernel
+@inlined
 def _panel_up(model: Model, work: Work) -> None:
     """From the leaves to the root: columns = D^-1 (columns - S2^T p), p_parent += p + U columns.
 

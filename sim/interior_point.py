@@ -61,7 +61,7 @@ class Merit(NamedTuple):
     mean: float  # of the complementarity products
 
 
-@kernel
+@inlined
 def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float) -> bool:
     """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular."""
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
@@ -71,7 +71,7 @@ def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smo
     return factor(model, work)
 
 
-@kernel
+@inlined
 def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> float:
     """Newton step dnu and the steps of all cones; returns the step to their boundary.
 
@@ -135,7 +135,7 @@ def assess(
     return Merit(1e301, 1e301, 1e301)
 
 
-@kernel
+@inlined
 def search(
     model: Model,
     work: Work,
