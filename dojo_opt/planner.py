@@ -117,7 +117,9 @@ class Solver:
                 met = self.objective.mismatch(now.x, now.u) <= options.violation
                 if met and now.gap <= options.gap:
                     return status
-                if status == Status.LINE_SEARCH and last > 0 and softened < _SOFTEN:
+                if status == Status.LINE_SEARCH and last > 0:
+                    if softened >= _SOFTEN:
+                        return status
                     index, softened = last - 1, softened + 1
                     continue
             self.objective.update_multipliers(now.x, now.u)
