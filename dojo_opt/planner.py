@@ -100,7 +100,8 @@ class Solver:
     def _run(self) -> Status:
         """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
 
-        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened once more.
+        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
+        few times; after that the solve ends, where it used to repeat failed line searches up to its iteration limit.
         """
         options = self.options
         last = len(options.stages) - 1
