@@ -195,8 +195,11 @@ class Continuation:
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:
             descent.lower_regularization()
-        elif alpha < _POOR_STEP and (self.now.gaps is None or descent.mu < _FIRM):
-            # gaps close only under gains that keep the robot up: at 1e6 there are none left, and it fell over
+        elif (
+            alpha < _POOR_STEP
+            # while contact is discovered, gaps close only under gains that keep the robot up: at 1e6 none are left
+            and (self.now.gaps is None or descent.mu < _FIRM or stage is self._options.stages[-1])
+        ):
             descent.raise_regularization()
         self._fresh = self._fresh and alpha == 0.0
         return alpha
