@@ -24,8 +24,10 @@ _GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
 _POOR_STEP = 0.1  # one shorter than this raises it
 _LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
 _SLOW = 2  # short steps in a row that bring next to nothing end a stage
+_SLOW_OPEN = 6  # the same with open gaps and a model that promises more: standing still is a poor guess of a trot
 _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
 _PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
+_FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
 _FITS = 2.0  # times the least sum of squared gaps: what counts as a good fit of a guess
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 
@@ -142,7 +144,8 @@ class Continuation:
             if promise.status != Status.SOLVED:
                 return Status.MAX_REGULARIZATION
             small = stage.decrease * (abs(self.now.merit) + _SMALL)
-            if self.now.gaps is None and self._descent.mu <= _LIGHT and -(promise.d0 + 0.5 * promise.d1) <= small:
+            promised = -(promise.d0 + 0.5 * promise.d1)
+            if self.now.gaps is None and self._descent.mu <= _LIGHT and promised <= small:
                 return Status.SOLVED
             status = self._over_budget()
             if status != Status.SOLVED:
@@ -158,12 +161,18 @@ class Continuation:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
                 slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
-                if slow >= (1 if alpha >= _GOOD_STEP and before.gaps is None else _SLOW):
+                if slow >= self._allowed(alpha, before, promised > small):
                     if self.now.gaps is None or stage is not self._options.stages[-1]:
                         return Status.SOLVED
                     self._unstick(stage)  # the last stage does not leave gaps
                     slow = 0
         return Status.SOLVED
+
+    def _allowed(self, alpha: float, before: Iterate, promising: bool) -> int:
+        """How many steps in a row may bring next to nothing before the stage ends."""
+        if before.gaps is None:
+            return 1 if alpha >= _GOOD_STEP else _SLOW
+        return _SLOW_OPEN if promising else _SLOW
 
     def _unstick(self, stage: Stage) -> bool:
         """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
@@ -186,7 +195,11 @@ class Continuation:
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:
             descent.lower_regularization()
-        elif alpha < _POOR_STEP:
+        elif (
+            alpha < _POOR_STEP
+            # while contact is discovered, gaps close only under gains that keep the robot up: at 1e6 none are left
+            and (self.now.gaps is None or descent.mu < _FIRM or stage is self._options.stages[-1])
+        ):
             descent.raise_regularization()
         self._fresh = self._fresh and alpha == 0.0
         return alpha

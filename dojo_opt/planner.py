@@ -100,7 +100,8 @@ class Solver:
     def _run(self) -> Status:
         """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
 
-        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened once more.
+        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
+        few times; after that the solve ends, where it used to repeat failed line searches up to its iteration limit.
         """
         options = self.options
         last = len(options.stages) - 1
@@ -117,7 +118,9 @@ class Solver:
                 met = self.objective.mismatch(now.x, now.u) <= options.violation
                 if met and now.gap <= options.gap:
                     return status
-                if status == Status.LINE_SEARCH and last > 0 and softened < _SOFTEN:
+                if status == Status.LINE_SEARCH and last > 0:
+                    if softened >= _SOFTEN:
+                        return status
                     index, softened = last - 1, softened + 1
                     continue
             self.objective.update_multipliers(now.x, now.u)

@@ -222,6 +222,14 @@ def test_line_search_failure():
     assert all(r["alpha"] == 0.0 for r in plan.history) and plan.nit >= 1
 
 
+def test_a_last_stage_that_stays_stuck_ends_the_solve():
+    goal = Goal(np.zeros(2))
+    problem = Problem(Contrary(), [1.0, 0.0], 10, cost=[Tracking(np.zeros(2), 1.0), Effort(1e-3)], constraints=[goal])
+    plan = ilqr(problem)
+    assert not plan.success and plan.status == Status.LINE_SEARCH
+    assert plan.nit <= 100
+
+
 def test_simulation_failure_names_the_knot():
     problem = swingup(controls0=np.full((30, 1), 50.0))
     problem.sim.too_fast = 12.0

@@ -72,6 +72,15 @@ def test_trot_from_standing_still(damping, speed):
     assert np.ptp(problem.states0[1:], axis=0).max() == 0.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("damping, speed", [(0.3, 0.38), (0.5, 0.39), (0.8, 0.35)])
+def test_trot_from_standing_still_keeps_its_gains_while_gaps_are_open(damping, speed):
+    problem = problems.trot(damping=damping, speed=speed, guess="standing")
+    plan = ilqr(problem)
+    check(problem, plan, 60)
+    assert max(record["mu"] for record in plan.history if record["gap"] > 0.0) < 100.0
+
+
 @pytest.mark.parametrize("name, iterations", [("pace", 40), ("walk", 20), ("turn", 30)])
 def test_other_gaits(name, iterations):
     problem = getattr(problems, name)()
