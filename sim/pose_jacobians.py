@@ -7,7 +7,7 @@ A1   d/d(pose 1): the incoming momentum
 
 from __future__ import annotations
 
-from sim.dynamics import angular_momentum, angular_momentum_jacobian, momentum_balance_jacobian
+from sim.dynamics import angular_momentum, angular_momentum_jacobian, body_jacobian
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
@@ -57,12 +57,12 @@ def inertial_jacobians(model: Model, work: Work, h: float) -> None:
     A1 = diag(m/h I, D-),   A2 = diag(-2 m/h I, -D+ - D- - [P+ - P-]) + inputs that turn with the body
     D+ = dP+/dphi3, D- = d(-P-)/dphi1, rows of A1 about O by d2, columns by d1
     """
-    momentum_balance_jacobian(model, work, h, work.A3)
     J = work.inertia_world
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         e, u, v, w = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
         plus = angular_momentum_jacobian(J, i, h, c, x, y, z)
+        body_jacobian(model, work, h, i, plus, work.A3[i])
         minus = angular_momentum_jacobian(J, i, h, e, -u, -v, -w)
         px, py, pz = angular_momentum(J, i, h, c, x, y, z)
         mx, my, mz = angular_momentum(J, i, h, e, -u, -v, -w)  # -P-

@@ -75,6 +75,7 @@ def _standing(time_step: float, *, limits: bool = False) -> tuple[Simulator, Vec
 def _scene(report: Report, name: str, sim: Simulator, x: Vector, u: Vector, rounds: int, bars: Bars) -> None:
     """Rows of one mechanism that holds still: step, gradient, and their ratios to MuJoCo's."""
     us = np.tile(u, (KNOTS, 1))
+    x = np.ascontiguousarray(_solved(name, sim.rollout(x, us)).x[-1])  # settled to the last digit
     trajectory = _solved(name, sim.rollout(x, us))
     xs = np.tile(x, (KNOTS, 1))
     cases: dict[str, Callable[[], Any]] = {
