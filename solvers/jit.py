@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba import prange
+from numba.core.registry import cpu_target
 
 __all__ = [
     "cache_folder",
@@ -91,6 +92,12 @@ _FOLDER = cache_folder()
 if _FOLDER is not None:
     os.utime(_FOLDER)
     _prune(_FOLDER.parent)
+
+
+# Plain arithmetic before anything else: a first look into a cache registers the operators of sets and strings first,
+# and every operator of every kernel is then tried on all of them: 10 of the 50 s of processor time of a cold start
+# (numba 0.68).
+cpu_target.typing_context.refresh()
 
 
 def _compile(func: F, cache: bool = True, **flags: Any) -> F:
