@@ -1,18 +1,14 @@
 """benchmarks/urdf_zoo.py on a file of our own, and on a sample of robots from packages where these are installed."""
 
-import importlib.util
 import json
-import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmark import loaded
 from urdf_files import collision, compare_with_mujoco, inertial, joint, link, write
 
 import dojo_opt as dojo
-
-PATH = Path(__file__).parent.parent / "benchmarks" / "urdf_zoo.py"
 
 # part of a path: why it is in the sample
 SAMPLE = {
@@ -32,12 +28,7 @@ SAMPLE = {
 
 @pytest.fixture(scope="module")
 def zoo():
-    spec = importlib.util.spec_from_file_location("urdf_zoo", PATH)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[spec.name]
+    yield from loaded("urdf_zoo")
 
 
 @pytest.fixture(scope="module")

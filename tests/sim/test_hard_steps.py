@@ -1,17 +1,12 @@
 """Single steps that were hard: each was missed by some form of the interior point and is solved by the reference."""
 
-import sys
-from importlib import util
-from pathlib import Path
-
 import numpy as np
 import pytest
+from benchmark import loaded
 from naive import rotation as rot
 from scenes import ball, block, gaps
 
 import dojo_opt as dojo
-
-PATH = Path(__file__).parents[2] / "benchmarks" / "robustness.py"
 
 # cells of benchmarks/robustness.py at seed 0: mechanism, friction, time step, kappa, number of the state
 CELLS = (
@@ -38,12 +33,7 @@ CELLS = (
 
 @pytest.fixture(scope="module")
 def robustness():
-    spec = util.spec_from_file_location("robustness", PATH)
-    module = util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[spec.name]
+    yield from loaded("robustness")
 
 
 @pytest.mark.parametrize("cell", CELLS, ids=str)
