@@ -19,7 +19,7 @@ import numpy as np
 
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import milliseconds
-from dojo_opt.report import REPORTS, run_report
+from dojo_opt.report import STUDIES, run_report, write_page
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
@@ -42,11 +42,14 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
 
-    report = commands.add_parser("report", help="measure, and print a table", description="Measure, print a table.")
-    report.add_argument("name", choices=sorted(REPORTS), metavar="NAME", help=_listing(REPORTS))
-    report.add_argument("--json", action="store_true", help="print every number as JSON instead of the table")
+    what = "Run studies: tables on the terminal; with --out a page with figures, and every number as JSON."
+    report = commands.add_parser("report", help="measure, and show it", description=what)
+    names = {"all": "every study", **{name: what for name, (what, *_) in STUDIES.items()}}
+    report.add_argument("name", choices=list(names), metavar="NAME", help=_listing(names))
+    report.add_argument("robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="measure this robot instead")
+    report.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
     report.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
-    report.add_argument("--out", type=Path, metavar="DIR", help="also write NAME.txt and NAME.json to this folder")
+    report.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
     report.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
 
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
@@ -58,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _listing(names: dict[str, str]) -> str:
-    return "; ".join(f"{name}: {what}" for name, what in sorted(names.items()))
+    return "; ".join(f"{name}: {what}" for name, what in names.items())
 
 
 def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
@@ -126,14 +129,17 @@ def _run_loop(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
-    report = run_report(args.name, quick=args.quick)
-    text = report.as_json() if args.json else report.as_text()
-    print(text)
+    mechanism = None if args.robot is None else dojo.load_urdf(args.robot)
+    names = list(STUDIES) if args.name == "all" else [args.name]
+    reports = {name: run_report(name, quick=args.quick, mechanism=mechanism, verbose=True) for name in names}
+    if args.json:
+        print(json.dumps({name: json.loads(report.as_json()) for name, report in reports.items()}, indent=1))
+    else:
+        print("\n\n".join(report.as_text() for report in reports.values()))
     if args.out:
-        args.out.mkdir(parents=True, exist_ok=True)
-        (args.out / f"{args.name}.txt").write_text(report.as_text() + "\n")
-        (args.out / f"{args.name}.json").write_text(report.as_json() + "\n")
-    return 1 if args.strict and not report.met() else 0
+        arguments = [args.name, *([str(args.robot)] if args.robot else []), *(["--quick"] if args.quick else [])]
+        write_page(reports, args.out, "dojo-opt report " + " ".join(arguments))
+    return 1 if args.strict and not all(report.met() for report in reports.values()) else 0
 
 
 def _models(args: argparse.Namespace) -> int:

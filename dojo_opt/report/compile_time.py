@@ -7,12 +7,14 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dojo_opt.report.result import Report, Row
+from dojo_opt.report.study import Progress
 
 # One new process: the import, the first plan, and the same plan again, which is the time of the solve alone.
 _PROGRAM = """
@@ -33,33 +35,39 @@ print(json.dumps({"import": imported, "first": first, "again": second, "success"
 """
 
 
-def measure(*, quick: bool = False) -> Report:
+@dataclass(frozen=True)
+class CompileTime:
     """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process."""
-    report = Report("Start of a new process, to the first planned hop", "python -m dojo_opt report compile")
-    with tempfile.TemporaryDirectory() as folder:
-        cold = _start(folder)
-        size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
-        warm = [_start(folder) for _ in range(1 if quick else 5)]
-    report.details = {"cold": cold, "warm": warm, "cache_bytes": size}
 
-    def median(what: str, clock: int) -> float:
-        return float(np.median([run[what][clock] for run in warm]))
+    quick: bool = False
 
-    beyond = float(np.median([run["first"][0] - run["again"][0] for run in warm]))
-    report.rows = [
-        Row("import dojo_opt", median("import", 0), "s", 0.7),
-        Row("cold start to first plan, CPU", cold["first"][1], "s", 40.0),
-        Row("cold start to first plan, wall", cold["first"][0], "s"),
-        Row("warm start to first plan, wall", median("first", 0), "s"),
-        Row("of which the solve", median("again", 0), "s", note="the same plan again"),
-        Row("of which the rest", beyond, "s", 1.5, note="imports, loading compiled code"),
-        Row("kernels", cold["kernels"], ""),
-        Row("signatures", cold["signatures"], ""),
-        Row("cache", size / 1e6, "MB"),
-    ]
-    if cold["several"]:
-        report.notes = ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
-    return report
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        report = Report("Start of a new process, to the first planned hop", "python -m dojo_opt report compile")
+        starts = ["cold", *["warm"] * (1 if self.quick else 5)]
+        with tempfile.TemporaryDirectory() as folder:
+            cold, *warm = [_start(folder) for _ in progress([(name, None) for name in starts], "compile")]
+            size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
+        report.details = {"cold": cold, "warm": warm, "cache_bytes": size}
+
+        def median(what: str, clock: int) -> float:
+            return float(np.median([run[what][clock] for run in warm]))
+
+        beyond = float(np.median([run["first"][0] - run["again"][0] for run in warm]))
+        report.rows = [
+            Row("import dojo_opt", median("import", 0), "s", 0.7),
+            Row("cold start to first plan, CPU", cold["first"][1], "s", 40.0),
+            Row("cold start to first plan, wall", cold["first"][0], "s"),
+            Row("warm start to first plan, wall", median("first", 0), "s"),
+            Row("of which the solve", median("again", 0), "s", note="the same plan again"),
+            Row("of which the rest", beyond, "s", 1.5, note="imports, loading compiled code"),
+            Row("kernels", cold["kernels"], ""),
+            Row("signatures", cold["signatures"], ""),
+            Row("cache", size / 1e6, "MB"),
+        ]
+        if cold["several"]:
+            report.notes = ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
+        return report
 
 
 def _start(folder: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Report: rows of measured numbers with their bars, as an aligned table or as JSON."""
+"""Report: what one study measured, as rows with their bars, tables, a figure, and every raw number."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import json
 import os
 import platform
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+Cell = str | float | int | bool | None
+
+_PACKAGES = ("dojo-opt", "numba", "numpy", "scipy", "mujoco", "drake", "pybullet", "crocoddyl", "pin")
 
 
 @dataclass(frozen=True)
@@ -25,46 +30,104 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the bar is met; None without a bar."""
+        """Whether the bar is met; None without a bar, False for a value that is not a number."""
         if self.bar is None:
             return None
         return bool(self.value >= self.bar if self.at_least else self.value <= self.bar)
 
+    @property
+    def bound(self) -> str:
+        """The bar with its direction."""
+        return "" if self.bar is None else f"{'>=' if self.at_least else '<='} {self.bar:.4g}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numbers side by side: one row per case, one column per engine, or setting."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.header):
+                raise ValueError(f"Table {self.title!r}: {len(self.header)} columns, but a row has {len(row)}: {row}")
+
 
 @dataclass
 class Report:
-    """What one report measured, on which machine, by which command."""
+    """What one study measured, on which machine, by which command."""
 
     title: str
     command: str
     rows: list[Row] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)  # every raw number
     notes: list[str] = field(default_factory=list)
     machine: dict[str, Any] = field(default_factory=lambda: machine())
+    summary: str = ""  # what was measured, and against which reference
+    figure: Any = None  # a matplotlib Figure
 
     def met(self) -> bool:
         """Whether no bar was missed."""
         return all(row.met is not False for row in self.rows)
 
-    def as_json(self) -> str:
-        """Everything, raw numbers included."""
+    def as_dict(self) -> dict[str, Any]:
+        """Everything but the figure, raw numbers included."""
         rows = [{**asdict(row), "met": row.met} for row in self.rows]
-        return json.dumps({**asdict(self), "rows": rows, "met": self.met()}, indent=1, default=float)
+        fields = {name: getattr(self, name) for name in ("title", "command", "summary", "details", "notes", "machine")}
+        return {**fields, "rows": rows, "tables": [asdict(table) for table in self.tables], "met": self.met()}
+
+    def as_json(self) -> str:
+        """Everything but the figure, as JSON; infinities and NaN as strings, which JSON has no numbers for."""
+        return json.dumps(finite(self.as_dict()), indent=1)
 
     def as_text(self) -> str:
-        """The aligned table."""
-        cells = [("", "value", "unit", "bar", "met", "")]
-        for row in self.rows:
-            bar = "" if row.bar is None else f"{'>=' if row.at_least else '<='} {row.bar:.4g}"
-            met = {None: "", True: "yes", False: "NO"}[row.met]
-            cells.append((row.name, f"{row.value:.4g}", row.unit, bar, met, row.note))
-        widths = [max(len(line[k]) for line in cells) for k in range(6)]
-        lines = [self.title, ""]
-        for name, value, unit, bar, met, note in cells:
-            left = f"{name:<{widths[0]}}  {value:>{widths[1]}} {unit:<{widths[2]}}"
-            lines.append(f"{left}  {bar:<{widths[3]}}  {met:<{widths[4]}}  {note}".rstrip())
-        lines += ["", *self.notes, ", ".join(f"{k} {v}" for k, v in self.machine.items()), f"command: {self.command}"]
+        """Aligned tables."""
+        lines = [self.title, "", *([self.summary, ""] if self.summary else [])]
+        if self.rows:
+            cells = [(r.name, f"{r.value:.4g} {r.unit}", r.bound, verdict(r.met), r.note) for r in self.rows]
+            lines += [*aligned(("", "value", "bar", "met", ""), cells), ""]
+        for table in self.tables:
+            lines += [table.title, *aligned(table.header, [[shown(c) for c in row] for row in table.rows])]
+            lines += [table.note, ""] if table.note else [""]
+        lines += [*self.notes, ", ".join(f"{k} {v}" for k, v in self.machine.items()), f"command: {self.command}"]
         return "\n".join(lines)
+
+
+def verdict(met: bool | None) -> str:
+    """A word for a bar."""
+    return {None: "", True: "yes", False: "NO"}[met]
+
+
+def shown(cell: Cell) -> str:
+    """A cell as people read it."""
+    if cell is None:
+        return ""
+    if isinstance(cell, bool):
+        return "yes" if cell else "NO"
+    return cell if isinstance(cell, str) else f"{cell:.4g}"
+
+
+def aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table with columns of equal width."""
+    widths = [max(len(line[k]) for line in [header, *rows]) for k in range(len(header))]
+    return ["  ".join(f"{c:<{w}}" for c, w in zip(line, widths, strict=True)).rstrip() for line in [header, *rows]]
+
+
+def finite(value: Any) -> Any:
+    """A value that JSON can hold: arrays as lists, numbers that are not finite as strings."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(k): finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(v) for v in value]
+    if isinstance(value, float) and value - value != 0.0:
+        return str(value)
+    return value
 
 
 def machine() -> dict[str, Any]:
@@ -73,7 +136,7 @@ def machine() -> dict[str, Any]:
     if hasattr(os, "getloadavg"):
         facts["load"] = round(os.getloadavg()[0], 1)
     facts["python"] = platform.python_version()
-    for name in ("dojo-opt", "numba", "numpy", "mujoco", "crocoddyl", "pin"):
+    for name in _PACKAGES:
         try:
             facts[name] = version(name)
         except PackageNotFoundError:

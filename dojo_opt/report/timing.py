@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -23,6 +24,7 @@ from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave, ratio, slope
 from dojo_opt.report.planning_time import add_planning
 from dojo_opt.report.result import Report, Row
+from dojo_opt.report.study import Progress
 from sim.model import Vector
 from sim.simulator import Simulator
 from solvers.jit import threads
@@ -41,27 +43,48 @@ class Bars(NamedTuple):
     under_jacobian: float | None = None  # at least so many gradients in one Jacobian of MuJoCo
 
 
-def measure(*, quick: bool = False) -> Report:
+@dataclass(frozen=True)
+class Timing:
     """All scenes; quick takes 3 rounds instead of 60."""
-    rounds = 3 if quick else 60
-    report = Report("Time on one core", "python -m dojo_opt report timing" + (" --quick" if quick else ""))
-    with threads(1):
-        hop = dojo.problems.hop()
-        _scene(report, "hopper", hop.sim, hop.start, hop.controls0[0], rounds, Bars(7.0, 4.0))
-        for h in (0.01, 0.02, 0.05):
-            sim, start = _standing(h)
-            bars = Bars(22.0, 13.0, 1.5, 25.0)
-            _scene(report, f"quadruped, {1e3 * h:.0f} ms", sim, start, np.zeros(sim.nu), rounds, bars)
-        sim, start = _standing(0.02, limits=True)
-        _scene(report, "the same with 24 limits, 20 ms", sim, start, np.zeros(sim.nu), rounds, Bars())
-        _landing(report, rounds)
-        _chains(report, rounds)
-        add_planning(report, quick=quick)
-    _batch(report, rounds)
-    report.notes.append("step, gradient: microseconds of processor time; iterations: Newton iterations per step")
-    if find_spec("mujoco") is None:
-        report.notes.append('without MuJoCo; pip install ".[bench]" for the ratios')
-    return report
+
+    quick: bool = False
+
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        report = Report("Time on one core", "python -m dojo_opt report timing" + (" --quick" if self.quick else ""))
+        report.summary = (
+            "Processor time of whole horizons, medians over interleaved rounds; ratios are taken round by round."
+        )
+        rounds = 3 if self.quick else 60
+        parts: dict[str, Callable[[], None]] = {
+            "hopper": lambda: _hopper(report, rounds),
+            "quadruped": lambda: _quadruped(report, rounds),
+            "landing": lambda: _landing(report, rounds),
+            "chains": lambda: _chains(report, rounds),
+            "planning": lambda: add_planning(report, quick=self.quick),
+        }
+        with threads(1):
+            for measure in progress(list(parts.items()), "timing"):
+                measure()
+        _batch(report, rounds)
+        report.notes.append("step, gradient: microseconds of processor time; iterations: Newton iterations per step")
+        if find_spec("mujoco") is None:
+            report.notes.append('without MuJoCo; pip install ".[bench]" for the ratios')
+        return report
+
+
+def _hopper(report: Report, rounds: int) -> None:
+    hop = dojo.problems.hop()
+    _scene(report, "hopper", hop.sim, hop.start, hop.controls0[0], rounds, Bars(7.0, 4.0))
+
+
+def _quadruped(report: Report, rounds: int) -> None:
+    for h in (0.01, 0.02, 0.05):
+        sim, start = _standing(h)
+        bars = Bars(22.0, 13.0, 1.5, 25.0)
+        _scene(report, f"quadruped, {1e3 * h:.0f} ms", sim, start, np.zeros(sim.nu), rounds, bars)
+    sim, start = _standing(0.02, limits=True)
+    _scene(report, "the same with 24 limits, 20 ms", sim, start, np.zeros(sim.nu), rounds, Bars())
 
 
 def _standing(time_step: float, *, limits: bool = False) -> tuple[Simulator, Vector]:
