@@ -1,0 +1,1 @@
+"""Contact geometry of two shapes: distance, normal, point and their derivatives, without mechanisms or steps."""

@@ -1,0 +1,37 @@
+"""`collide`: one contact point of a pair of shapes."""
+
+from __future__ import annotations
+
+from sim.collision.halfspace import sphere_halfspace
+from sim.collision.kinds import Pair
+from sim.collision.sphere import sphere_capsule, sphere_sphere, string
+from sim.collision.witness import absent
+from sim.model import Vector
+from solvers.jit import kernel
+
+
+@kernel
+def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
+
+    kind     a Pair; feature: 0 to kinds.count(kind) - 1
+    sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of kinds.Shape
+    R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
+    out      (43,), overwritten, in the frame of b:
+             0       phi, signed distance [m], negative inside; 1e9 where there is no such point now
+             1:4     n, unit normal from b to a
+             4:7     p, midpoint of the two nearest points [m]
+             7:25    dn/d(v, w), 25:43 dp/d(v, w): (3, 6), row-major; (v, w) is the twist of a about the origin of b:
+                     dr = v + w x r, dR = [w] R
+    d phi = n.(v + w x p).
+    """
+    if kind == Pair.SPHERE_SPHERE:
+        sphere_sphere(sizes, r, out)
+    elif kind == Pair.SPHERE_CAPSULE:
+        sphere_capsule(sizes, r, out)
+    elif kind == Pair.SPHERE_HALFSPACE:
+        sphere_halfspace(sizes, r, out)
+    elif kind == Pair.STRING:
+        string(sizes, r, out)
+    else:
+        absent(out)

@@ -1,0 +1,75 @@
+"""Shape, Pair: which pairs of shapes can touch, how their sizes are laid out, and how many contact points they have."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
+OUT = 43  # length of what `collide` writes
+
+
+class Shape(IntEnum):
+    """Shape of a collision, with its sizes [m]. Centred on the origin of its frame, long along z."""
+
+    SPHERE = 0  # radius
+    CAPSULE = 1  # radius, half length of the segment
+    BOX = 2  # half extents along x, y, z
+    CYLINDER = 3  # radius, half length
+    HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
+    STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
+
+
+class Pair(IntEnum):
+    """Kind of a collision: shape a against shape b, in this order."""
+
+    SPHERE_SPHERE = 0
+    SPHERE_CAPSULE = 1
+    SPHERE_BOX = 2
+    SPHERE_CYLINDER = 3
+    SPHERE_HALFSPACE = 4
+    CAPSULE_CAPSULE = 5
+    CAPSULE_BOX = 6
+    CAPSULE_HALFSPACE = 7
+    BOX_BOX = 8
+    BOX_HALFSPACE = 9
+    CYLINDER_HALFSPACE = 10
+    STRING = 11
+
+
+_PAIRS = {
+    (Shape.SPHERE, Shape.SPHERE): Pair.SPHERE_SPHERE,
+    (Shape.SPHERE, Shape.CAPSULE): Pair.SPHERE_CAPSULE,
+    (Shape.SPHERE, Shape.BOX): Pair.SPHERE_BOX,
+    (Shape.SPHERE, Shape.CYLINDER): Pair.SPHERE_CYLINDER,
+    (Shape.SPHERE, Shape.HALFSPACE): Pair.SPHERE_HALFSPACE,
+    (Shape.CAPSULE, Shape.CAPSULE): Pair.CAPSULE_CAPSULE,
+    (Shape.CAPSULE, Shape.BOX): Pair.CAPSULE_BOX,
+    (Shape.CAPSULE, Shape.HALFSPACE): Pair.CAPSULE_HALFSPACE,
+    (Shape.BOX, Shape.BOX): Pair.BOX_BOX,
+    (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
+    (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
+    (Shape.STRING, Shape.STRING): Pair.STRING,
+}
+
+_COUNT = {
+    Pair.CAPSULE_CAPSULE: 3,  # ends of the overlap, crossing
+    Pair.CAPSULE_BOX: 3,  # ends of the part above the face, closest point elsewhere
+    Pair.CAPSULE_HALFSPACE: 2,  # ends
+    Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
+    Pair.BOX_HALFSPACE: 8,  # corners
+    Pair.CYLINDER_HALFSPACE: 8,  # lowest points of two rims, three fixed points on each
+}
+
+
+def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
+    """Kind of the pair, and whether the two have to change places to match its order; None if there is no such pair."""
+    if (a, b) in _PAIRS:
+        return _PAIRS[a, b], False
+    if (b, a) in _PAIRS:
+        return _PAIRS[b, a], True
+    return None
+
+
+def count(kind: Pair) -> int:
+    """How many contact points the pair may have: features 0 to count - 1 of `collide`."""
+    return _COUNT.get(kind, 1)

@@ -1,0 +1,182 @@
+"""Contact of two elements, given by their closest points: distance, normal, point and derivatives by the twist of a.
+
+Elements are vertices, lines, circles and faces, each with a radius around it. x is the closest point of the element
+of a, y that of b, both without the radii ra, rb; n is the unit normal from b to a, d the signed distance along it:
+
+    x = y + d n,   phi = d - ra - rb,   p = (x - ra n + y + rb n)/2 = (x + y + (rb - ra) n)/2
+
+All in the frame of b. The twist (v, w) of a is about the origin of that frame: a point of a moves by v + w x x. Because
+p lies on the line through x and y, d phi = n.(v + w x p).
+
+    out (43,)    0 phi, 1:4 n, 4:7 p, 7:25 dn/d(v, w) (3 x 6, row-major), 25:43 dp/d(v, w)
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.model import Vector
+from sim.rotation import Vec3, cross
+from solvers.jit import kernel
+
+ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
+_SAME = 1e-12  # distance below which two points are one, and the direction between them is a choice [m]
+
+
+@kernel
+def dot(a: Vec3, b: Vec3) -> float:
+    """a.b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def along(x: Vec3, t: float, u: Vec3) -> Vec3:
+    """x + t u"""
+    return x[0] + t * u[0], x[1] + t * u[1], x[2] + t * u[2]
+
+
+@kernel
+def velocity(j: int, x: Vec3) -> Vec3:
+    """v + w x x for the unit twist j."""
+    if j == 0:
+        return 1.0, 0.0, 0.0
+    if j == 1:
+        return 0.0, 1.0, 0.0
+    if j == 2:
+        return 0.0, 0.0, 1.0
+    return turning(j, x)
+
+
+@kernel
+def turning(j: int, u: Vec3) -> Vec3:
+    """w x u for the unit twist j."""
+    if j == 3:
+        return 0.0, -u[2], u[1]
+    if j == 4:
+        return u[2], 0.0, -u[0]
+    if j == 5:
+        return -u[1], u[0], 0.0
+    return 0.0, 0.0, 0.0
+
+
+@kernel
+def absent(out: Vector) -> None:
+    """No such contact point now: phi = 1e9, with a normal and zero derivatives, so that nothing that reads it fails."""
+    for i in range(43):
+        out[i] = 0.0
+    out[0] = ABSENT
+    out[3] = 1.0
+
+
+@kernel
+def put(phi: float, n: Vec3, p: Vec3, out: Vector) -> None:
+    """phi, n and p."""
+    out[0] = phi
+    out[1], out[2], out[3] = n
+    out[4], out[5], out[6] = p
+
+
+@kernel
+def put_column(j: int, dn: Vec3, dp: Vec3, out: Vector) -> None:
+    """Column j of dn and dp."""
+    out[7 + j], out[13 + j], out[19 + j] = dn
+    out[25 + j], out[31 + j], out[37 + j] = dp
+
+
+@kernel
+def direction(x: Vec3, y: Vec3, u: Vec3) -> tuple[Vec3, float]:
+    """Unit vector from y to x, and their distance; where the two are one, a fixed direction across u (z for u = 0)."""
+    e = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
+    d = sqrt(dot(e, e))
+    if d > _SAME:
+        return (e[0] / d, e[1] / d, e[2] / d), d
+    c = sqrt(u[0] * u[0] + u[2] * u[2])
+    if c > 0.5:
+        return (-u[2] / c, 0.0, u[0] / c), 0.0
+    c = sqrt(u[1] * u[1] + u[2] * u[2])
+    if c > 0.5:
+        return (0.0, -u[2] / c, u[1] / c), 0.0
+    return (0.0, 0.0, 1.0), 0.0
+
+
+@kernel
+def vertex_a(
+    x: Vec3, n: Vec3, u: Vec3, d: float, radii: tuple[float, float], bend: Vec3, slip: Vec3, out: Vector
+) -> None:
+    """Vertex x of a against an element of b, by its curvature: with delta = v + w x x
+
+    dn = K delta,   K = bend0 I + bend1 n n^T + bend2 u u^T
+    dy = T delta,   T = slip0 I + slip1 n n^T + slip2 u u^T
+    """
+    rho = radii[1] - radii[0]
+    h = 0.5 * (rho - d)
+    put(d - radii[0] - radii[1], n, along(x, h, n), out)
+    for j in range(6):
+        e = velocity(j, x)
+        en, eu = dot(n, e), dot(u, e)
+        dn = along(along((bend[0] * e[0], bend[0] * e[1], bend[0] * e[2]), bend[1] * en, n), bend[2] * eu, u)
+        c = 0.5 * (1.0 + slip[0])
+        dp = along(along((c * e[0], c * e[1], c * e[2]), 0.5 * slip[1] * en, n), 0.5 * slip[2] * eu, u)
+        put_column(j, dn, along(dp, 0.5 * rho, dn), out)
+
+
+@kernel
+def vertex_b(
+    y: Vec3, n: Vec3, u: Vec3, d: float, radii: tuple[float, float], bend: Vec3, slip: Vec3, out: Vector
+) -> None:
+    """Vertex y of b against an element of a: `vertex_a` seen from a, with delta = v + w x y
+
+    dn = w x n + K delta,   dx = delta + d w x n - T delta
+    """
+    rho = radii[1] - radii[0]
+    put(d - radii[0] - radii[1], n, along(y, 0.5 * (d + rho), n), out)
+    for j in range(6):
+        e = velocity(j, y)
+        en, eu = dot(n, e), dot(u, e)
+        t = turning(j, n)
+        dn = along(along(along(t, bend[0], e), bend[1] * en, n), bend[2] * eu, u)
+        c = 0.5 * (1.0 - slip[0])
+        dp = along(along((c * e[0], c * e[1], c * e[2]), -0.5 * slip[1] * en, n), -0.5 * slip[2] * eu, u)
+        put_column(j, dn, along(along(dp, 0.5 * d, t), 0.5 * rho, dn), out)
+
+
+@kernel
+def bend_point(d: float) -> Vec3:
+    """K = (I - n n^T)/d around a point; flat where the direction is a choice."""
+    k = 1.0 / d if d > _SAME else 0.0
+    return k, -k, 0.0
+
+
+@kernel
+def bend_line(d: float) -> Vec3:
+    """K = (I - n n^T - u u^T)/d around a line along u."""
+    k = 1.0 / d if d > _SAME else 0.0
+    return k, -k, -k
+
+
+@kernel
+def edges(x: Vec3, ua: Vec3, y: Vec3, ub: Vec3, n: Vec3, radii: tuple[float, float], out: Vector) -> None:
+    """Line through x along ua of a against line through y along ub of b; n is the normal of both.
+
+    With c = ua.ub, s^2 = 1 - c^2, g = (ua - c ub)/s^2, f = (ub - c ua)/s^2, delta = v + w x (closest point of a):
+
+    dn = -g (ua x n).w,   dx = delta + ua (d g.dn - g.delta),   dy = ub (f.delta - d f.dn)
+    """
+    rho = radii[1] - radii[0]
+    c = dot(ua, ub)
+    s2 = 1.0 - c * c
+    ga, fb = along(ua, -c, ub), along(ub, -c, ua)
+    g = (ga[0] / s2, ga[1] / s2, ga[2] / s2)
+    f = (fb[0] / s2, fb[1] / s2, fb[2] / s2)
+    e = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
+    d = dot(n, e)
+    near = along(x, -dot(g, e), ua)
+    q = cross(ua[0], ua[1], ua[2], n[0], n[1], n[2])
+    put(d - radii[0] - radii[1], n, along(near, 0.5 * (rho - d), n), out)
+    for j in range(6):
+        delta = velocity(j, near)
+        turn = q[j - 3] if j > 2 else 0.0
+        dn = (-turn * g[0], -turn * g[1], -turn * g[2])
+        dp = along(delta, d * dot(g, dn) - dot(g, delta), ua)
+        dp = along(along(dp, dot(f, delta) - d * dot(f, dn), ub), rho, dn)
+        put_column(j, dn, (0.5 * dp[0], 0.5 * dp[1], 0.5 * dp[2]), out)
