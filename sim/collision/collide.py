@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from sim.collision.halfspace import sphere_halfspace
+from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
-from sim.collision.sphere import sphere_capsule, sphere_sphere, string
+from sim.collision.segment import capsule_capsule
+from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.collision.witness import absent
 from sim.model import Vector
 from solvers.jit import kernel
@@ -29,8 +30,20 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
         sphere_sphere(sizes, r, out)
     elif kind == Pair.SPHERE_CAPSULE:
         sphere_capsule(sizes, r, out)
+    elif kind == Pair.SPHERE_BOX:
+        sphere_box(sizes, r, out)
+    elif kind == Pair.SPHERE_CYLINDER:
+        sphere_cylinder(sizes, r, out)
     elif kind == Pair.SPHERE_HALFSPACE:
         sphere_halfspace(sizes, r, out)
+    elif kind == Pair.CAPSULE_CAPSULE:
+        capsule_capsule(feature, sizes, R, r, out)
+    elif kind == Pair.CAPSULE_HALFSPACE:
+        capsule_halfspace(feature, sizes, R, r, out)
+    elif kind == Pair.BOX_HALFSPACE:
+        box_halfspace(feature, sizes, R, r, out)
+    elif kind == Pair.CYLINDER_HALFSPACE:
+        cylinder_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.STRING:
         string(sizes, r, out)
     else:

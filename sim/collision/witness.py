@@ -20,6 +20,11 @@ from sim.rotation import Vec3, cross
 from solvers.jit import kernel
 
 ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
+TIE = 1e-9  # a point this far beyond the end of an element still belongs to it (relative)
+NOWHERE = (0.0, 0.0, 0.0)  # no direction; no curvature; a point that stays; the origin
+Z = (0.0, 0.0, 1.0)
+LINE = (0.0, 0.0, 1.0)  # slip along a line: dy = u u^T delta
+FACE = (1.0, -1.0, 0.0)  # slip on a face: dy = (I - n n^T) delta
 _SAME = 1e-12  # distance below which two points are one, and the direction between them is a choice [m]
 
 

@@ -1,0 +1,121 @@
+"""Capsule against capsule: two segments with a radius around each.
+
+    feature 0, 1    end -, + of a beside b, or the end of b beside a where that is the nearer end of the overlap
+    feature 2       the closest points, where they are other ones: a crossing, an end beside the middle
+
+The least of the three is the distance of the capsules. Parallel capsules touch at both ends of the overlap, and the
+third is absent: one of two parallel lines has no closest point.
+
+A pair of points is named by (s, t): s = -1, 0, 1 is the - end, the inside, the + end of a; t the same of b.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.collision.witness import (
+    LINE,
+    NOWHERE,
+    TIE,
+    Z,
+    absent,
+    along,
+    bend_line,
+    bend_point,
+    direction,
+    dot,
+    edges,
+    vertex_a,
+    vertex_b,
+)
+from sim.model import Vector
+from sim.rotation import Vec3
+from solvers.jit import kernel
+
+_PARALLEL = 1e-6  # squared sine of the angle below which two segments are parallel
+
+
+@kernel
+def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact point `feature` of two capsules, both along the z axes of their frames."""
+    c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
+    la, lb = sizes[1], sizes[5]
+    low, high = beside(-1, c, u, la, lb), beside(1, c, u, la, lb)
+    code = high
+    if feature == 0:
+        code = low
+        if low == high:
+            absent(out)
+            return
+    if feature == 2:
+        s2 = 1.0 - u[2] * u[2]
+        if s2 < _PARALLEL:
+            absent(out)
+            return
+        code = closest(c, u, la, lb)
+        if code == low or code == high:
+            absent(out)
+            return
+    put_pair(code, c, u, (la, lb), (sizes[0], sizes[4]), out)
+
+
+@kernel
+def beside(e: int, c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
+    """(s, t) at end e of segment a: this end beside b, or the end of b on this side beside a."""
+    b = e if u[2] >= 0.0 else -e
+    z = b * (c[2] + e * la * u[2])
+    if z < -lb * (1.0 + TIE):
+        return e, -b
+    if z <= lb * (1.0 + TIE):
+        return e, 0
+    s = dot(u, (-c[0], -c[1], b * lb - c[2]))
+    if abs(s) <= la * (1.0 + TIE):
+        return 0, b
+    return (1 if s > 0.0 else -1), b
+
+
+@kernel
+def closest(c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
+    """(s, t) of the closest points of two segments that are not parallel.   Ericson 2005, section 5.1.9."""
+    cu = dot(c, u)
+    s = min(max((u[2] * c[2] - cu) / (1.0 - u[2] * u[2]), -la), la)
+    t = c[2] + s * u[2]
+    if abs(t) > lb:
+        t = lb if t > 0.0 else -lb
+        s = min(max(t * u[2] - cu, -la), la)
+    return sign_at(s, la), sign_at(t, lb)
+
+
+@kernel
+def sign_at(s: float, half: float) -> int:
+    """-1, 0, 1 for a point at the - end, inside, at the + end of |s| <= half."""
+    if abs(s) < half:
+        return 0
+    return 1 if s > 0.0 else -1
+
+
+@kernel
+def put_pair(
+    code: tuple[int, int], c: Vec3, u: Vec3, half: tuple[float, float], radii: tuple[float, float], out: Vector
+) -> None:
+    """Contact of the points (s, t)."""
+    s, t = code
+    if s == 0 and t == 0:
+        k = sqrt(1.0 - u[2] * u[2])
+        n = (u[1] / k, -u[0] / k, 0.0)
+        if dot(n, c) < 0.0:
+            n = (-n[0], -n[1], 0.0)
+        edges(c, u, NOWHERE, Z, n, radii, out)
+    elif s == 0:
+        y = (0.0, 0.0, t * half[1])
+        x = along(c, dot(u, (-c[0], -c[1], y[2] - c[2])), u)
+        n, d = direction(x, y, u)
+        vertex_b(y, n, u, d, radii, bend_line(d), LINE, out)
+    else:
+        x = along(c, s * half[0], u)
+        if t == 0:
+            n, d = direction(x, (0.0, 0.0, x[2]), Z)
+            vertex_a(x, n, Z, d, radii, bend_line(d), LINE, out)
+        else:
+            n, d = direction(x, (0.0, 0.0, t * half[1]), NOWHERE)
+            vertex_a(x, n, NOWHERE, d, radii, bend_point(d), NOWHERE, out)
