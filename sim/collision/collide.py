@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sim.collision.capsule_box import capsule_box
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
 from sim.collision.segment import capsule_capsule
@@ -38,6 +39,8 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
         sphere_halfspace(sizes, r, out)
     elif kind == Pair.CAPSULE_CAPSULE:
         capsule_capsule(feature, sizes, R, r, out)
+    elif kind == Pair.CAPSULE_BOX:
+        capsule_box(feature, sizes, R, r, out)
     elif kind == Pair.CAPSULE_HALFSPACE:
         capsule_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.BOX_HALFSPACE:

@@ -1,0 +1,44 @@
+"""Rules of the separating axes: which of a face and an edge decides, and what then counts as contact."""
+
+from __future__ import annotations
+
+from sim.collision.witness import TIE
+from sim.rotation import Vec3
+from solvers.jit import kernel
+
+PARALLEL = 1e-6  # sine of the angle below which two edges span no plane
+_FACE_FIRST = 0.95  # an edge decides inside only where it needs less than this part of the depth below a face
+_DEEPER = 2.0  # points this many times deeper than the least depth,
+_SLACK = 1e-2  # and this part of the smallest half extent, are no contact
+
+
+@kernel
+def edge_must_exceed(s: float, h: Vec3) -> float:
+    """Separation that an edge must exceed to decide, when that of the best face is s."""
+    tie = TIE * (h[0] + h[1] + h[2])
+    return s * (1.0 + TIE) + tie if s > 0.0 else _FACE_FIRST * s + tie
+
+
+@kernel
+def deepest(s: float, h: Vec3) -> float:
+    """Distance below which a point is no contact, when the separation is s: it lies far inside, but beside a way out."""
+    return (_DEEPER * s if s < 0.0 else s / _DEEPER) - _SLACK * min(h[0], h[1], h[2])
+
+
+@kernel
+def support(n: Vec3, i: int, h: Vec3) -> Vec3:
+    """Centre of the edge along e_i that lies farthest along n."""
+    return (
+        0.0 if i == 0 else (h[0] if n[0] >= 0.0 else -h[0]),
+        0.0 if i == 1 else (h[1] if n[1] >= 0.0 else -h[1]),
+        0.0 if i == 2 else (h[2] if n[2] >= 0.0 else -h[2]),
+    )
+
+
+@kernel
+def side_of(i: int, n: Vec3, face: int, top: float) -> int:
+    """Which side (clip.py) of the face `top` e_face is the edge along e_i farthest along n, or -1 for none."""
+    if i == face or n[face] * top < 0.0:
+        return -1
+    m = 3 - i - face
+    return (0 if m == (face + 1) % 3 else 2) + (1 if n[m] >= 0.0 else 0)

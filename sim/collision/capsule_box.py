@@ -1,0 +1,130 @@
+"""Capsule against box: a segment with a radius around it.
+
+    feature 0, 1    begin and end of the part of the segment above the nearest face of the box: an end of the segment,
+                    or where it crosses an edge of the face
+    feature 2       elsewhere: the nearest edge or corner of the box
+
+The normal of a face, of an edge across the segment, or between two points, each exact for its pair of elements. Deep
+inside, where the segment itself cuts the box, the face or edge of least penetration decides.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.collision.axes import PARALLEL, deepest, edge_must_exceed, side_of, support
+from sim.collision.box import axis, column, corner, distance_squared, nearest, vertex_on_box
+from sim.collision.clip import clip, common_normal, crossing, on_edges
+from sim.collision.witness import (
+    FACE,
+    LINE,
+    NOWHERE,
+    TIE,
+    absent,
+    along,
+    bend_line,
+    direction,
+    dot,
+    edges,
+    vertex_a,
+    vertex_b,
+)
+from sim.model import Vector
+from sim.rotation import Vec3
+from solvers.jit import kernel
+
+
+@kernel
+def capsule_box(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact point `feature` of a capsule along the z axis of its frame against a box."""
+    c, u = (r[0], r[1], r[2]), column(R, 2)
+    radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
+    face, edge, s = separation(c, u, half, h)
+    top = 1.0 if c[face] >= 0.0 else -1.0
+    x, y = along(c, -half, u), along(c, half, u)
+    m, o = (face + 1) % 3, (face + 2) % 3
+    codes = clip((x[m], x[o]), (y[m], y[o]), (h[m], h[o]))
+    if feature < 2:
+        code = codes[feature]
+        if feature == 1:
+            x = y
+        if code > 1:
+            if not crossing(c, u, half, code - 2, face, top, h, radius, out):
+                code = 0
+        elif code == 1:
+            vertex_a(x, axis(face, top), NOWHERE, top * x[face] - h[face], (radius, 0.0), NOWHERE, FACE, out)
+        if code == 0 or out[0] + radius < deepest(s, h):
+            absent(out)
+    elif edge >= 0 and put_edge(edge, c, u, half, h, s, radius, out):
+        side = side_of(edge, (out[1], out[2], out[3]), face, top)
+        if side >= 0 and (codes[0] == 2 + side or codes[1] == 2 + side):
+            absent(out)
+    elif s <= 0.0 or not put_vertex(c, u, half, h, radius, out):
+        absent(out)
+
+
+@kernel
+def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> tuple[int, int, float]:
+    """(face, edge, s): axis of the face that separates the segment c + t u most, |t| <= half, that of the edge of the
+    box, or -1 where the face does better, and the separation s along the better one, negative inside.
+    """
+    face, edge, s = 0, -1, -1e300
+    for i in range(3):
+        d = abs(c[i]) - h[i] - half * abs(u[i])
+        if d > s:
+            face, s = i, d
+    least = edge_must_exceed(s, h)
+    for i in range(3):
+        k, l = (i + 1) % 3, (i + 2) % 3
+        q = sqrt(u[k] * u[k] + u[l] * u[l])
+        if q > PARALLEL:
+            d = (abs(c[l] * u[k] - c[k] * u[l]) - h[k] * abs(u[l]) - h[l] * abs(u[k])) / q
+            if d > least:
+                edge, s, least = i, d, d
+    return face, edge, s
+
+
+@kernel
+def put_edge(i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, radius: float, out: Vector) -> bool:
+    """Segment against the edge along e_i that its separating direction points to; False where they pass each other."""
+    b = axis(i, 1.0)
+    n = common_normal(u, b, c)
+    y = support(n, i, h)
+    if s > 0.0 and not on_edges(c, u, half, y, b, h[i], TIE):
+        return False
+    edges(c, u, y, b, n, (radius, 0.0), out)
+    return True
+
+
+@kernel
+def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
+    """An end of the segment against an edge or corner of the box, or a corner of the box against the segment.
+
+    False where neither is the nearest pair: the direction between them does not separate the two.
+    """
+    x, y = along(c, -half, u), along(c, half, u)
+    d2 = distance_squared(x, h)
+    e2 = distance_squared(y, h)
+    if e2 < d2:
+        x, d2 = y, e2
+    best, at = -1, 0.0
+    for k in range(8):
+        y = corner(k, h)
+        t = dot(u, y) - dot(u, c)
+        if abs(t) < half:
+            z = along(c, t, u)
+            e = (z[0] - y[0], z[1] - y[1], z[2] - y[2])
+            e2 = dot(e, e)
+            if e2 < d2 * (1.0 - TIE):
+                best, at, d2 = k, t, e2
+    if best < 0:
+        if nearest(x, h)[3] == 1:
+            return False
+        vertex_on_box(x, h, radius, out)
+    else:
+        y = corner(best, h)
+        n, d = direction(along(c, at, u), y, u)
+        vertex_b(y, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
+    n = (out[1], out[2], out[3])
+    reach = half * abs(dot(n, u)) + abs(n[0]) * h[0] + abs(n[1]) * h[1] + abs(n[2]) * h[2]
+    return dot(n, c) - reach >= out[0] + radius - TIE * (half + h[0] + h[1] + h[2])
