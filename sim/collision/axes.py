@@ -21,7 +21,7 @@ def edge_must_exceed(s: float, h: Vec3) -> float:
 
 @kernel
 def deepest(s: float, h: Vec3) -> float:
-    """Distance below which a point is no contact, when the separation is s: it lies far inside, but beside a way out."""
+    """Distance below which a point is no contact, when the separation is s: far inside, but beside a way out."""
     return (_DEEPER * s if s < 0.0 else s / _DEEPER) - _SLACK * min(h[0], h[1], h[2])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sim.collision.box_box import box_box
 from sim.collision.capsule_box import capsule_box
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
@@ -43,6 +44,8 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
         capsule_box(feature, sizes, R, r, out)
     elif kind == Pair.CAPSULE_HALFSPACE:
         capsule_halfspace(feature, sizes, R, r, out)
+    elif kind == Pair.BOX_BOX:
+        box_box(feature, sizes, R, r, out)
     elif kind == Pair.BOX_HALFSPACE:
         box_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.CYLINDER_HALFSPACE:
