@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from sim.collision.witness import TIE
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
+
+Arrangement = tuple[int, int, float]  # face, edge or -1, separation: what `separation` of a pair returns
 
 PARALLEL = 1e-6  # sine of the angle below which two edges span no plane
 _FACE_FIRST = 0.95  # an edge decides inside only where it needs less than this part of the depth below a face
@@ -12,20 +14,20 @@ _DEEPER = 2.0  # points this many times deeper than the least depth,
 _SLACK = 1e-2  # and this part of the smallest half extent, are no contact
 
 
-@kernel
+@inner_kernel
 def edge_must_exceed(s: float, h: Vec3) -> float:
     """Separation that an edge must exceed to decide, when that of the best face is s."""
     tie = TIE * (h[0] + h[1] + h[2])
     return s * (1.0 + TIE) + tie if s > 0.0 else _FACE_FIRST * s + tie
 
 
-@kernel
+@inner_kernel
 def deepest(s: float, h: Vec3) -> float:
     """Distance below which a point is no contact, when the separation is s: far inside, but beside a way out."""
     return (_DEEPER * s if s < 0.0 else s / _DEEPER) - _SLACK * min(h[0], h[1], h[2])
 
 
-@kernel
+@inner_kernel
 def support(n: Vec3, i: int, h: Vec3) -> Vec3:
     """Centre of the edge along e_i that lies farthest along n."""
     return (
@@ -35,7 +37,7 @@ def support(n: Vec3, i: int, h: Vec3) -> Vec3:
     )
 
 
-@kernel
+@inner_kernel
 def side_of(i: int, n: Vec3, face: int, top: float) -> int:
     """Which side (clip.py) of the face `top` e_face is the edge along e_i farthest along n, or -1 for none."""
     if i == face or n[face] * top < 0.0:

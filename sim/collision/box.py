@@ -5,22 +5,22 @@ from __future__ import annotations
 from sim.collision.witness import FACE, LINE, NOWHERE, TIE, bend_line, bend_point, direction, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 
-@kernel
+@inner_kernel
 def axis(i: int, s: float) -> Vec3:
     """s e_i"""
     return (s if i == 0 else 0.0), (s if i == 1 else 0.0), (s if i == 2 else 0.0)
 
 
-@kernel
+@inner_kernel
 def column(R: Vector, j: int) -> Vec3:
     """Column j of R (9,), row-major: axis j of a in the frame of b."""
     return R[j], R[3 + j], R[6 + j]
 
 
-@kernel
+@inner_kernel
 def to_b(R: Vector, x: Vec3) -> Vec3:
     """R x"""
     return (
@@ -30,7 +30,7 @@ def to_b(R: Vector, x: Vec3) -> Vec3:
     )
 
 
-@kernel
+@inner_kernel
 def to_a(R: Vector, x: Vec3) -> Vec3:
     """R^T x"""
     return (
@@ -40,20 +40,20 @@ def to_a(R: Vector, x: Vec3) -> Vec3:
     )
 
 
-@kernel
+@inner_kernel
 def corner(k: int, h: Vec3) -> Vec3:
     """Corner k = 0..7 of a box with half extents h; the bits of k are the signs."""
     return (h[0] if k & 1 else -h[0]), (h[1] if k & 2 else -h[1]), (h[2] if k & 4 else -h[2])
 
 
-@kernel
+@inner_kernel
 def distance_squared(x: Vec3, h: Vec3) -> float:
     """Squared distance of a point to the solid box."""
     a, b, c = max(abs(x[0]) - h[0], 0.0), max(abs(x[1]) - h[1], 0.0), max(abs(x[2]) - h[2], 0.0)
     return a * a + b * b + c * c
 
 
-@kernel
+@inner_kernel
 def nearest(x: Vec3, h: Vec3) -> tuple[Vec3, Vec3, float, int]:
     """Normal n, direction u of the edge, distance d and kind (1 face, 2 edge, 3 corner) of a box at the point x.
 
@@ -83,7 +83,7 @@ def nearest(x: Vec3, h: Vec3) -> tuple[Vec3, Vec3, float, int]:
     return n, u, d, 2
 
 
-@kernel
+@inner_kernel
 def curvature(kind: int, d: float) -> tuple[Vec3, Vec3]:
     """Bend and slip (witness.vertex_a) around a face, edge or corner of `nearest`."""
     if kind == 1:
@@ -93,7 +93,7 @@ def curvature(kind: int, d: float) -> tuple[Vec3, Vec3]:
     return bend_point(d), NOWHERE
 
 
-@kernel
+@inner_kernel
 def vertex_on_box(x: Vec3, h: Vec3, radius: float, out: Vector) -> None:
     """Vertex x of a, with a radius around it, against the box b."""
     n, u, d, kind = nearest(x, h)
@@ -101,7 +101,7 @@ def vertex_on_box(x: Vec3, h: Vec3, radius: float, out: Vector) -> None:
     vertex_a(x, n, u, d, (radius, 0.0), bend, slip, out)
 
 
-@kernel
+@inner_kernel
 def vertex_under_box(y: Vec3, h: Vec3, R: Vector, r: Vector, out: Vector) -> None:
     """Vertex y of b against the box a."""
     m, w, d, kind = nearest(to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])), h)

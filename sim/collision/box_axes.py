@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.axes import PARALLEL, edge_must_exceed
+from sim.collision.axes import PARALLEL, Arrangement, edge_must_exceed
 from sim.collision.box import column
 from sim.collision.witness import TIE, dot
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 
-@kernel
-def separation(ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> tuple[int, int, float]:
+@inner_kernel
+def separation(ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> Arrangement:
     """(face, edge, s): the face that separates most, 0-2 of b, 3-5 of a; the pair of edges 3 i + j (e_i of b, e_j of
     a), or -1 where the face does better; the separation s along the better one, negative inside.
     """
@@ -47,7 +47,7 @@ def separation(ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> tuple[int, int, floa
     return face, edge, s
 
 
-@kernel
+@inner_kernel
 def facing(face: int, R: Vector, r: Vector) -> tuple[int, float, int, float]:
     """(i, top, j, bottom): face `top` e_i of b and face `bottom` e_j of a, turned towards each other."""
     if face < 3:
@@ -60,7 +60,7 @@ def facing(face: int, R: Vector, r: Vector) -> tuple[int, float, int, float]:
     return i, (-1.0 if bottom * R[3 * i + j] >= 0.0 else 1.0), j, bottom
 
 
-@kernel
+@inner_kernel
 def _largest(a: float, b: float, c: float) -> int:
     if abs(a) >= abs(b) and abs(a) >= abs(c):
         return 0

@@ -16,7 +16,7 @@ a's, then pairs of edges.
 
 from __future__ import annotations
 
-from sim.collision.axes import deepest, side_of, support
+from sim.collision.axes import Arrangement, deepest, side_of, support
 from sim.collision.box import (
     axis,
     column,
@@ -28,21 +28,21 @@ from sim.collision.box import (
     vertex_on_box,
     vertex_under_box,
 )
-from sim.collision.box_axes import facing, separation
+from sim.collision.box_axes import facing
 from sim.collision.clip import BORDER, clip, common_normal, crossing, on_edges
 from sim.collision.witness import FACE, NOWHERE, TIE, absent, along, dot, edges, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 _RADII = (0.0, 0.0)
 
 
-@kernel
-def box_box(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+@inner_kernel
+def box_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact point `feature` of two boxes."""
     ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
-    face, edge, s = separation(ha, hb, R, r)
+    face, edge, s = arrangement
     i, top, j, bottom = facing(face, R, r)
     if feature < 8:
         found = put_clipped(feature, i, top, j, bottom, ha, hb, R, r, out)
@@ -58,7 +58,7 @@ def box_box(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> N
         absent(out)
 
 
-@kernel
+@inner_kernel
 def vertex(k: int, j: int, bottom: float, h: Vec3, R: Vector, r: Vector) -> Vec3:
     """Vertex k = 0..3 of the face `bottom` e_j of a, around it: the signs are ++, -+, --, +-."""
     x = along((r[0], r[1], r[2]), bottom * h[j], column(R, j))
@@ -67,7 +67,7 @@ def vertex(k: int, j: int, bottom: float, h: Vec3, R: Vector, r: Vector) -> Vec3
     return along(x, h[o] if k < 2 else -h[o], column(R, o))
 
 
-@kernel
+@inner_kernel
 def put_clipped(
     feature: int, i: int, top: float, j: int, bottom: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
 ) -> bool:
@@ -87,7 +87,7 @@ def put_clipped(
     return crossing(middle, column(R, l), ha[l], code - 2, i, top, hb, 0.0, out)
 
 
-@kernel
+@inner_kernel
 def put_corner(
     k: int, up: tuple[int, float], down: tuple[int, float], ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
 ) -> bool:
@@ -112,7 +112,7 @@ def put_corner(
     return True
 
 
-@kernel
+@inner_kernel
 def put_edges(edge: int, s: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
     """The two edges that the separating direction points to; False where they pass each other."""
     i, j = edge // 3, edge % 3
@@ -128,7 +128,7 @@ def put_edges(edge: int, s: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out
     return True
 
 
-@kernel
+@inner_kernel
 def clipped_has(
     edge: int, i: int, top: float, j: int, bottom: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
 ) -> bool:
@@ -147,7 +147,7 @@ def clipped_has(
     return begin == 2 + side or end == 2 + side
 
 
-@kernel
+@inner_kernel
 def put_vertex(ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
     """The nearest corner of one box against an edge or corner of the other; False where those are not the nearest."""
     best, d2 = 0, 1e300

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.axes import PARALLEL, deepest, edge_must_exceed, side_of, support
+from sim.collision.axes import PARALLEL, Arrangement, deepest, edge_must_exceed, side_of, support
 from sim.collision.box import axis, column, corner, distance_squared, nearest, vertex_on_box
 from sim.collision.clip import clip, common_normal, crossing, on_edges
 from sim.collision.witness import (
@@ -31,15 +31,15 @@ from sim.collision.witness import (
 )
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 
-@kernel
-def capsule_box(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+@inner_kernel
+def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact point `feature` of a capsule along the z axis of its frame against a box."""
     c, u = (r[0], r[1], r[2]), column(R, 2)
     radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
-    face, edge, s = separation(c, u, half, h)
+    face, edge, s = arrangement
     top = 1.0 if c[face] >= 0.0 else -1.0
     x, y = along(c, -half, u), along(c, half, u)
     m, o = (face + 1) % 3, (face + 2) % 3
@@ -63,8 +63,8 @@ def capsule_box(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) 
         absent(out)
 
 
-@kernel
-def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> tuple[int, int, float]:
+@inner_kernel
+def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> Arrangement:
     """(face, edge, s): axis of the face that separates the segment c + t u most, |t| <= half, that of the edge of the
     box, or -1 where the face does better, and the separation s along the better one, negative inside.
     """
@@ -84,7 +84,7 @@ def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> tuple[int, int, float]
     return face, edge, s
 
 
-@kernel
+@inner_kernel
 def put_edge(i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, radius: float, out: Vector) -> bool:
     """Segment against the edge along e_i that its separating direction points to; False where they pass each other."""
     b = axis(i, 1.0)
@@ -96,7 +96,7 @@ def put_edge(i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, radius: f
     return True
 
 
-@kernel
+@inner_kernel
 def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
     """An end of the segment against an edge or corner of the box, or a corner of the box against the segment.
 

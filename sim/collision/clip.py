@@ -14,7 +14,7 @@ from sim.collision.box import axis
 from sim.collision.witness import along, dot, edges
 from sim.model import Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 BORDER = 1e-4  # a vertex this far outside of a face still belongs to it (relative)
 _ALONG = 1e-2  # sine of the angle below which an edge is parallel to a side
@@ -23,7 +23,7 @@ _PAST = 2e-2  # closest points of two lines this far past the ends of their edge
 Vec2 = tuple[float, float]
 
 
-@kernel
+@inner_kernel
 def clip(a: Vec2, b: Vec2, h: Vec2) -> tuple[int, int]:
     """Begin and end of the edge from a to b in the rectangle |y0| <= h0, |y1| <= h1."""
     e = (b[0] - a[0], b[1] - a[1])
@@ -45,7 +45,7 @@ def clip(a: Vec2, b: Vec2, h: Vec2) -> tuple[int, int]:
     return _code(a, h, side0, t0 < t1), _code(b, h, side1, t0 < t1)
 
 
-@kernel
+@inner_kernel
 def _code(a: Vec2, h: Vec2, side: int, overlap: bool) -> int:
     if abs(a[0]) <= h[0] * (1.0 + BORDER) and abs(a[1]) <= h[1] * (1.0 + BORDER):
         return 1
@@ -54,7 +54,7 @@ def _code(a: Vec2, h: Vec2, side: int, overlap: bool) -> int:
     return 2 + side if side >= 0 else 1
 
 
-@kernel
+@inner_kernel
 def side_edge(side: int, i: int, top: float, h: Vec3) -> tuple[Vec3, Vec3, float]:
     """Centre, direction and half length of the edge of b at `side` of its face `top` e_i (top = 1, -1)."""
     m, o = (i + 1) % 3, (i + 2) % 3
@@ -63,7 +63,7 @@ def side_edge(side: int, i: int, top: float, h: Vec3) -> tuple[Vec3, Vec3, float
     return along(axis(i, top * h[i]), h[m] if side & 1 else -h[m], axis(m, 1.0)), axis(o, 1.0), h[o]
 
 
-@kernel
+@inner_kernel
 def on_edges(x: Vec3, ua: Vec3, la: float, y: Vec3, ub: Vec3, lb: float, past: float) -> bool:
     """Whether the closest points of two lines lie on the edges |s| <= la, |t| <= lb around x, y, or `past` them."""
     c = dot(ua, ub)
@@ -72,7 +72,7 @@ def on_edges(x: Vec3, ua: Vec3, la: float, y: Vec3, ub: Vec3, lb: float, past: f
     return abs(c * eb - ea) <= s2 * la * (1.0 + past) and abs(eb - c * ea) <= s2 * lb * (1.0 + past)
 
 
-@kernel
+@inner_kernel
 def common_normal(ua: Vec3, ub: Vec3, out_of: Vec3) -> Vec3:
     """Unit vector along ua x ub, on the side of `out_of`."""
     n = cross(ua[0], ua[1], ua[2], ub[0], ub[1], ub[2])
@@ -82,7 +82,7 @@ def common_normal(ua: Vec3, ub: Vec3, out_of: Vec3) -> Vec3:
     return n[0] / k, n[1] / k, n[2] / k
 
 
-@kernel
+@inner_kernel
 def crossing(x: Vec3, ua: Vec3, la: float, side: int, i: int, top: float, h: Vec3, radius: float, out: Vector) -> bool:
     """Edge of a, with a radius around it, against the edge of b at `side` of its face `top` e_i.
 

@@ -1,9 +1,10 @@
-"""`collide`: one contact point of a pair of shapes."""
+"""`collide`: one contact point of a pair of shapes. `arrange`: what all points of the pair have in common."""
 
 from __future__ import annotations
 
+from sim.collision import box_axes, capsule_box
+from sim.collision.axes import Arrangement
 from sim.collision.box_box import box_box
-from sim.collision.capsule_box import capsule_box
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
 from sim.collision.segment import capsule_capsule
@@ -28,6 +29,29 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
+    collide_arranged(kind, feature, arrange(kind, sizes, R, r), sizes, R, r, out)
+
+
+@kernel
+def arrange(kind: int, sizes: Vector, R: Vector, r: Vector) -> Arrangement:
+    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+
+    Once per pair and pose, where it saves most of the time of `collide`. It may be kept while the pose changes little:
+    what `collide_arranged` then returns is smooth where `collide` would change over to another face.
+    """
+    if kind == Pair.BOX_BOX:
+        return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
+    if kind == Pair.CAPSULE_BOX:
+        h = (sizes[4], sizes[5], sizes[6])
+        return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h)
+    return 0, -1, 0.0
+
+
+@kernel
+def collide_arranged(
+    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector
+) -> None:
+    """`collide`, with what `arrange` returns."""
     if kind == Pair.SPHERE_SPHERE:
         sphere_sphere(sizes, r, out)
     elif kind == Pair.SPHERE_CAPSULE:
@@ -41,11 +65,11 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
     elif kind == Pair.CAPSULE_CAPSULE:
         capsule_capsule(feature, sizes, R, r, out)
     elif kind == Pair.CAPSULE_BOX:
-        capsule_box(feature, sizes, R, r, out)
+        capsule_box.capsule_box(feature, arrangement, sizes, R, r, out)
     elif kind == Pair.CAPSULE_HALFSPACE:
         capsule_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.BOX_BOX:
-        box_box(feature, sizes, R, r, out)
+        box_box(feature, arrangement, sizes, R, r, out)
     elif kind == Pair.BOX_HALFSPACE:
         box_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.CYLINDER_HALFSPACE:

@@ -8,40 +8,40 @@ from sim.collision.box import corner, to_b
 from sim.collision.witness import FACE, NOWHERE, Z, absent, along, put, put_column, turning, velocity, vertex_a
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 _LEVEL = 1e-4  # sine of the tilt below which the lowest point of a rim leaves the rim for its centre
 _STEEP = 0.5  # cosine of the tilt beyond which the fixed points of the rims are left out
 _COS120, _SIN120 = -0.5, 0.75**0.5
 
 
-@kernel
+@inner_kernel
 def point_plane(x: Vec3, radius: float, out: Vector) -> None:
     """phi = x_z - radius"""
     vertex_a(x, Z, NOWHERE, x[2], (radius, 0.0), NOWHERE, FACE, out)
 
 
-@kernel
+@inner_kernel
 def sphere_halfspace(sizes: Vector, r: Vector, out: Vector) -> None:
     """phi = r_z - radius"""
     point_plane((r[0], r[1], r[2]), sizes[0], out)
 
 
-@kernel
+@inner_kernel
 def capsule_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Ends - and + of the segment."""
     half = sizes[1] if feature == 1 else -sizes[1]
     point_plane(along((r[0], r[1], r[2]), half, (R[2], R[5], R[8])), sizes[0], out)
 
 
-@kernel
+@inner_kernel
 def box_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Corners; the bits of `feature` are the signs of x, y, z."""
     x = to_b(R, corner(feature, (sizes[0], sizes[1], sizes[2])))
     point_plane((r[0] + x[0], r[1] + x[1], r[2] + x[2]), 0.0, out)
 
 
-@kernel
+@inner_kernel
 def cylinder_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Lowest points of the rims - and + (0, 1); points at 0, 120, 240 degrees on the rim - (2, 3, 4) and + (5, 6, 7).
 
@@ -63,7 +63,7 @@ def cylinder_halfspace(feature: int, sizes: Vector, R: Vector, r: Vector, out: V
     point_plane((r[0] + x[0], r[1] + x[1], r[2] + x[2]), 0.0, out)
 
 
-@kernel
+@inner_kernel
 def lowest(half: float, radius: float, R: Vector, r: Vector, out: Vector) -> None:
     """Lowest point of the rim around c = r + half u, u the axis of a: with g = |u_xy|, sigma^2 = g^2 + eps^2
 

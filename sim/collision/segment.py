@@ -30,12 +30,12 @@ from sim.collision.witness import (
 )
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 _PARALLEL = 1e-6  # squared sine of the angle below which two segments are parallel
 
 
-@kernel
+@inner_kernel
 def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact point `feature` of two capsules, both along the z axes of their frames."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
@@ -59,7 +59,7 @@ def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vect
     put_pair(code, c, u, (la, lb), (sizes[0], sizes[4]), out)
 
 
-@kernel
+@inner_kernel
 def beside(e: int, c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
     """(s, t) at end e of segment a: this end beside b, or the end of b on this side beside a."""
     b = e if u[2] >= 0.0 else -e
@@ -74,7 +74,7 @@ def beside(e: int, c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
     return (1 if s > 0.0 else -1), b
 
 
-@kernel
+@inner_kernel
 def closest(c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
     """(s, t) of the closest points of two segments that are not parallel.   Ericson 2005, section 5.1.9."""
     cu = dot(c, u)
@@ -86,7 +86,7 @@ def closest(c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
     return sign_at(s, la), sign_at(t, lb)
 
 
-@kernel
+@inner_kernel
 def sign_at(s: float, half: float) -> int:
     """-1, 0, 1 for a point at the - end, inside, at the + end of |s| <= half."""
     if abs(s) < half:
@@ -94,7 +94,7 @@ def sign_at(s: float, half: float) -> int:
     return 1 if s > 0.0 else -1
 
 
-@kernel
+@inner_kernel
 def put_pair(
     code: tuple[int, int], c: Vec3, u: Vec3, half: tuple[float, float], radii: tuple[float, float], out: Vector
 ) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from sim.collision.box import vertex_on_box
 from sim.collision.witness import FACE, LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
 from sim.model import Vector
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 
-@kernel
+@inner_kernel
 def sphere_sphere(sizes: Vector, r: Vector, out: Vector) -> None:
     """phi = |r| - ra - rb; of concentric spheres the normal is z."""
     x = (r[0], r[1], r[2])
@@ -16,7 +16,7 @@ def sphere_sphere(sizes: Vector, r: Vector, out: Vector) -> None:
     vertex_a(x, n, NOWHERE, d, (sizes[0], sizes[4]), bend_point(d), NOWHERE, out)
 
 
-@kernel
+@inner_kernel
 def sphere_capsule(sizes: Vector, r: Vector, out: Vector) -> None:
     """phi = |r - y| - ra - rb, y the nearest point of the segment of b; a centre on the segment has the normal x."""
     x, half = (r[0], r[1], r[2]), sizes[5]
@@ -29,13 +29,13 @@ def sphere_capsule(sizes: Vector, r: Vector, out: Vector) -> None:
     vertex_a(x, n, u, d, (sizes[0], sizes[4]), bend, slip, out)
 
 
-@kernel
+@inner_kernel
 def sphere_box(sizes: Vector, r: Vector, out: Vector) -> None:
     """Distance to the nearest face, edge or corner; a centre inside is pushed out of the nearest face."""
     vertex_on_box((r[0], r[1], r[2]), (sizes[4], sizes[5], sizes[6]), sizes[0], out)
 
 
-@kernel
+@inner_kernel
 def sphere_cylinder(sizes: Vector, r: Vector, out: Vector) -> None:
     """Distance to the side, an end face or a rim; a centre inside is pushed out of the nearest of side and ends.
 
@@ -61,7 +61,7 @@ def sphere_cylinder(sizes: Vector, r: Vector, out: Vector) -> None:
     vertex_a(x, n, u, d, (radius, rb), bend, slip, out)
 
 
-@kernel
+@inner_kernel
 def string(sizes: Vector, r: Vector, out: Vector) -> None:
     """phi = length - |r|, between the origins of the two frames; n points from a to b: a taut string pulls."""
     x = (r[0], r[1], r[2])

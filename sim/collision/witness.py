@@ -17,7 +17,7 @@ from math import sqrt
 
 from sim.model import Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import kernel
+from solvers.jit import inner_kernel
 
 ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
 TIE = 1e-9  # a point this far beyond the end of an element still belongs to it (relative)
@@ -28,19 +28,19 @@ FACE = (1.0, -1.0, 0.0)  # slip on a face: dy = (I - n n^T) delta
 _SAME = 1e-12  # distance below which two points are one, and the direction between them is a choice [m]
 
 
-@kernel
+@inner_kernel
 def dot(a: Vec3, b: Vec3) -> float:
     """a.b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inner_kernel
 def along(x: Vec3, t: float, u: Vec3) -> Vec3:
     """x + t u"""
     return x[0] + t * u[0], x[1] + t * u[1], x[2] + t * u[2]
 
 
-@kernel
+@inner_kernel
 def velocity(j: int, x: Vec3) -> Vec3:
     """v + w x x for the unit twist j."""
     if j == 0:
@@ -52,7 +52,7 @@ def velocity(j: int, x: Vec3) -> Vec3:
     return turning(j, x)
 
 
-@kernel
+@inner_kernel
 def turning(j: int, u: Vec3) -> Vec3:
     """w x u for the unit twist j."""
     if j == 3:
@@ -64,7 +64,7 @@ def turning(j: int, u: Vec3) -> Vec3:
     return 0.0, 0.0, 0.0
 
 
-@kernel
+@inner_kernel
 def absent(out: Vector) -> None:
     """No such contact point now: phi = 1e9, with a normal and zero derivatives, so that nothing that reads it fails."""
     for i in range(43):
@@ -73,7 +73,7 @@ def absent(out: Vector) -> None:
     out[3] = 1.0
 
 
-@kernel
+@inner_kernel
 def put(phi: float, n: Vec3, p: Vec3, out: Vector) -> None:
     """phi, n and p."""
     out[0] = phi
@@ -81,14 +81,14 @@ def put(phi: float, n: Vec3, p: Vec3, out: Vector) -> None:
     out[4], out[5], out[6] = p
 
 
-@kernel
+@inner_kernel
 def put_column(j: int, dn: Vec3, dp: Vec3, out: Vector) -> None:
     """Column j of dn and dp."""
     out[7 + j], out[13 + j], out[19 + j] = dn
     out[25 + j], out[31 + j], out[37 + j] = dp
 
 
-@kernel
+@inner_kernel
 def direction(x: Vec3, y: Vec3, u: Vec3) -> tuple[Vec3, float]:
     """Unit vector from y to x, and their distance; where the two are one, a fixed direction across u (z for u = 0)."""
     e = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
@@ -104,7 +104,7 @@ def direction(x: Vec3, y: Vec3, u: Vec3) -> tuple[Vec3, float]:
     return (0.0, 0.0, 1.0), 0.0
 
 
-@kernel
+@inner_kernel
 def vertex_a(
     x: Vec3, n: Vec3, u: Vec3, d: float, radii: tuple[float, float], bend: Vec3, slip: Vec3, out: Vector
 ) -> None:
@@ -125,7 +125,7 @@ def vertex_a(
         put_column(j, dn, along(dp, 0.5 * rho, dn), out)
 
 
-@kernel
+@inner_kernel
 def vertex_b(
     y: Vec3, n: Vec3, u: Vec3, d: float, radii: tuple[float, float], bend: Vec3, slip: Vec3, out: Vector
 ) -> None:
@@ -145,21 +145,21 @@ def vertex_b(
         put_column(j, dn, along(along(dp, 0.5 * d, t), 0.5 * rho, dn), out)
 
 
-@kernel
+@inner_kernel
 def bend_point(d: float) -> Vec3:
     """K = (I - n n^T)/d around a point; flat where the direction is a choice."""
     k = 1.0 / d if d > _SAME else 0.0
     return k, -k, 0.0
 
 
-@kernel
+@inner_kernel
 def bend_line(d: float) -> Vec3:
     """K = (I - n n^T - u u^T)/d around a line along u."""
     k = 1.0 / d if d > _SAME else 0.0
     return k, -k, -k
 
 
-@kernel
+@inner_kernel
 def edges(x: Vec3, ua: Vec3, y: Vec3, ub: Vec3, n: Vec3, radii: tuple[float, float], out: Vector) -> None:
     """Line through x along ua of a against line through y along ub of b; n is the normal of both.
 
