@@ -14,6 +14,8 @@ from sim.parts import Contact, Joint
 
 Floats = NDArray[np.float64]
 
+_CONE = 0.0  # instead of the sign of a bound
+
 
 def mechanism_sizes(mech: Mechanism) -> Sizes:
     """Counts of a mechanism; a limit is one bound of one degree of freedom."""
@@ -54,20 +56,24 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
         model.joint_offset[i] = np.asarray(joint.orientation)
         model.joint_axis[i] = np.asarray(joint.axis)
         model.joint_trans_axes[i] = translation_axes(joint.ntrans, joint.axis).ravel()
+        model.joint_swing_axes[i] = translation_axes(2, joint.axis)[:2].ravel()
         model.dof_body[dofs] = i
         # the three degrees of freedom of a quaternion all point at its start
-        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), joint.ntrans)
+        last = joint.ntrans if joint.nrot == 3 else joint.nv
+        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), last)
         model.dof_spring[dofs], model.dof_damper[dofs] = np.asarray(joint.spring), np.asarray(joint.damper)
-        model.dof_rest[dofs] = np.asarray(joint.rest)
+        model.dof_armature[dofs], model.dof_rest[dofs] = np.asarray(joint.armature), np.asarray(joint.rest)
         for dof, sign, bound in _bounds(joint):
             model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
+            model.limit_cone[limit] = sign == _CONE
             limit += 1
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:
-    """(degree of freedom, +1 lower or -1 upper, bound) of every finite limit."""
+    """(degree of freedom, +1 lower or -1 upper or 0 cone, bound) of every finite limit."""
     rows = [(dof, s, b) for dof, pair in enumerate(joint.limits or ()) for s, b in zip((1.0, -1.0), pair, strict=True)]
-    return [row for row in rows if np.isfinite(row[2])]
+    cone = [(joint.ntrans, _CONE, joint.cone)] if joint.cone is not None else []
+    return [row for row in rows if np.isfinite(row[2])] + cone
 
 
 def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
