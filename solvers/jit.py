@@ -39,13 +39,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
+_LOADERS = ("urdf", "mjcf")  # folders without kernels
 _REGISTRY: list[Any] = []
 
 
 def _sources() -> list[Path]:
-    """Every file whose text can end up inside a compiled kernel; a loader of files (sim/urdf) is not among them."""
+    """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
     root = Path(__file__).resolve().parent.parent
-    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name != "urdf")]
+    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
     files += [
         f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
     ]
