@@ -13,7 +13,7 @@ from sim.kinematics import displace, tree_poses
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate
-from sim.swing import swing_component, swing_of
+from sim.swing_coordinates import swing_component, swing_of
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
 from sim.inequalities import add_slip_jacobians, condense_into
-from sim.joints import add_spring_derivatives, joint_blocks
+from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import add_limit_blocks, add_limit_derivatives
 from sim.model import InputKind, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
-from sim.swing import add_swing_curvature
 from solvers.jit import inlined, kernel
 
 _JOINT = int(InputKind.JOINT)

@@ -8,11 +8,13 @@ discrete Lagrangian, the energy of a rotor that turns with the coordinate and ca
 
 from __future__ import annotations
 
-from sim.model import InputKind, Model, Vector, Work
+from sim.model import InputKind, Late, Model, Vector, Work
 from sim.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_matrix, quat_mul
 from solvers.jit import kernel
+from solvers.record import call_late
 
 _JOINT = int(InputKind.JOINT)
+_SWING_CURVATURE = int(Late.SWING_CURVATURE)
 
 
 @kernel
@@ -163,3 +165,12 @@ def _quaternion_spring_derivatives(model: Model, work: Work, h: float, q: Vector
                 t -= 0.25 * dot
             work.dR_dq[e + a, e + b] += g * (t + w)
             work.dR_dv[e + a, e + b] += g * w
+
+
+@kernel
+def add_swing_curvature(model: Model, work: Work, q: Vector) -> None:
+    """dR_dq += what changes in the test directions of joints with two rotations, beyond turning (swing.py)."""
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] == 2:
+            a = model.body_qadr[i + 1] - 2
+            call_late(model.late[_SWING_CURVATURE], model, work, i, q[a], q[a + 1])

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model import Matrix, Model, Vector
+from sim.model import Late, Matrix, Model, Vector
 from sim.rotation import cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate
-from sim.swing import swing, swing_column
 from solvers.jit import kernel
+from solvers.record import call_late
+
+_SWING_POSE = int(Late.SWING_POSE)
 
 
 @kernel
@@ -108,9 +110,8 @@ def tree_poses(
         elif model.joint_nrot[i] == 3:
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q[a], q[a + 1], q[a + 2], q[a + 3])
         elif model.joint_nrot[i] == 2:
-            w = swing(model, i, q[a], q[a + 1])
-            s = quat_exp(w[0], w[1], w[2])
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, s[0], s[1], s[2], s[3])
+            call_late(model.late[_SWING_POSE], model, S[d], i, q[a], q[a + 1])
+            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, S[d + 1, 0], S[d, 0], S[d, 1], S[d, 2])
         else:
             g0, g1, g2, g3 = f0, f1, f2, f3
         quat[i, 0] = g0
@@ -130,8 +131,7 @@ def tree_poses(
                 _column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
         elif model.joint_nrot[i] == 2:
             for k in range(2):
-                b = swing_column(model, i, k, w)
-                ax, ay, az = rotate(rot, i, b[0], b[1], b[2])
+                ax, ay, az = rotate(rot, i, S[d + k, 3], S[d + k, 4], S[d + k, 5])
                 _column(S, d + k, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
         m = model.joint_child_point[i]
         cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])

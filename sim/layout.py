@@ -25,7 +25,7 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, limit_dof nlimit, limit_cone nlimit,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, late 5, limit_dof nlimit, limit_cone nlimit,
     input_kind nu, input_index nu
     """
 )

@@ -41,6 +41,16 @@ class InputKind(IntEnum):
     BODY = 2  # wrench on a body at its centre of mass, body axes
 
 
+class Late(IntEnum):
+    """Kernels that are compiled by the first scene that needs them (solvers/jit.py)."""
+
+    CONE_GAP = 0
+    CONE_BLOCK = 1
+    CONE_DERIVATIVE = 2
+    SWING_POSE = 3
+    SWING_CURVATURE = 4
+
+
 class Model(NamedTuple):
     """One mechanism: constant during a run. Body i hangs on joint i; parents come before children."""
 
@@ -55,6 +65,7 @@ class Model(NamedTuple):
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
     contact_body: Integers  # (ncontact,)
     contact_law: Integers  # (ncontact,) Law
+    late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind

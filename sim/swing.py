@@ -6,15 +6,20 @@
 
 The coordinates are regular for |p| < 2 pi. This is no universal joint, which is two hinges one after the other and
 turns its child about the axis by an amount of second order.
+
+Scenes without such joints do not compile these kernels.
 """
 
 from __future__ import annotations
 
-from math import cos, pi, sqrt
+from math import cos, sqrt
+from typing import Any
 
-from sim.model import Model, Vector, Work
-from sim.rotation import Quat, Vec3, cross, left_jacobian, quat_log, rotate, so3_coefficients
-from solvers.jit import kernel
+from sim.layout import model_view, work_view
+from sim.model import Model, Vector
+from sim.rotation import Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients
+from solvers.jit import kernel, late
+from solvers.record import floats
 
 
 @kernel
@@ -24,35 +29,26 @@ def swing(model: Model, i: int, p1: float, p2: float) -> Vec3:
     return p1 * V[0] + p2 * V[3], p1 * V[1] + p2 * V[4], p1 * V[2] + p2 * V[5]
 
 
-@kernel
-def swing_column(model: Model, i: int, k: int, t: Vec3) -> Vec3:
-    """J(t)^T V_k = J(-t) V_k: rotation of the child per unit of coordinate k, child's axes."""
-    V = model.joint_swing_axes[i, 3 * k : 3 * k + 3]
+@late
+def swing_pose(model_at: Any, out_at: Any, i: int, p1: float, p2: float) -> int:
+    """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p.
+
+    out, the rows S[d] and S[d + 1] of the joint: (x, y, z, column 1), (w, -, -, column 2).
+    """
+    model = model_view(model_at)
+    out = floats(out_at, 12)
+    t = swing(model, i, p1, p2)
+    w, x, y, z = quat_exp(t[0], t[1], t[2])
     J = left_jacobian(-t[0], -t[1], -t[2])
-    return (
-        J[0] * V[0] + J[1] * V[1] + J[2] * V[2],
-        J[3] * V[0] + J[4] * V[1] + J[5] * V[2],
-        J[6] * V[0] + J[7] * V[1] + J[8] * V[2],
-    )
-
-
-@kernel
-def swing_of(r: Quat, near: Vec3) -> Vec3:
-    """The rotation vector t of the rotation r that is nearest to another one: of angle up to 2 pi."""
-    t = quat_log(r[0], r[1], r[2], r[3])
-    n = sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-    dot = t[0] * near[0] + t[1] * near[1] + t[2] * near[2]
-    if n > 0.0 and dot < n * (n - pi):  # |t (1 - 2 pi/n) - near| < |t - near|
-        k = 1.0 - 2.0 * pi / n
-        return k * t[0], k * t[1], k * t[2]
-    return t
-
-
-@kernel
-def swing_component(model: Model, i: int, k: int, t: Vec3) -> float:
-    """p_k = V_k . t"""
-    V = model.joint_swing_axes[i, 3 * k : 3 * k + 3]
-    return V[0] * t[0] + V[1] * t[1] + V[2] * t[2]
+    V = model.joint_swing_axes[i]
+    for r in range(3):
+        out[3 + r] = J[3 * r] * V[0] + J[3 * r + 1] * V[1] + J[3 * r + 2] * V[2]
+        out[9 + r] = J[3 * r] * V[3] + J[3 * r + 1] * V[4] + J[3 * r + 2] * V[5]
+    out[0] = x
+    out[1] = y
+    out[2] = z
+    out[6] = w
+    return 0
 
 
 @kernel
@@ -85,32 +81,33 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
     )
 
 
-@kernel
-def add_swing_curvature(model: Model, work: Work, q: Vector) -> None:
-    """dR_dq += m . d(column j)/d(p_k), m the residual moment on the subtree about the joint, child's axes.
+@late
+def swing_curvature(model_at: Any, work_at: Any, i: int, p1: float, p2: float) -> int:
+    """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 
-    A test direction turns with the joint, which `residual_derivatives` knows, and in the child's axes it also changes.
+    All in the child's axes. A test direction turns with its joint, which `residual_derivatives` knows, and in the child's axes it also changes.
     """
-    for i in range(model.body_parent.shape[0]):
-        if model.joint_nrot[i] != 2:
-            continue
-        c = model.joint_child_point[i]
-        x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
-        f = work.subtree[i]
-        o = work.origin
-        x, y, z = cross(
-            x + work.pos2[i, 0] - o[0], y + work.pos2[i, 1] - o[1], z + work.pos2[i, 2] - o[2], f[0], f[1], f[2]
-        )
-        m = (f[3] - x, f[4] - y, f[5] - z)
-        R = work.rot2[i]
-        m0 = R[0] * m[0] + R[3] * m[1] + R[6] * m[2]
-        m1 = R[1] * m[0] + R[4] * m[1] + R[7] * m[2]
-        m2 = R[2] * m[0] + R[5] * m[1] + R[8] * m[2]
-        a = model.body_qadr[i + 1] - 2
-        d = model.body_vadr[i + 1] - 2
-        t = swing(model, i, q[a], q[a + 1])
-        V = model.joint_swing_axes[i]
-        for j in range(2):
-            for k in range(2):
-                g = column_derivative(t, V[3 * j : 3 * j + 3], V[3 * k : 3 * k + 3])
-                work.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2
+    model = model_view(model_at)
+    work = work_view(work_at)
+    c = model.joint_child_point[i]
+    x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
+    x, y, z = (
+        x + work.pos2[i, 0] - work.origin[0],
+        y + work.pos2[i, 1] - work.origin[1],
+        z + work.pos2[i, 2] - work.origin[2],
+    )
+    f = work.subtree[i]
+    x, y, z = cross(x, y, z, f[0], f[1], f[2])
+    x, y, z = f[3] - x, f[4] - y, f[5] - z
+    R = work.rot2[i]
+    m0 = R[0] * x + R[3] * y + R[6] * z
+    m1 = R[1] * x + R[4] * y + R[7] * z
+    m2 = R[2] * x + R[5] * y + R[8] * z
+    d = model.body_vadr[i + 1] - 2
+    t = swing(model, i, p1, p2)
+    V = model.joint_swing_axes[i]
+    for j in range(2):
+        for k in range(2):
+            g = column_derivative(t, V[3 * j : 3 * j + 3], V[3 * k : 3 * k + 3])
+            work.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2
+    return 0
