@@ -30,6 +30,8 @@ __all__ = [
     "Linearization",
     "MPC",
     "Mechanism",
+    "MjcfMechanism",
+    "MjcfWarning",
     "Perturbation",
     "Plan",
     "Plant",
@@ -50,6 +52,7 @@ __all__ = [
     "equilibrium",
     "gaits",
     "ilqr",
+    "load_mjcf",
     "load_urdf",
     "models",
     "monte_carlo",
@@ -73,6 +76,8 @@ _HOME: dict[str, str | None] = {
     "Linearization": "sim.results",
     "MPC": "dojo_opt.mpc.controller",
     "Mechanism": "sim.mechanism",
+    "MjcfMechanism": "sim.mjcf",
+    "MjcfWarning": "sim.mjcf",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
     "Plant": "dojo_opt.plant.plant",
@@ -93,6 +98,7 @@ _HOME: dict[str, str | None] = {
     "equilibrium": "dojo_opt.rest",
     "gaits": None,
     "ilqr": "dojo_opt.planner",
+    "load_mjcf": "sim.mjcf",
     "load_urdf": "sim.urdf",
     "models": None,
     "monte_carlo": "dojo_opt.plant.study",
@@ -116,6 +122,7 @@ if TYPE_CHECKING:
     from dojo_opt.problem import Problem
     from dojo_opt.rest import equilibrium
     from sim.mechanism import Mechanism
+    from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, Sphere

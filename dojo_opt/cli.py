@@ -12,6 +12,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
 
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
     models.add_argument("--json", action="store_true", help="print JSON")
+    models.add_argument("--thumbnails", type=Path, metavar="DIR", help="also write a picture of each, DIR/NAME.png")
 
     warmup = commands.add_parser("warmup", help="compile ahead of time", description="Compile and cache every kernel.")
     warmup.add_argument("--json", action="store_true", help="print JSON")
@@ -143,19 +145,18 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _models(args: argparse.Namespace) -> int:
-    rows = []
-    for name in sorted(dojo.models.__all__):
-        model = getattr(dojo.models, name)
-        sim = dojo.Simulator(model(3) if name == "npendulum" else model(), time_step=0.01)
-        rows.append({"name": name, "bodies": sim.nbody, "nq": sim.nq, "nv": sim.nv, "nu": sim.nu})
-        rows[-1] |= {"contacts": sim.ncontact, "what": (model.__doc__ or "").split("\n")[0]}
+    entries = dojo.models.catalogue()
+    if args.thumbnails:
+        args.thumbnails.mkdir(parents=True, exist_ok=True)
+        for entry in entries:
+            dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
-        print(json.dumps(rows))
+        print(json.dumps([asdict(entry) for entry in entries]))
         return 0
-    print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}  what")
-    for row in rows:
-        sizes = "{bodies:>7}{nq:>4}{nv:>4}{nu:>4}{contacts:>9}".format(**row)
-        print(f"{row['name']:<18}{sizes}  {row['what']}")
+    print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  what")
+    for e in entries:
+        sizes = f"{e.bodies:>7}{e.nq:>4}{e.nv:>4}{e.nu:>4}{e.contacts:>9}{e.limits:>7}{e.mass:>8.4g}"
+        print(f"{e.name:<18}{sizes}  {e.what}")
     return 0
 
 

@@ -7,12 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
-from sim.model import InputKind, Law, Model
+from sim.model import InputKind, Late, Law, Model
 from sim.parts import Contact, Joint
+from sim.swing import swing_curvature, swing_pose
 
 Floats = NDArray[np.float64]
+
+_CONE = 0.0  # instead of the sign of a bound
 
 
 def mechanism_sizes(mech: Mechanism) -> Sizes:
@@ -29,7 +33,19 @@ def pack(mech: Mechanism) -> Model:
     _pack_contacts(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
+    bind(model)
     return model
+
+
+def bind(model: Model) -> None:
+    """Fill in the addresses, in this process, of the kernels that few scenes have."""
+    if np.any(model.limit_cone):
+        model.late[Late.CONE_GAP] = cone_gap.address()
+        model.late[Late.CONE_BLOCK] = cone_block.address()
+        model.late[Late.CONE_DERIVATIVE] = cone_derivative.address()
+    if np.any(model.joint_nrot == 2):
+        model.late[Late.SWING_POSE] = swing_pose.address()
+        model.late[Late.SWING_CURVATURE] = swing_curvature.address()
 
 
 def _pack_tree(mech: Mechanism, model: Model) -> None:
@@ -54,20 +70,24 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
         model.joint_offset[i] = np.asarray(joint.orientation)
         model.joint_axis[i] = np.asarray(joint.axis)
         model.joint_trans_axes[i] = translation_axes(joint.ntrans, joint.axis).ravel()
+        model.joint_swing_axes[i] = translation_axes(2, joint.axis)[:2].ravel()
         model.dof_body[dofs] = i
         # the three degrees of freedom of a quaternion all point at its start
-        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), joint.ntrans)
+        last = joint.ntrans if joint.nrot == 3 else joint.nv
+        model.dof_qadr[dofs] = model.body_qadr[i] + np.minimum(np.arange(joint.nv), last)
         model.dof_spring[dofs], model.dof_damper[dofs] = np.asarray(joint.spring), np.asarray(joint.damper)
-        model.dof_rest[dofs] = np.asarray(joint.rest)
+        model.dof_armature[dofs], model.dof_rest[dofs] = np.asarray(joint.armature), np.asarray(joint.rest)
         for dof, sign, bound in _bounds(joint):
             model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
+            model.limit_cone[limit] = sign == _CONE
             limit += 1
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:
-    """(degree of freedom, +1 lower or -1 upper, bound) of every finite limit."""
+    """(degree of freedom, +1 lower or -1 upper or 0 cone, bound) of every finite limit."""
     rows = [(dof, s, b) for dof, pair in enumerate(joint.limits or ()) for s, b in zip((1.0, -1.0), pair, strict=True)]
-    return [row for row in rows if np.isfinite(row[2])]
+    cone = [(joint.ntrans, _CONE, joint.cone)] if joint.cone is not None else []
+    return [row for row in rows if np.isfinite(row[2])] + cone
 
 
 def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
+from sim.build import bind
 from sim.layout import allocate_work, sizes_of, table
 from sim.model import Integers, Model, Vector
 from solvers.status import Status
@@ -50,6 +51,7 @@ class Calls:
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
         self.hard = 1 if self.sizes.ncontact + self.sizes.nlimit else None  # None: the interior point is not compiled
         self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
+        bind(model)  # addresses are those of this process
         self._model = table(model)
         self._scratch = threading.local()
 

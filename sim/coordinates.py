@@ -13,6 +13,7 @@ from sim.kinematics import displace, tree_poses
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate
+from sim.swing_coordinates import swing_component, swing_of
 from solvers.jit import kernel
 from solvers.record import Table
 
@@ -124,6 +125,7 @@ def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) ->
 
         translations    q_k = R(Q) t_k . d                   v = (q2 - q1)/h
         one axis        angle of r2 = Q2^* quat2 about it    v = angle of r1^* r2 / h
+        swing           log(r2), across the axis             v = (log(r2) - log(r1))/h
         quaternion      r2, with nonnegative scalar part     v = log(r1^* r2)/h
 
     d: from the joint frame on the parent to the joint point of the child. Of poses that violate a joint, the part along
@@ -147,6 +149,12 @@ def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) ->
         if model.joint_nrot[i] == 1:
             out[a] = axis_angle(model, i, r2)
             out[d] = axis_angle(model, i, e) / h
+        elif model.joint_nrot[i] == 2:
+            s2 = quat_log(r2[0], r2[1], r2[2], r2[3])
+            s1 = swing_of(r1, s2)
+            for k in range(2):
+                out[a + k] = swing_component(model, i, k, s2)
+                out[d + k] = (out[a + k] - swing_component(model, i, k, s1)) / h
         elif model.joint_nrot[i] == 3:
             sign = 1.0 if r2[0] >= 0.0 else -1.0
             w = quat_log(e[0], e[1], e[2], e[3])

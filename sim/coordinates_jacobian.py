@@ -12,6 +12,7 @@ from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import (
     Mat3,
+    Quat,
     Vec3,
     cross,
     inverse_right_jacobian,
@@ -117,6 +118,7 @@ def _joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, ou
 
         translation     a . (dx_c - dx_p) + ((R c) x a) . phi_c - ((R c + x_c - x_p) x a) . phi_p,   a = R(Q) t_k
         one axis        a . (phi_c - phi_p)
+        swing           a . (phi_c - phi_p),   a = R(Q) J(t)^-T V_k
         quaternion      R_c^T (phi_c - phi_p)
 
     World rotations; consistent poses.   out: (nv, 12 or more).
@@ -147,11 +149,29 @@ def _joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, ou
         for j in range(3):
             out[d, 3 + j] = a[j]
             out[d, 9 + j] = -a[j]
+    elif model.joint_nrot[i] == 2:
+        t = joint_swing(i, Q, quat)
+        J = inverse_right_jacobian(t[0], t[1], t[2])
+        R = quat_matrix(Q[0], Q[1], Q[2], Q[3])
+        for k in range(2):
+            V = model.joint_swing_axes[i, 3 * k : 3 * k + 3]
+            b = times(J, V[0], V[1], V[2])
+            a = times(R, b[0], b[1], b[2])
+            for j in range(3):
+                out[d + k, 3 + j] = a[j]
+                out[d + k, 9 + j] = -a[j]
     elif model.joint_nrot[i] == 3:
         for k in range(3):
             for j in range(3):
                 out[d + k, 3 + j] = rot[i, 3 * j + k]
                 out[d + k, 9 + j] = -rot[i, 3 * j + k]
+
+
+@kernel
+def joint_swing(i: int, Q: Quat, quat: Matrix) -> Vec3:
+    """log(Q^* quat): rotation vector of a swing, from the frame Q of its joint."""
+    r = quat_mul(Q[0], -Q[1], -Q[2], -Q[3], quat[i, 0], quat[i, 1], quat[i, 2], quat[i, 3])
+    return quat_log(r[0], r[1], r[2], r[3])
 
 
 @kernel

@@ -50,6 +50,8 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
             ("spring", any(np.atleast_1d(np.asarray(joint.spring)))),
             ("damper", any(np.atleast_1d(np.asarray(joint.damper)))),
             ("limits", any(np.isfinite(b) for pair in joint.limits or () for b in pair)),
+            ("cone", joint.cone is not None),
+            ("armature", any(np.atleast_1d(np.asarray(joint.armature)))),
         )
         if there
     ]

@@ -45,10 +45,10 @@ def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) ->
 
 @kernel
 def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
-    """out -= d V_d(1, 2)/d(q2), the half of the spring impulse at the node (accumulated).
+    """out += d(L_d - T_d)(1, 2)/d(q2): the half of the spring impulse at the node, and rotors (accumulated).
 
-        scalar        V_d = h k/2 ((q1 + q2)/2 - rest)^2       derivative  h k/2 ((q1 + q2)/2 - rest)
-        quaternion    V_d = h k/2 |s1 + s2|^2                  derivative  h k/2 (c2 I - [s2]) (s1 + s2)
+        scalar        -h k/2 ((q1 + q2)/2 - rest)^2 + I (q2 - q1)^2/(2 h)    -h k/2 ((q1 + q2)/2 - rest) + I v
+        quaternion    -h k/2 |s1 + s2|^2                                     -h k/2 (c2 I - [s2]) (s1 + s2)
 
     s: vector part of the rotation from rest.   out: (nv,).
     """
@@ -71,7 +71,7 @@ def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
                 out[end + 2] -= 0.5 * h * k * (r2[0] * s2 - t[2])
         for d in range(model.body_vadr[i], end):
             middle = x[model.dof_qadr[d]] - 0.5 * h * x[nq + d] - model.dof_rest[d]
-            out[d] -= 0.5 * h * model.dof_spring[d] * middle
+            out[d] += model.dof_armature[d] * x[nq + d] - 0.5 * h * model.dof_spring[d] * middle
 
 
 @kernel
@@ -99,8 +99,20 @@ def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
 
 
 @kernel
+def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
+    """out[i] = sign diag(I), n x n row-major, I the armatures of joint i.   out: (nbody, 36)."""
+    for i in range(model.body_parent.shape[0]):
+        d = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d
+        for k in range(n * n):
+            out[i, k] = 0.0
+        for k in range(n):
+            out[i, k * n + k] = sign * model.dof_armature[d + k]
+
+
+@kernel
 def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
-    """p.M^-1 p / 2, with p = S2^T (momenta of the bodies) + springs and M = S2^T (inertia) S2 at configuration 2."""
+    """p.M^-1 p / 2, p = S2^T (momenta of the bodies) + springs, M = S2^T (inertia) S2 + armature at configuration 2."""
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)
@@ -109,9 +121,7 @@ def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
     for d in range(work.S2.shape[0]):
         for k in range(6):
             work.S3nu[d, k] = work.S2[d, k]
-    for i in range(work.joint_block.shape[0]):
-        for k in range(36):
-            work.joint_block[i, k] = 0.0
+    armature_blocks(model, 1.0, work.joint_block)
     factor(model, work)
     solve(model, work, work.residual, work.dnu)
     energy = 0.0

@@ -9,9 +9,9 @@ from __future__ import annotations
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
 from sim.inequalities import add_slip_jacobians, condense_into
-from sim.joints import add_spring_derivatives, joint_blocks
+from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
-from sim.limits import add_limit_blocks
+from sim.limits import add_limit_blocks, add_limit_derivatives
 from sim.model import InputKind, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
@@ -44,6 +44,7 @@ def gradient(
         return False
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    add_swing_curvature(model, work, q)
     add_spring_derivatives(model, work, h, q, v)
     _joint_columns(model, work, h, v, hard)
     _input_columns(model, work, h)
@@ -172,9 +173,7 @@ def _joint_columns(model: Model, work: Work, h: float, v: Vector, hard: int | No
             for d in range(nv):
                 R[d, k] *= -h
     if hard is not None:
-        for k in range(model.limit_dof.shape[0]):
-            d = model.limit_dof[k]
-            work.dR_dq[d, d] += work.bound[k, 1] / work.bound[k, 0]
+        add_limit_derivatives(model, work, h)
     for d in range(nv):
         for k in range(nv):
             work.columns[d, k] = -work.dR_dq[d, k]

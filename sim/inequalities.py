@@ -17,7 +17,7 @@ from sim.friction import (
     slip_violation,
     start_contact,
 )
-from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits
+from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
 from sim.model import Goal, Matrix, Model, Work
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
@@ -31,7 +31,7 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, i
 def inequality_kinematics(model: Model, work: Work, h: float) -> None:
     """Gaps and slips of contacts and limits at configuration 3."""
     contact_kinematics(model, work, h)
-    limit_gaps(model, work)
+    limit_gaps(model, work, h)
 
 
 @kernel
@@ -78,9 +78,9 @@ def apply_inequalities(model: Model, work: Work) -> float:
 
 @kernel
 def apply_limits(model: Model, work: Work) -> None:
-    """residual -= sign gamma."""
+    """residual -= sign gamma, and p gamma of a cone."""
     for k in range(model.limit_dof.shape[0]):
-        work.residual[model.limit_dof[k]] -= model.limit_sign[k] * work.bound[k, 1]
+        add_limit_impulse(model, work, k, -work.bound[k, 1], work.residual)
 
 
 @kernel

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model import Matrix, Model, Vector
+from sim.model import Late, Matrix, Model, Vector
 from sim.rotation import cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
+from solvers.record import call_late
+
+_SWING_POSE = int(Late.SWING_POSE)
 
 
 @kernel
@@ -23,13 +26,15 @@ def displace(model: Model, q: Vector, v: Vector, h: float, out: Vector) -> None:
     for i in range(model.body_parent.shape[0]):
         a = model.body_qadr[i]
         d = model.body_vadr[i]
-        for _ in range(model.joint_ntrans[i]):
+        n = model.body_vadr[i + 1] - d
+        quaternion = model.joint_nrot[i] == 3
+        if quaternion:
+            n -= 3
+        for _ in range(n):
             out[a] = q[a] + h * v[d]
             a += 1
             d += 1
-        if model.joint_nrot[i] == 1:
-            out[a] = q[a] + h * v[d]
-        elif model.joint_nrot[i] == 3:
+        if quaternion:
             e = quat_exp(h * v[d], h * v[d + 1], h * v[d + 2])
             r = quat_mul(q[a], q[a + 1], q[a + 2], q[a + 3], e[0], e[1], e[2], e[3])
             n = 1.0 / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]) ** 0.5
@@ -57,7 +62,7 @@ def tree_poses(
 
         joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
         body          quat = Q quat_joint(q),   pos = o - R p_child
-        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis;
+        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see swing.py;
                       quaternion: the three axes of Q quat_joint(q2)
 
     q2 are the coordinates at configuration 2, always: so the columns are derivatives with respect to a right
@@ -104,6 +109,9 @@ def tree_poses(
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, cq, sq * t[0], sq * t[1], sq * t[2])
         elif model.joint_nrot[i] == 3:
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q[a], q[a + 1], q[a + 2], q[a + 3])
+        elif model.joint_nrot[i] == 2:
+            call_late(model.late[_SWING_POSE], model, S[d], i, q[a], q[a + 1])
+            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, S[d + 1, 0], S[d, 0], S[d, 1], S[d, 2])
         else:
             g0, g1, g2, g3 = f0, f1, f2, f3
         quat[i, 0] = g0
@@ -121,6 +129,10 @@ def tree_poses(
             r = quat_matrix(g0, g1, g2, g3)
             for k in range(3):
                 _column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
+        elif model.joint_nrot[i] == 2:
+            for k in range(2):
+                ax, ay, az = rotate(rot, i, S[d + k, 3], S[d + k, 4], S[d + k, 5])
+                _column(S, d + k, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
         m = model.joint_child_point[i]
         cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])
         pos[i, 0] = ox - cx

@@ -25,15 +25,16 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, limit_dof nlimit, input_kind nu,
-    input_index nu
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, late 5, limit_dof nlimit, limit_cone nlimit,
+    input_kind nu, input_index nu
     """
 )
 
 MODEL_FLOATS = _shapes(
     """
     body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
-    joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, dof_spring nv, dof_damper nv, dof_rest nv,
+    joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_swing_axes nbody 6, dof_spring nv,
+    dof_damper nv, dof_armature nv, dof_rest nv,
     contact_point ncontact 3, contact_radius ncontact, contact_friction ncontact, contact_frame ncontact 9,
     contact_height ncontact, limit_sign nlimit, limit_bound nlimit, input_wrench nu 6, gravity 3
     """
@@ -47,7 +48,7 @@ WORK_FIELDS = _shapes(
     balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
-    bound_step nlimit 2, bound_trial nlimit 2, bound_gap nlimit, bound_w nlimit,
+    bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5
     """

@@ -40,6 +40,7 @@ class Mechanism:
         bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
+        _check_masses(f"{call})", bodies, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
         object.__setattr__(self, "contacts", _name_contacts(f"{call})", self.contacts, self.body_names))
@@ -190,6 +191,16 @@ def _sort_tree(
         order.append(ready[0])
         waiting.remove(ready[0])
     return tuple(by_name[j.child] for j in order), tuple(order)
+
+
+def _check_masses(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
+    """Refuse a body without mass that carries none either and can move: nothing would hold its joint."""
+    carries = {b.name: b.mass > 0.0 for b in bodies}
+    for body, joint in zip(reversed(bodies), reversed(joints), strict=True):
+        if joint.parent in carries:
+            carries[joint.parent] |= carries[body.name]
+        if not carries[body.name]:
+            raise ValueError(f"{call}: body {body.name!r} has no mass, nor has anything that hangs on it")
 
 
 def _renamed(part: Any, name: str) -> Any:

@@ -41,6 +41,16 @@ class InputKind(IntEnum):
     BODY = 2  # wrench on a body at its centre of mass, body axes
 
 
+class Late(IntEnum):
+    """Kernels that are compiled by the first scene that needs them (solvers/jit.py)."""
+
+    CONE_GAP = 0
+    CONE_BLOCK = 1
+    CONE_DERIVATIVE = 2
+    SWING_POSE = 3
+    SWING_CURVATURE = 4
+
+
 class Model(NamedTuple):
     """One mechanism: constant during a run. Body i hangs on joint i; parents come before children."""
 
@@ -50,12 +60,14 @@ class Model(NamedTuple):
     body_qadr: Integers  # (nbody + 1,) first coordinate of joint i in q
     body_vadr: Integers  # (nbody + 1,) first velocity of joint i in v: translations first, then rotations
     joint_ntrans: Integers  # (nbody,) free translations, 0 to 3
-    joint_nrot: Integers  # (nbody,) free rotations: 0, 1 (about joint_axis) or 3 (quaternion)
+    joint_nrot: Integers  # (nbody,) free rotations: 0, 1 (about joint_axis), 2 (swing, across it) or 3 (quaternion)
     dof_body: Integers  # (nv,) body of each degree of freedom
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
     contact_body: Integers  # (ncontact,)
     contact_law: Integers  # (ncontact,) Law
-    limit_dof: Integers  # (nlimit,) a scalar degree of freedom
+    late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
+    limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
+    limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
     input_index: Integers  # (nu,) degree of freedom, or body
     # numbers
@@ -65,9 +77,11 @@ class Model(NamedTuple):
     joint_child_point: Matrix  # (nbody, 3) joint point in the child body, from its centre of mass [m]
     joint_offset: Matrix  # (nbody, 4) orientation of the joint frame in the parent body, quaternion
     joint_trans_axes: Matrix  # (nbody, 9) free translation directions in the joint frame, one per row
-    joint_axis: Matrix  # (nbody, 3) rotation axis of a one-axis joint, joint frame
+    joint_axis: Matrix  # (nbody, 3) rotation axis of a one-axis joint, axis of a cone limit; joint frame
+    joint_swing_axes: Matrix  # (nbody, 6) the two directions across the axis of a swing, joint frame
     dof_spring: Vector  # (nv,) [N/m, N m/rad]
     dof_damper: Vector  # (nv,) [N s/m, N m s/rad]
+    dof_armature: Vector  # (nv,) inertia that moves with a scalar dof alone, a rotor's [kg, kg m^2]
     dof_rest: Vector  # (nv,) spring rest of a scalar dof; of a quaternion dof, component of its rotation vector
     contact_point: Matrix  # (ncontact, 3) sphere centre in the body, from its centre of mass [m]
     contact_radius: Vector  # (ncontact,) [m], 0 for a point
@@ -75,7 +89,7 @@ class Model(NamedTuple):
     contact_frame: Matrix  # (ncontact, 9) rows: normal and two tangents of the half-space, world axes
     contact_height: Vector  # (ncontact,) the half-space is normal . x >= height [m]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
-    limit_bound: Vector  # (nlimit,) [m, rad]
+    limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
     gravity: Vector  # (3,) [m/s^2]
 
@@ -133,6 +147,7 @@ class Work(NamedTuple):
     bound: Matrix  # (nlimit, 2) slack, impulse
     bound_step: Matrix  # (nlimit, 2)
     bound_trial: Matrix  # (nlimit, 2)
+    bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)
     bound_w: Vector  # (nlimit,)
     # derivatives

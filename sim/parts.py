@@ -23,6 +23,10 @@ KINDS: dict[str, tuple[int, int]] = {
     "cylindrical": (1, 1),
     "planar_axis": (2, 1),  # across and about the axis: the base of a planar robot
     "free_revolute": (3, 1),
+    "orbital": (0, 2),  # in any direction across the axis, never about it
+    "prismatic_orbital": (1, 2),
+    "planar_orbital": (2, 2),
+    "free_orbital": (3, 2),
     "spherical": (0, 3),
     "cylindrical_free": (1, 3),
     "planar_free": (2, 3),
@@ -36,6 +40,8 @@ class Body:
     """A rigid body. Its frame has its origin at the centre of mass.
 
     inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; left out, that of `shape`.
+    A body of mass 0, without inertia and shape, is the middle of a joint put together from several, as hinges one after
+    the other; something with a mass has to hang on it.
     """
 
     name: str
@@ -46,7 +52,8 @@ class Body:
     def __post_init__(self) -> None:
         checks.name("Body(name=...)", self.name)
         call = f"Body({self.name!r}"
-        object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
+        if self.mass != 0 or self.inertia is not None or self.shape is not None:
+            object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         if self.shape is not None and not isinstance(self.shape, Solid):
             raise ValueError(f"{call}, shape=...): expected Sphere, Box, Cylinder or Capsule, got {self.shape!r}")
         object.__setattr__(self, "inertia", _inertia(call, self))
@@ -54,6 +61,8 @@ class Body:
 
 def _inertia(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
     """The inertia as rows, after the tests that every rigid body passes."""
+    if body.mass == 0.0:
+        return ((0.0, 0.0, 0.0),) * 3
     if body.inertia is None:
         if body.shape is None:
             raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
@@ -83,12 +92,16 @@ class Joint:
 
         joint frame   at `parent_point` in the parent, turned by `orientation` (quaternion, joint to parent)
         coordinates   translations first, then rotations; at zero the child's axes are those of the joint frame
+                      one rotation: its angle; two, of the orbital kinds: the rotation vector along the two directions
+                      of the plane across the axis (sim/swing.py); three: a quaternion
         `axis`        in the joint frame; a plane across it has its coordinates along x, y, z in this order, without
                       the one nearest to the axis (axis y: x then z)
 
     Points are measured from the centres of mass [m]. spring [N/m, N m/rad], damper [N s/m, N m s/rad] and rest take one
     number or one per degree of freedom; a quaternion joint has one spring constant, and its rest is a rotation vector.
-    limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite.
+    limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite. cone: largest angle of
+    the child's axis from the parent's, for kinds with three rotations [rad]. armature [kg, kg m^2]: inertia that moves
+    with a coordinate and with nothing else, as a geared rotor's; none on the rotations of a quaternion.
     """
 
     kind: str
@@ -103,6 +116,8 @@ class Joint:
     damper: ArrayLike = 0.0
     rest: ArrayLike = 0.0
     limits: Sequence[Any] | None = None
+    cone: float | None = None
+    armature: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -114,9 +129,10 @@ class Joint:
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
         object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
-        for field in ("spring", "damper", "rest"):
+        for field in ("spring", "damper", "rest", "armature"):
             object.__setattr__(self, field, self._per_dof(call, field))
         object.__setattr__(self, "limits", self._limits(call))
+        self._check_cone(f"{call}, cone=...)")
 
     @property
     def ntrans(self) -> int:
@@ -125,7 +141,7 @@ class Joint:
 
     @property
     def nrot(self) -> int:
-        """Number of free rotations: 0, 1 or 3."""
+        """Number of free rotations."""
         return KINDS[self.kind][1]
 
     @property
@@ -149,6 +165,8 @@ class Joint:
             values = checks.vector(call, value, self.nv)
         if field != "rest" and any(x < 0.0 for x in values):
             raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
+        if field == "armature" and self.nrot == 3 and any(values[-3:]):
+            raise ValueError(f"{call}: the rotations of a quaternion joint have none, got {value!r}")
         if field == "spring" and self.nrot == 3 and len(set(values[-3:])) > 1:
             raise ValueError(
                 f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}"
@@ -174,9 +192,22 @@ class Joint:
         for dof, pair in enumerate(given):
             lo, hi = _bounds(call, free if pair is None else pair)
             if self.nrot == 3 and dof >= self.ntrans and (lo, hi) != free:
-                raise ValueError(f"{call}: the three rotations of a {self.kind} joint cannot be limited")
+                raise ValueError(
+                    f"{call}: the three rotations of a {self.kind} joint have no bounds; cone=... limits them"
+                )
             out.append((lo, hi))
         return tuple(out)
+
+    def _check_cone(self, call: str) -> None:
+        """An angle between 0 and pi, on kinds with three rotations."""
+        if self.cone is None:
+            return
+        if self.nrot != 3:
+            raise ValueError(f"{call}: a {self.kind} joint has no three rotations to limit; see limits=...")
+        angle = checks.number(call, self.cone, above=0.0)
+        if angle > 3.1:
+            raise ValueError(f"{call}: expected an angle below 3.1 rad, got {angle:g}")
+        object.__setattr__(self, "cone", angle)
 
 
 def _bounds(call: str, pair: Any) -> tuple[float, float]:

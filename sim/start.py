@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.dynamics import _turns_below_half, momentum_balance_jacobian, turns
 from sim.elimination import factor, project, solve, subtree_sums
-from sim.energy import add_spring_momentum, node_momentum, spatial_inertia
+from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
@@ -22,7 +22,7 @@ _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 
 @kernel
 def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> None:
-    """out = M(q) v = S2^T (inertia (S2 v)), at the poses of configuration 2 in `work`.   out: (nv,)."""
+    """out = M(q) v = S2^T (inertia (S2 v)) + I v, at the poses of configuration 2 in `work`.   out: (nv,)."""
     spatial_inertia(model, work, work.A)
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
@@ -37,6 +37,8 @@ def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> No
             work.wrench[i, r] = f
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, out)
+    for d in range(out.shape[0]):
+        out[d] += model.dof_armature[d] * v[d]
 
 
 @kernel
@@ -67,20 +69,19 @@ def _turn_back(work: Work) -> None:
 def newton_direction(model: Model, work: Work, h: float, v: Vector) -> bool:
     """dnu = -(dp/dv15)^-1 (p - target), at the state of the last `momentum_error`; False when singular.
 
-        -dp/dv15 = S2^T A S1nu - h^2 k/4,     A = d(-momentum)/d(pose 1),   S1nu = d(pose 1)/d(v15)
+        -dp/dv15 = S2^T A S1nu - I - h^2 k/4,     A = d(-momentum)/d(pose 1),   S1nu = d(pose 1)/d(v15)
 
     The spring term is exact but for quaternion joints.
     """
     _turn_back(work)
     momentum_balance_jacobian(model, work, h, work.A)
     velocity_columns(model, work.S1, v, -h, work.S3nu)
+    armature_blocks(model, -1.0, work.joint_block)
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d
-        for k in range(n * n):
-            work.joint_block[i, k] = 0.0
         for k in range(n):
-            work.joint_block[i, k * n + k] = -0.25 * h * h * model.dof_spring[d + k]
+            work.joint_block[i, k * n + k] -= 0.25 * h * h * model.dof_spring[d + k]
     if not factor(model, work):
         return False
     solve(model, work, work.residual, work.dnu)

@@ -22,13 +22,15 @@ def configuration_difference(model: Model, q0: Vector, q1: Vector, out: Vector) 
     for i in range(model.body_parent.shape[0]):
         a = model.body_qadr[i]
         d = model.body_vadr[i]
-        for _ in range(model.joint_ntrans[i]):
+        n = model.body_vadr[i + 1] - d
+        quaternion = model.joint_nrot[i] == 3
+        if quaternion:
+            n -= 3
+        for _ in range(n):
             out[d] = q1[a] - q0[a]
             a += 1
             d += 1
-        if model.joint_nrot[i] == 1:
-            out[d] = q1[a] - q0[a]
-        elif model.joint_nrot[i] == 3:
+        if quaternion:
             t = quat_mul(q0[a], -q0[a + 1], -q0[a + 2], -q0[a + 3], q1[a], q1[a + 1], q1[a + 2], q1[a + 3])
             r = quat_log(t[0], t[1], t[2], t[3])
             for k in range(3):

@@ -39,14 +39,16 @@ __all__ = [
 F = TypeVar("F", bound=Callable[..., Any])
 
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_LATE_FLAGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
+_LOADERS = ("urdf", "mjcf")  # folders without kernels
 _REGISTRY: list[Any] = []
 
 
 def _sources() -> list[Path]:
-    """Every file whose text can end up inside a compiled kernel; a loader of files (sim/urdf) is not among them."""
+    """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
     root = Path(__file__).resolve().parent.parent
-    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name != "urdf")]
+    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
     files += [
         f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
     ]
@@ -136,6 +138,36 @@ def inlined(func: F) -> F:
 def inner_kernel(func: F) -> F:
     """A kernel that only kernels call, for the small ones: without the Python wrapper, half of their compile time."""
     return _compile(func, _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+class Late:
+    """A kernel that other kernels call by its address (solvers/record.py, `call_late`): for what few scenes have.
+
+    It takes two records as pointers, a whole number and two numbers, and returns a whole number. It is compiled when a
+    scene first asks for its address; in all other scenes nothing but the call is compiled.
+    """
+
+    def __init__(self, func: Callable[..., int]) -> None:
+        self.func = func
+        self._compiled: Any = None
+
+    def address(self) -> int:
+        """Where the compiled kernel is, in this process."""
+        if self._compiled is None:
+            users_folder = numba.config.CACHE_DIR
+            try:
+                if _FOLDER is not None:
+                    numba.config.CACHE_DIR = str(_FOLDER)
+                signature = "int64(voidptr, voidptr, int64, float64, float64)"
+                self._compiled = numba.cfunc(signature, cache=_FOLDER is not None, **_LATE_FLAGS)(self.func)
+            finally:
+                numba.config.CACHE_DIR = users_folder
+        return int(self._compiled.address)
+
+
+def late(func: Callable[..., int]) -> Late:
+    """A kernel that is compiled by the first scene that needs it, see `Late`."""
+    return Late(func)
 
 
 def local_kernel(func: F) -> F:

@@ -101,6 +101,8 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
     @intrinsic
     def at(typing: Any, table: Any) -> Any:
         def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            if signature.args[0] == types.voidptr:  # what a late kernel is given
+                return arguments[0]
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
             return builder.bitcast(array.data, cgutils.voidptr_t)
 
@@ -114,6 +116,41 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
         return lambda table: at(table)
 
     return view
+
+
+@intrinsic
+def call_late(typing: Any, address: Any, first: Any, second: Any, k: Any, x: Any, y: Any) -> Any:
+    """Call the kernel at an address (solvers/jit.py, `late`) with two records, a whole number and two numbers.
+
+    Instead of the second record, a C-contiguous array of numbers, which the kernel finds again by `floats`.
+    """
+    signature = types.int64(types.int64, first, second, types.int64, types.float64, types.float64)
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word, number = ir.IntType(64), ir.DoubleType()
+        kind = ir.FunctionType(word, [cgutils.voidptr_t, cgutils.voidptr_t, word, number, number])
+        given = list(arguments[1:])
+        if isinstance(signature.args[2], types.Array):
+            array = context.make_array(signature.args[2])(context, builder, given[1])
+            given[1] = builder.bitcast(array.data, cgutils.voidptr_t)
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
+
+    return signature, lower
+
+
+@intrinsic
+def floats(typing: Any, address: Any, count: Any) -> Any:
+    """The `count` numbers at an address, as a vector."""
+    kind = types.Array(types.float64, 1, "C")
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(kind)(context, builder)
+        data = builder.bitcast(arguments[0], ir.DoubleType().as_pointer())
+        size = cgutils.intp_t(8)
+        populate_array(array, data=data, shape=[arguments[1]], strides=[size], itemsize=size, meminfo=None)
+        return array._getvalue()
+
+    return kind(types.voidptr, types.int64), lower
 
 
 def _array(field: Field, words: Table) -> NDArray[Any]:

@@ -1,23 +1,70 @@
-"""Ready-made mechanisms, under the names that Dojo uses: one builder per file, keyword parameters with defaults."""
+"""Ready-made mechanisms, under the names that Dojo uses: one builder per file, keyword parameters with defaults.
+
+`catalogue()` lists them with their sizes. `box` and `box2d` are older names of `block` and `block2d`.
+"""
 
 from dojo_opt.models.acrobot import acrobot
+from dojo_opt.models.ant import ant
+from dojo_opt.models.atlas import atlas
 from dojo_opt.models.block import block
+from dojo_opt.models.block2d import block2d
 from dojo_opt.models.cartpole import cartpole
+from dojo_opt.models.catalogue import Entry as Entry
+from dojo_opt.models.catalogue import catalogue as catalogue
 from dojo_opt.models.double_pendulum import double_pendulum
+from dojo_opt.models.dzhanibekov import dzhanibekov
+from dojo_opt.models.exoskeleton import exoskeleton
+from dojo_opt.models.halfcheetah import halfcheetah
+from dojo_opt.models.hopper import hopper
+from dojo_opt.models.humanoid import humanoid
 from dojo_opt.models.npendulum import npendulum
+from dojo_opt.models.nslider import nslider
+from dojo_opt.models.orbital import orbital
+from dojo_opt.models.panda import panda
 from dojo_opt.models.pendulum import pendulum
+from dojo_opt.models.quadrotor import quadrotor
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.raiberthopper import raiberthopper
+from dojo_opt.models.slider import slider
+from dojo_opt.models.snake import snake
 from dojo_opt.models.sphere import sphere
+from dojo_opt.models.tennisracket import tennisracket
+from dojo_opt.models.tippetop import tippetop
+from dojo_opt.models.twister import twister
+from dojo_opt.models.uuv import uuv
+from dojo_opt.models.walker import walker
+from dojo_opt.models.youbot import youbot
 
 __all__ = [
     "acrobot",
+    "ant",
+    "atlas",
     "block",
+    "block2d",
     "cartpole",
     "double_pendulum",
+    "dzhanibekov",
+    "exoskeleton",
+    "halfcheetah",
+    "hopper",
+    "humanoid",
     "npendulum",
+    "nslider",
+    "orbital",
+    "panda",
     "pendulum",
+    "quadrotor",
     "quadruped",
     "raiberthopper",
+    "slider",
+    "snake",
     "sphere",
+    "tennisracket",
+    "tippetop",
+    "twister",
+    "uuv",
+    "walker",
+    "youbot",
 ]
+
+box, box2d = block, block2d

@@ -5,6 +5,7 @@ matplotlib is imported when the first figure is made, without pyplot: no window,
 
 from dojo_opt.plots.gait import foot_paths, friction_use, gait, gait_diagram
 from dojo_opt.plots.loop import base_path, closed_loop, study, survival, tick_times, tracking
+from dojo_opt.plots.thumbnail import thumbnail
 from dojo_opt.plots.trajectory import contact_forces, controls, paths, state, trajectory, velocities
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "state",
     "study",
     "survival",
+    "thumbnail",
     "tick_times",
     "tracking",
     "trajectory",

@@ -112,6 +112,8 @@ def _coordinates(m: Motion) -> list[tuple[str, Any]]:
             rows.append((_label(m.mechanism, joint.name, "xyz"[k] if joint.ntrans > 1 else ""), q[:, k]))
         if joint.nrot == 1:
             rows.append((_label(m.mechanism, joint.name, "angle" if joint.ntrans else ""), q[:, -1]))
+        elif joint.nrot == 2:
+            rows += [(_label(m.mechanism, joint.name, f"r{k + 1}"), q[:, k - 2]) for k in range(2)]
         elif joint.nrot == 3:
             vectors = _rotation_vectors(q[:, -4:])
             rows += [(_label(m.mechanism, joint.name, f"r{a}"), vectors[:, k]) for k, a in enumerate("xyz")]

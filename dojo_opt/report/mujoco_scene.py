@@ -4,7 +4,7 @@ MuJoCo's body frames are put at our centres of mass with the axes of the joint f
 have the same layout and, but for the convention of v (mean over the last interval, not at the node), the same meaning.
 Contacts become spheres paired with the plane of their half-space, and with nothing else.
 
-What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero. What it says otherwise:
+What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones. What it says otherwise:
 contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
 """
 
@@ -130,6 +130,10 @@ def _joints(model: Model, body: int) -> list[str]:
     ntrans, nrot = int(model.joint_ntrans[body]), int(model.joint_nrot[body])
     point = {"pos": _numbers(model.joint_child_point[body])}
     axes = model.joint_trans_axes[body].reshape(3, 3)
+    if nrot == 2:
+        raise ValueError(f"mjcf: MuJoCo has no joint that turns across an axis and not about it (body {body})")
+    if np.any(model.limit_cone[(model.limit_dof >= first) & (model.limit_dof < first + ntrans + nrot)]):
+        raise ValueError(f"mjcf: MuJoCo has no cone limit (body {body})")
     lines = [_scalar(model, first + k, "slide", axes[k], {}) for k in range(ntrans)]
     if nrot == 1:
         lines.append(_scalar(model, first + ntrans, "hinge", model.joint_axis[body], point))
@@ -148,6 +152,7 @@ def _scalar(model: Model, dof: int, kind: str, axis: Vector, place: dict[str, st
     attributes["stiffness"] = _numbers(model.dof_spring[dof])
     attributes["springref"] = _numbers(model.dof_rest[dof])
     attributes["damping"] = _numbers(model.dof_damper[dof])
+    attributes["armature"] = _numbers(model.dof_armature[dof])
     low, high = -1e6, 1e6  # MuJoCo has two-sided ranges only
     for limit in np.flatnonzero(model.limit_dof == dof):
         bound = float(model.limit_bound[limit])

@@ -37,6 +37,10 @@ def poses(mech: Mechanism, q: Floats) -> dict[str, Pose]:
 def _motion(joint: Joint, q: Floats) -> Pose:
     """Pose of the child's joint point in the joint frame."""
     shift = q[: joint.ntrans] @ translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
+    if joint.nrot == 2:
+        t = q[-2:] @ translation_axes(2, joint.axis)[:2]
+        angle = float(np.linalg.norm(t))
+        return Pose(turn(t / angle, angle) if angle > 0.0 else np.eye(3), shift)
     if joint.nrot == 1:
         return Pose(turn(joint.axis, float(q[-1])), shift)
     return Pose(rotation_matrix(q[-4:]) if joint.nrot == 3 else np.eye(3), shift)

@@ -6,8 +6,10 @@ import inspect
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from dojo_opt import models
+from dojo_opt.plots import thumbnail
 from sim.build import mechanism_sizes, pack
 from sim.kinematics import tree_poses
 from sim.layout import allocate_work, model_view, sizes_of, table, work_view
@@ -27,6 +29,36 @@ SIZES = {
     "sphere": (1, 7, 6, 1, 0, 3),
     "raiberthopper": (2, 8, 7, 2, 0, 3),
     "quadruped": (13, 19, 18, 4, 24, 12),
+    "ant": (9, 15, 14, 9, 16, 8),
+    "atlas": (31, 37, 36, 8, 60, 30),
+    "block2d": (1, 3, 3, 4, 0, 3),
+    "dzhanibekov": (2, 7, 6, 0, 0, 0),
+    "exoskeleton": (4, 4, 4, 0, 8, 4),
+    "halfcheetah": (7, 9, 9, 9, 12, 6),
+    "hopper": (4, 6, 6, 5, 6, 3),
+    "humanoid": (13, 28, 25, 4, 0, 19),
+    "nslider": (5, 5, 5, 0, 0, 5),
+    "orbital": (5, 8, 8, 0, 0, 8),
+    "panda": (9, 9, 9, 0, 18, 9),
+    "quadrotor": (1, 7, 6, 8, 0, 4),
+    "slider": (1, 1, 1, 0, 0, 1),
+    "snake": (2, 11, 9, 4, 0, 3),
+    "tennisracket": (1, 7, 6, 0, 0, 0),
+    "tippetop": (2, 7, 6, 2, 0, 0),
+    "twister": (5, 11, 10, 6, 0, 4),
+    "uuv": (1, 7, 6, 2, 0, 6),
+    "walker": (7, 9, 9, 9, 12, 6),
+    "youbot": (12, 14, 14, 0, 14, 14),
+}
+# total masses [kg] that the makers, gym or Dojo state
+MASSES = {
+    "ant": 0.8788,
+    "atlas": 174.05,
+    "halfcheetah": 14.0,
+    "humanoid": 40.844,
+    "quadrotor": 1.04,
+    "quadruped": 13.5,
+    "uuv": 19.243,
 }
 
 
@@ -67,10 +99,37 @@ def test_sizes_and_documentation(name: str) -> None:
         assert word in build.__doc__
 
 
-@pytest.mark.parametrize("name", ["block", "sphere", "raiberthopper", "quadruped"])
+@pytest.mark.parametrize("name", MASSES)
+def test_masses(name: str) -> None:
+    assert sum(b.mass for b in getattr(models, name)().bodies) == pytest.approx(MASSES[name], rel=1e-4)
+
+
+@pytest.mark.parametrize("name", [name for name, size in SIZES.items() if size[3] and name != "uuv"])
 def test_neutral_touches_the_ground(name: str) -> None:
     gaps = clearances(getattr(models, name)())
-    assert min(gaps.values()) == pytest.approx(0.0, abs=1e-15)
+    assert min(gaps.values()) == pytest.approx(0.0, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", models.__all__)
+def test_neutral_is_within_the_limits(name: str) -> None:
+    mech = getattr(models, name)()
+    for joint in mech.joints:
+        q = np.array(mech.neutral)[mech.q_slice(joint.name)]
+        for value, (low, high) in zip(q, joint.limits, strict=False):
+            assert low <= value <= high, joint.name
+
+
+def test_left_and_right_of_the_robots_are_mirror_images() -> None:
+    for name, mirror in (("atlas", "lr"), ("humanoid", ("left", "right")), ("ant", None)):
+        mech = getattr(models, name)()
+        pos, _ = poses(mech)
+        if mirror is None:
+            np.testing.assert_allclose(pos.sum(axis=0)[:2], 0.0, atol=1e-12)
+            continue
+        for body in [b for b in mech.body_names if b.startswith(f"{mirror[0]}_")]:
+            other = body.replace(mirror[0], mirror[1], 1)
+            left, right = (pos[mech.body_names.index(b)] for b in (body, other))
+            np.testing.assert_allclose(left, right * (1, -1, 1), atol=5e-3, err_msg=body)
 
 
 def test_quadruped_stands_on_four_feet() -> None:
@@ -119,7 +178,31 @@ def test_hopper_stands_at_its_leg_length() -> None:
     np.testing.assert_allclose(pos, [[0, 0, 0.55], [0, 0, 0.05]], atol=1e-15)
 
 
+def test_older_names() -> None:
+    assert models.box is models.block
+    assert models.box2d is models.block2d
+
+
+def test_catalogue() -> None:
+    entries = {entry.name: entry for entry in models.catalogue()}
+    assert set(entries) == set(models.__all__)
+    atlas = entries["atlas"]
+    assert (atlas.bodies, atlas.nv, atlas.contacts) == (31, 36, 8)
+    assert atlas.build().nbody == 31
+    assert atlas.what.startswith("Thirty-one links")
+
+
+@pytest.mark.parametrize("name", ["atlas", "quadrotor", "cartpole", "tippetop"])
+def test_thumbnail(name: str) -> None:
+    canvas = FigureCanvasAgg(thumbnail(getattr(models, name)()))
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    assert 0.01 < np.mean(np.any(pixels < 250, axis=-1)) < 0.9
+
+
 def test_wrong_parameters_are_named() -> None:
+    with pytest.raises(ValueError, match=r"orbital\(n\): expected a whole number >= 2, got 1"):
+        models.orbital(1)
     with pytest.raises(ValueError, match=r"npendulum\(n\): expected a whole number >= 1, got 0"):
         models.npendulum(0)
     with pytest.raises(ValueError, match=r"quadruped\(contacts=\.\.\.\): 'paws' is not one of: feet, all"):

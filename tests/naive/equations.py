@@ -13,10 +13,12 @@ from naive import rotation as rot
 from naive.lagrangian import (
     TINY,
     Poses,
+    armatures,
     arriving_momentum,
     constraints,
     displacements,
     leaving_momentum,
+    separation,
     spring_impulse,
     varied,
 )
@@ -63,6 +65,7 @@ class Step:
         self.nbody = len(scene.bodies)
         self.G = np.imag(constraints(scene, varied(self.z2))).T / TINY  # (nlambda, 6 nbody)
         self.B = np.imag(displacements(scene, varied(self.z2), self.z2)).T / TINY  # (nv, 6 nbody)
+        self.armature, self.v1 = armatures(scene), v
         self.damper = np.concatenate([np.broadcast_to(joint.damper, joint.nv) for joint in scene.joints])
         self.inertia = np.array([body.inertia for body in scene.bodies])
         self.mass = np.array([body.mass for body in scene.bodies])
@@ -110,14 +113,23 @@ class Step:
         balance = balance - self.incoming - self.applied
         moved = displacements(scene, z3, self.z2)
         joint = spring_impulse(scene, self.q1, self.q2, moved, h) - self.damper * moved
+        joint = joint - self.armature * (moved / h - self.v1)
         rows = []
         for contact, unknown in zip(scene.contacts, parts[2:], strict=False):
             law, wrench = self.contact(contact, unknown, z3, kappa, exact)
             rows.append(law)
             balance[..., contact.body, :] -= wrench
         for limit, unknown in zip(scene.limits, parts[2 + len(scene.contacts) :], strict=True):
-            rows.append(self.limit(limit, unknown, moved, kappa, exact))
-            joint[..., limit.dof] += limit.sign * unknown[..., 1]
+            law, direction = (
+                self.cone(limit, unknown, z3, kappa, exact)
+                if limit.sign == 0.0
+                else (self.limit(limit, unknown, moved, kappa, exact), limit.sign)
+            )
+            rows.append(law)
+            if limit.sign == 0.0:
+                joint[..., limit.dof : limit.dof + 3] += unknown[..., 1:] * direction
+            else:
+                joint[..., limit.dof] += direction * unknown[..., 1]
         flat = balance.reshape(*y.shape[:-1], -1) - parts[1] @ self.G - joint @ self.B
         return np.concatenate((flat, constraints(scene, z3), *rows), axis=-1)
 
@@ -127,6 +139,25 @@ class Step:
         slack, gamma = unknown[..., 0], unknown[..., 1]
         law = bilinear(slack, gamma, kappa) if exact else smoothed(slack, gamma, kappa)
         return np.stack((limit.sign * (theta - limit.bound) - slack, law), axis=-1)
+
+    def cone(self, limit: Limit, unknown: Array, z3: Poses, kappa: float, exact: bool) -> tuple[Array, Array]:
+        """slack = (a.c - cos angle)/sin angle, a and c the axes of parent and child; torque c x a/sin per impulse.
+
+        The torque acts in the child's axes at configuration 2, like the rotation vector of `displacement`.
+        """
+        i = self.carrier(limit.dof)
+        axis, sine = self.scene.joints[i].axis, np.sin(limit.bound)
+        q2, q3 = (separation(self.scene.joints[i], i, z)[1] for z in (self.z2, z3))
+        child = rot.rotate(q3, axis)
+        gap = (child @ axis - np.cos(limit.bound)) / sine
+        torque = rot.rotate(rot.conj(q2), rot.cross(child, np.broadcast_to(axis, child.shape)) / sine)
+        slack, gamma = unknown[..., 0], unknown[..., 1]
+        law = bilinear(slack, gamma, kappa) if exact else smoothed(slack, gamma, kappa)
+        return np.stack((gap - slack, law), axis=-1), torque
+
+    def carrier(self, dof: int) -> int:
+        """Index of the joint of a degree of freedom."""
+        return int(np.searchsorted(np.cumsum([joint.nv for joint in self.scene.joints]), dof, side="right"))
 
     def coordinate(self, dof: int) -> int:
         """Index in q of a scalar degree of freedom."""
@@ -180,8 +211,11 @@ class Step:
             y.append(central_path(contact, float(gap), slip, kappa))
         moved = displacements(self.scene, z3, self.z2)
         for limit in self.scene.limits:
-            theta = self.q2[self.coordinate(limit.dof)] + moved[limit.dof]
-            s = max(limit.sign * (theta - limit.bound), np.sqrt(kappa))
+            if limit.sign == 0.0:
+                gap = float(self.cone(limit, np.ones(2), z3, kappa, False)[0][0]) + 1.0
+            else:
+                gap = limit.sign * (self.q2[self.coordinate(limit.dof)] + moved[limit.dof] - limit.bound)
+            s = max(gap, np.sqrt(kappa))
             y.append(np.array([s, kappa / s]))
         return np.concatenate(y)
 

@@ -86,17 +86,24 @@ def constraint(joint: Joint, child: int, z: Poses) -> Array:
     rows = [d @ complement(joint.trans_axes).T]
     if joint.nrot == 1:
         rows.append(q[..., 1:] @ complement(joint.axis[None]).T)
+    elif joint.nrot == 2:
+        rows.append(q[..., 1:] @ joint.axis[:, None])
     elif joint.nrot == 0:
         rows.append(q[..., 1:])
     return np.concatenate(rows, axis=-1)
 
 
 def displacement(joint: Joint, child: int, z: Poses, reference: Poses) -> Array:
-    """Free motion of a joint from the reference poses: translations, then the rotation vector in the child's axes."""
+    """Free motion of a joint from the reference poses: translations, then the rotation vector in the child's axes.
+
+    Of a swing, the difference of the rotation vectors from the joint frame.
+    """
     d, q = separation(joint, child, z)
     d0, q0 = separation(joint, child, reference)
     rows = [(d - d0) @ joint.trans_axes.T]
-    if joint.nrot:
+    if joint.nrot == 2:
+        rows.append((rot.log(q) - rot.log(q0)) @ joint.swing_axes.T)
+    elif joint.nrot:
         phi = rot.log(rot.mul(rot.conj(q0), q))
         rows.append(phi if joint.nrot == 3 else phi @ joint.axis[:, None])
     return np.concatenate(rows, axis=-1)
@@ -159,8 +166,13 @@ def node_momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
         p[b, :3] = body.mass * ((z2[0][b] - z1[0][b]) / h + 0.5 * h * scene.gravity)
         p[b, 3:] = arriving_momentum(body.inertia, z1[1][b], z2[1][b], h)
     free = np.imag(displacements(scene, varied(z2), z2)) / TINY  # (6 nbody, nv)
-    pull = spring_impulse(scene, q1, q, None, h)
+    pull = spring_impulse(scene, q1, q, None, h) + armatures(scene) * v
     return p + (free @ pull).reshape(-1, 6)
+
+
+def armatures(scene: Scene) -> Array:
+    """Inertia of every coordinate alone, (nv,)."""
+    return np.concatenate([np.broadcast_to(joint.armature, joint.nv) for joint in scene.joints])
 
 
 def motion_subspace(scene: Scene, q: Array) -> Array:
@@ -178,7 +190,7 @@ def mass_matrix(scene: Scene, q: Array) -> Array:
     for b, (body, R) in enumerate(zip(scene.bodies, rot.matrix(poses(scene, q)[1]), strict=True)):
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = body.mass * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = R @ body.inertia @ R.T
-    return S.T @ M @ S
+    return S.T @ M @ S + np.diag(armatures(scene))
 
 
 def potential(scene: Scene, q: Array) -> float:

@@ -32,7 +32,7 @@ class Body:
 class Joint:
     parent: int  # body index, -1 for the world
     trans_axes: Array = field(default_factory=lambda: np.zeros((0, 3)))  # free translations, joint frame
-    nrot: int = 0  # 0, 1 (about axis) or 3
+    nrot: int = 0  # 0, 1 (about axis), 2 (rotation vector along swing_axes) or 3
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     parent_point: Array = field(default_factory=lambda: ZERO)
     child_point: Array = field(default_factory=lambda: ZERO)
@@ -40,6 +40,8 @@ class Joint:
     spring: Array | float = 0.0  # per degree of freedom
     damper: Array | float = 0.0
     rest: Array | float = 0.0
+    armature: Array | float = 0.0  # inertia of a coordinate alone
+    swing_axes: Array = field(default_factory=lambda: np.eye(3)[:2])
 
     @property
     def ntrans(self) -> int:
@@ -67,8 +69,8 @@ class Contact:
 
 @dataclass(frozen=True)
 class Limit:
-    dof: int  # index into v, a scalar degree of freedom
-    sign: float  # +1 lower bound, -1 upper bound
+    dof: int  # index into v, a scalar degree of freedom; of a cone, the first of three rotations
+    sign: float  # +1 lower bound, -1 upper bound, 0 cone
     bound: float
 
 
@@ -110,6 +112,8 @@ def poses(scene: Scene, q: Array) -> tuple[Array, Array]:
         turned = UNIT
         if joint.nrot == 1:
             turned = rot.exp(joint.axis * qj[-1])
+        elif joint.nrot == 2:
+            turned = rot.exp(joint.swing_axes.T @ qj[-2:])
         elif joint.nrot == 3:
             turned = qj[-4:]
         frame = rot.mul(qa, joint.offset)
@@ -138,7 +142,12 @@ def translation_axes(joint: Any) -> Array:
     """Free translations in the joint frame: along the axis, across it (x, y, z without the nearest), or all."""
     if joint.ntrans != 2:
         return np.array([joint.axis]) if joint.ntrans == 1 else np.eye(3)[: joint.ntrans]
-    axis, rows = np.asarray(joint.axis), []
+    return plane_axes(np.asarray(joint.axis))
+
+
+def plane_axes(axis: Array) -> Array:
+    """Two directions across an axis: x, y, z without the nearest."""
+    rows: list[Array] = []
     for e in np.delete(np.eye(3), np.argmax(np.abs(axis)), axis=0):
         across = e - axis * (axis @ e) - sum((row * (row @ e) for row in rows), np.zeros(3))
         rows.append(across / np.linalg.norm(across))
@@ -170,9 +179,12 @@ def from_mechanism(mech: Any) -> Scene:
                 j.nrot,
                 np.array(j.axis),
                 *points,
-                *(np.array(value) for value in (j.spring, j.damper, j.rest)),
+                *(np.array(value) for value in (j.spring, j.damper, j.rest, j.armature)),
+                plane_axes(np.array(j.axis)),
             )
         )
+        if j.cone is not None:
+            limits.append(Limit(dof[j.name] + j.ntrans, 0.0, j.cone))
         for k, bounds in enumerate(j.limits):
             limits += [Limit(dof[j.name] + k, s, b) for s, b in zip((1.0, -1.0), bounds, strict=True) if np.isfinite(b)]
     laws = {"impact": IMPACT, "linear": LINEAR, "nonlinear": NONLINEAR}

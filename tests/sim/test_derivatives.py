@@ -87,6 +87,28 @@ def test_joints_to_the_world(kind, rng):
     check(mech, random_state(sim, rng, 2.0), rng.normal(size=sim.nu), 1e-6)
 
 
+def test_armature(rng):
+    for kind in ("revolute", "orbital", "planar_axis"):
+        mech = chain(kind, 2, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2, armature=0.3)
+        sim = simulator(mech, 1e-6)
+        check(mech, random_state(sim, rng, 2.0), rng.normal(size=sim.nu), 1e-6)
+
+
+@pytest.mark.parametrize("kind", ["spherical", "cylindrical_free", "planar_free"])
+@pytest.mark.parametrize("angle", [0.3, 0.58])
+def test_cone_limits(kind, angle, rng):
+    """Away from the cone, and arriving at it in this very step."""
+    mech = chain(kind, 1, base=None, cone=0.6, damper=0.1, gravity=(0.0, 0.0, -9.81))
+    axis = np.array(mech.joints[-1].axis)
+    across = np.cross(axis, [1.0, 0.0, 0.0]) / np.linalg.norm(np.cross(axis, [1.0, 0.0, 0.0]))
+    sim = simulator(mech, 1e-6)
+    x = np.array(sim.neutral())
+    x[sim.nq - 4 : sim.nq] = rot.mul(rot.exp(angle * across), rot.exp(0.7 * axis))
+    x[-3:] = rot.rotate(rot.exp(-0.7 * axis), 2.0 * across + axis)
+    for kappa in KAPPAS:
+        check(mech, x, rng.normal(size=sim.nu), kappa)
+
+
 @pytest.mark.parametrize("regime", GAP)
 @pytest.mark.parametrize("kind", KINDS)
 def test_contact_behind_every_joint(kind, regime, rng):

@@ -37,6 +37,19 @@ def hip(**changes: object) -> Joint:
 
 ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("", shape=BALL), r"Body\(name=\.\.\.\): expected a name"),
+    (lambda: Joint("revolute", None, "x", cone=0.5), r"Joint\('x', cone=\.\.\.\): a revolute joint has no three rot"),
+    (lambda: Joint("spherical", None, "x", cone=0.0), r"Joint\('x', cone=\.\.\.\): expected a number > 0, got 0"),
+    (lambda: Joint("spherical", None, "x", cone=3.2), r"Joint\('x', cone=\.\.\.\): expected an angle below 3.1 rad"),
+    (
+        lambda: Joint("spherical", None, "x", armature=1.0),
+        r"Joint\('x', armature=\.\.\.\): the rotations of a quaternion",
+    ),
+    (lambda: Joint("revolute", None, "x", armature=-1.0), r"Joint\('x', armature=\.\.\.\): expected numbers >= 0"),
+    (lambda: Joint("orbital", None, "x", limits=(0, 1)), r"Joint\('x', limits=\.\.\.\): expected 2 pairs"),
+    (
+        lambda: Mechanism([Body("x", 0.0)], [Joint("revolute", None, "x")]),
+        r"body 'x' has no mass, nor has anything that",
+    ),
     (lambda: Body("x", 0.0, shape=BALL), r"Body\('x', mass=\.\.\.\): expected a number > 0, got 0"),
     (lambda: Body("x", float("nan"), shape=BALL), r"Body\('x', mass=\.\.\.\): expected finite numbers, got nan"),
     (lambda: Body("x", "heavy", shape=BALL), r"Body\('x', mass=\.\.\.\): expected real numbers, got 'heavy'"),
@@ -165,12 +178,15 @@ def test_every_kind_of_joint_packs(kind: str, on_world: bool) -> None:
     assert model.body_vadr[i + 1] - model.body_vadr[i] == ntrans + nrot
     assert model.body_qadr[i + 1] - model.body_qadr[i] == ntrans + nrot + (nrot == 3)
     first = model.body_qadr[i]
-    expected = [first + k for k in range(ntrans)] + ([first + ntrans] * nrot)
+    rotations = [first + ntrans + (0 if nrot == 3 else k) for k in range(nrot)]
+    expected = [first + k for k in range(ntrans)] + rotations
     assert model.dof_qadr[model.dof_body == i].tolist() == expected
     T = model.joint_trans_axes[i].reshape(3, 3)[:ntrans]
     np.testing.assert_allclose(T @ T.T, np.eye(ntrans), atol=1e-15)
     along = {1: 1.0, 2: 0.0, 3: 1.0, 0: 0.0}[ntrans]
     np.testing.assert_allclose(np.linalg.norm(T @ model.joint_axis[i]), along, atol=1e-15)
+    V = np.vstack([model.joint_swing_axes[i].reshape(2, 3), model.joint_axis[i]])
+    np.testing.assert_allclose(V @ V.T, np.eye(3), atol=1e-15)
 
 
 def test_plane_coordinates_follow_the_world_axes() -> None:

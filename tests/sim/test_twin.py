@@ -169,3 +169,35 @@ def test_energy_momentum_and_start(kind, rng):
     np.testing.assert_allclose(np.concatenate(sim.momentum(x)), lag.momentum(scene, q, v, sim.time_step), atol=1e-9)
     np.testing.assert_allclose(np.sum(sim.energy(x)), lag.energy(scene, q, v, sim.time_step), rtol=1e-9)
     np.testing.assert_allclose(sim.start(q, v)[sim.nq :], lag.start(scene, q, v, sim.time_step), atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["spherical", "cylindrical_free", "planar_free"])
+def test_cone_limit(kind, rng):
+    """Thrown at the cone, and pressed against it."""
+    sim = make(chain(kind, 1, base=None, cone=0.6, damper=0.1), 0.02)
+    axis = np.array(sim.mechanism.joints[-1].axis)
+    across = np.cross(axis, [1.0, 0.0, 0.0]) / np.linalg.norm(np.cross(axis, [1.0, 0.0, 0.0]))
+    for angle, speed in ((0.3, 8.0), (0.59, 20.0), (0.599, 0.0)):
+        for spin in (0.0, 1.0):
+            x = np.array(sim.neutral())
+            x[sim.nq - 4 : sim.nq] = rot.mul(rot.exp(angle * across), rot.exp(spin * axis))
+            x[-3:] = rot.rotate(rot.exp(-spin * axis), speed * across)
+            u = np.zeros(sim.nu)
+            u[-3:] = 5.0 * rot.rotate(rot.exp(-spin * axis), across)
+            r = compare(sim, x, u)
+            q = r.x[sim.nq - 4 : sim.nq]
+            assert axis @ rot.rotate(q, axis) > np.cos(0.6) - 1e-9
+
+
+@pytest.mark.parametrize("base", ["floating", None])
+@pytest.mark.parametrize("kind", ["revolute", "planar_axis", "orbital", "fixed_orientation"])
+def test_armature(kind, base, rng):
+    mech = chain(kind, 2, gravity=(0.0, 1.0, -9.81), base=base, spring=3.0, damper=0.2, armature=0.4)
+    sim = make(mech, 0.02)
+    scene = from_mechanism(sim.mechanism)
+    for _ in range(2):
+        x = random_state(sim, rng, 3.0)
+        compare(sim, x, rng.normal(size=sim.nu))
+        q, v = x[: sim.nq], x[sim.nq :]
+        np.testing.assert_allclose(np.sum(sim.energy(x)), lag.energy(scene, q, v, sim.time_step), rtol=1e-9)
+        np.testing.assert_allclose(sim.start(q, v)[sim.nq :], lag.start(scene, q, v, sim.time_step), atol=1e-8)

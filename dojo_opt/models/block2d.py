@@ -1,0 +1,40 @@
+"""A square in a vertical plane, on the ground."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Joint
+from sim.shapes import Box
+
+
+def block2d(
+    *,
+    edge: float = 0.5,
+    mass: float = 1.0,
+    friction: float = 0.8,
+    law: str = "nonlinear",
+    radius: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A uniform cube that stays in the plane x = 0 and touches the ground z = 0 with four corners.
+
+        +-----+     q  (3,) position y, z of the centre [m], angle about x [rad]
+        |  o  |     u  (3,) forces along y and z [N], torque about x [N m]
+        +-----+ edge
+
+    edge [m], mass [kg]; the corners are balls of `radius` [m] that fit inside the cube; law: see Contact.
+    """
+    half = edge / 2 - radius
+    corners = [(0.0, half * y, half * z) for y, z in product((1, -1), repeat=2)]
+    return Mechanism(
+        bodies=[Body("block", mass, shape=Box(edge, edge, edge))],
+        joints=[Joint("planar_axis", None, "block", axis=(1.0, 0.0, 0.0))],
+        contacts=[Contact("block", p, radius, friction, law, name=f"corner_{k}") for k, p in enumerate(corners)],
+        gravity=gravity,
+        name="block2d",
+        neutral={"block": (0.0, edge / 2, 0.0)},
+    )

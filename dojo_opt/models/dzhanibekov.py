@@ -1,0 +1,35 @@
+"""A T-shaped handle in free fall, which turns over and over."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Capsule
+
+
+def dzhanibekov(
+    *,
+    mass: float = 1.0,
+    length: float = 0.8,
+    stem_mass: float = 0.5,
+    stem_length: float = 0.35,
+    radius: float = 0.05,
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+) -> Mechanism:
+    """A bar along y with a stem along -x in its middle, both capsules, in space.
+
+            |       q  (7,) position of the centre of mass of the bar [m], its quaternion
+        ----|       u  (0,) nothing drives it
+            |
+
+    mass [kg] and length [m] of the bar (between the centres of its caps), and of the stem; radius [m]. The moments of
+    inertia of the whole are .029 about y, .062 about x, the axis to spin it about, and .087 kg m^2 about z. (Dojo's bar
+    has the moments .03, .001, .1 kg m^2, which no rigid body has: the largest exceeds the sum of the others.)
+    """
+    bar = Body("bar", mass, shape=Capsule(radius, length, orientation=(0.5**0.5, 0.5**0.5, 0.0, 0.0)))
+    stem = Body("stem", stem_mass, shape=Capsule(radius, stem_length, orientation=(0.5**0.5, 0.0, 0.5**0.5, 0.0)))
+    middle = (-radius - stem_length / 2, 0.0, 0.0)
+    joints = [Joint("floating", None, "bar"), Joint("fixed", "bar", "stem", parent_point=middle)]
+    return Mechanism([bar, stem], joints, gravity=gravity, name="dzhanibekov")

@@ -1,0 +1,47 @@
+"""A chain of links that slide along one another."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Cylinder
+
+
+def nslider(
+    n: int = 5,
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    radius: float = 0.05,
+    spring: float = 0.0,
+    damper: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """`n` rods side by side along y, each on a vertical rail of the one before.
+
+        | |     q  (n,) height of the upper end of each rod over that of the one before [m]
+        |||     u  (n,) force of each rail along z [N]
+          |
+
+    mass [kg], length and radius [m] of one rod; spring [N/m] and damper [N s/m] of each rail.
+    """
+    if not isinstance(n, int) or n < 1:
+        raise ValueError(f"nslider(n): expected a whole number >= 1, got {n!r}")
+    rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]
+    top = (0.0, 0.0, length / 2)
+    rails = [
+        Joint(
+            "prismatic",
+            f"rod_{i - 1}" if i else None,
+            f"rod_{i}",
+            name=f"rail_{i}",
+            parent_point=(0.0, radius, length / 2) if i else (0.0, 0.0, 0.0),
+            child_point=top,
+            spring=spring,
+            damper=damper,
+        )
+        for i in range(n)
+    ]
+    return Mechanism(rods, rails, gravity=gravity, name="nslider")

@@ -1,0 +1,49 @@
+"""A chain of links that swing in any direction but do not twist."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Box
+
+
+def orbital(
+    n: int = 5,
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    width: float = 0.05,
+    spring: float = 0.0,
+    damper: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """`n` links that hang from one another by orbital joints, the first one fixed to the world.
+
+        #  fixed, z = 0      q  (2 (n - 1),) rotation vector of each joint along x and y [rad]
+        |                    u  (2 (n - 1),) torques along the same coordinates [N m]
+        |
+
+    mass [kg], length and width [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. All coordinates
+    zero is hanging straight down.
+    """
+    if not isinstance(n, int) or n < 2:
+        raise ValueError(f"orbital(n): expected a whole number >= 2, got {n!r}")
+    upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
+    links = [Body(f"link_{i}", mass, shape=Box(width, width, length)) for i in range(n)]
+    joints = [Joint("fixed", None, "link_0", name="joint_0", child_point=upper)]
+    joints += [
+        Joint(
+            "orbital",
+            f"link_{i - 1}",
+            f"link_{i}",
+            name=f"joint_{i}",
+            parent_point=lower,
+            child_point=upper,
+            spring=spring,
+            damper=damper,
+        )
+        for i in range(1, n)
+    ]
+    return Mechanism(links, joints, gravity=gravity, name="orbital")

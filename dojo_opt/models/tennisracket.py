@@ -1,0 +1,26 @@
+"""A flat box in free fall with three different moments of inertia."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Box
+
+
+def tennisracket(
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    gravity: ArrayLike = (0.0, 0.0, 0.0),
+) -> Mechanism:
+    """A box with edges length/25, length/2, length in space; rotation about its y axis, the middle one, is unstable.
+
+        q  (7,) position of the centre [m], quaternion
+        u  (0,) nothing drives it
+
+    mass [kg], length [m].
+    """
+    box = Body("racket", mass, shape=Box(length / 25, length / 2, length))
+    return Mechanism([box], [Joint("floating", None, "racket")], gravity=gravity, name="tennisracket")

@@ -1,0 +1,45 @@
+"""A ball with a knob, which turns over when it spins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Joint
+from sim.shapes import Sphere
+
+
+def tippetop(
+    *,
+    mass: float = 1.0,
+    radius: float = 0.5,
+    inertia: ArrayLike = (1.9, 2.1, 2.0),
+    scale: float = 0.2,
+    offset: float = 0.0,
+    friction: float = 0.4,
+    law: str = "nonlinear",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A ball on the ground z = 0 with a smaller one, the knob, on its upper pole.
+
+         o      q  (7,) position of the centre of mass of the ball [m], its quaternion
+        ( )     u  (0,) nothing drives it
+
+    mass [kg], radius [m] and inertia (about the centre of mass, body axes) [kg m^2] of the ball; its centre of mass is
+    `offset` [m] below its centre. The knob is a uniform ball scaled by `scale`: mass by its third power. Defaults are
+    Dojo's, whose moments of inertia exceed those of a uniform ball 20 times: it turns over slowly. law: see Contact.
+    """
+    knob = scale * radius
+    bodies = [
+        Body("ball", mass, inertia, Sphere(radius, center=(0.0, 0.0, offset))),
+        Body("knob", mass * scale**3, shape=Sphere(knob)),
+    ]
+    pole = np.array([0.0, 0.0, radius + offset])
+    joints = [Joint("floating", None, "ball"), Joint("fixed", "ball", "knob", parent_point=pole)]
+    contacts = [
+        Contact("ball", (0.0, 0.0, offset), radius, friction, law),
+        Contact("knob", (0.0, 0.0, 0.0), knob, friction, law),
+    ]
+    neutral = {"ball": (0.0, 0.0, radius - offset, 1.0, 0.0, 0.0, 0.0)}
+    return Mechanism(bodies, joints, contacts, gravity=gravity, name="tippetop", neutral=neutral)

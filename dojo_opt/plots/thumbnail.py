@@ -1,0 +1,113 @@
+"""thumbnail: a small picture of a mechanism in its neutral state."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import Mechanism
+from sim.parts import WORLD
+from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.urdf.stance import poses
+
+Floats = NDArray[np.float64]
+
+_VIEW = np.radians((30.0, 18.0))  # azimuth and elevation of the camera
+_FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c8442d", "#dddddd"
+
+
+def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float = 2.0) -> Any:
+    """Figure of `size` inches: bodies as hulls of their shapes, joints as lines between them, contacts as red balls.
+
+    q: coordinates (nq,), those of the neutral state when left out. Bodies without a shape are drawn as lines from
+    their joint to those that they carry.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle, Polygon
+
+    at = poses(mechanism, np.asarray(mechanism.neutral if q is None else q, dtype=np.float64))
+    right, up, depth = _camera()
+    figure = Figure(figsize=(size, size))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    drawn: list[Floats] = []
+    for a, b in _bones(mechanism, at):
+        line = np.array([a, b]) @ np.array([right, up]).T
+        ax.plot(*line.T, color=_BONE, linewidth=2.0, solid_capstyle="round", zorder=1)
+        drawn.append(line)
+    solids = [(b.name, b.shape) for b in mechanism.bodies if b.shape is not None]
+    for name, shape in sorted(solids, key=lambda part: float(at[part[0]].point @ depth)):
+        points = np.array([at[name].at(p) for p in _surface(shape)]) @ np.array([right, up]).T
+        outline = _hull(points)
+        ax.add_patch(Polygon(outline, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=2))
+        drawn.append(outline)
+    for contact in mechanism.contacts:
+        centre = np.array([right, up]) @ at[contact.body].at(np.asarray(contact.point))
+        drawn.append(centre + contact.radius * np.array([[-1.0, -1.0], [1.0, 1.0]]))
+        ax.add_patch(Circle(tuple(centre), contact.radius, fill=False, edgecolor=_CONTACT, linewidth=0.6, zorder=3))
+        ax.plot(*centre, ".", color=_CONTACT, markersize=3, zorder=3)
+    if mechanism.contacts:
+        ax.axhline(0.0, color=_GROUND, linewidth=3, zorder=0)
+    _frame(ax, np.concatenate(drawn))
+    return figure
+
+
+def _camera() -> tuple[Floats, Floats, Floats]:
+    """Directions right, up, and towards the viewer."""
+    a, e = _VIEW
+    back = np.array([np.cos(e) * np.cos(a - np.pi / 2), np.cos(e) * np.sin(a - np.pi / 2), np.sin(e)])
+    right = np.array([np.cos(a), np.sin(a), 0.0])
+    return right, np.cross(back, right), back
+
+
+def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
+    """Lines from the joint that carries a body, or its centre of mass, to the joints that it carries."""
+    out = []
+    own = {j.child: at[j.child].at(np.asarray(j.child_point)) for j in mechanism.joints}
+    for joint in mechanism.joints:
+        if joint.parent == WORLD or joint.parent is None:
+            continue
+        point = at[joint.parent].at(np.asarray(joint.parent_point))
+        out.append((own[joint.parent], point))
+        out.append((point, own[joint.child]))
+    parents = {j.parent for j in mechanism.joints}
+    out += [(own[b.name], at[b.name].point) for b in mechanism.bodies if b.name not in parents and b.shape is None]
+    return out
+
+
+def _surface(shape: Shape) -> Floats:
+    """Points whose hull is the shape, body axes (n, 3)."""
+    turn, centre = rotation_matrix(shape.orientation), np.asarray(shape.center)
+    angles = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)], axis=1)
+    ball = np.concatenate([ring * (np.cos(t), np.cos(t), 0.0) + (0, 0, np.sin(t)) for t in np.linspace(-1.5, 1.5, 9)])
+    if isinstance(shape, Box):
+        local = 0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))
+    elif isinstance(shape, Sphere):
+        local = shape.radius * ball
+    else:
+        assert isinstance(shape, Capsule | Cylinder)
+        end = shape.radius * (ball if isinstance(shape, Capsule) else ring)
+        half = np.array([0.0, 0.0, shape.length / 2])
+        local = np.concatenate([end + half, end - half])
+    return np.asarray(local @ turn.T + centre)
+
+
+def _hull(points: Floats) -> Floats:
+    """Corners of the convex hull of points in the plane, in order."""
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def _frame(ax: Any, points: Floats) -> None:
+    """Square limits around everything that was drawn."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = 0.56 * max(float((high - low).max()), 1e-3)
+    middle = 0.5 * (low + high)
+    ax.set_xlim(middle[0] - half, middle[0] + half)
+    ax.set_ylim(middle[1] - half, middle[1] + half)
+    ax.set_aspect("equal")
+    ax.axis("off")

@@ -1,0 +1,78 @@
+"""Inputs from the actuators of an MJCF file, and what of it the mechanism leaves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mjcf.groups import name_of
+from sim.mjcf.joints import BALL, FREE
+from sim.parts import Input
+from sim.urdf.report import Notes
+
+Floats = NDArray[np.float64]
+
+_JOINT, _JOINT_IN_PARENT = 0, 1  # mjtTrn
+_FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0
+
+
+def find_inputs(
+    model: Any, homes: dict[int, tuple[str, int]], notes: Notes
+) -> tuple[list[Input], Floats, Floats, Floats]:
+    """(inputs, gear, low, high): one force or torque per actuator on a hinge or slide; bounds of u = gear * ctrl."""
+    inputs: list[Input] = []
+    rows: list[tuple[float, float, float]] = []
+    for a in range(model.nu):
+        name, j = name_of(model, "actuator", a), int(model.actuator_trnid[a, 0])
+        on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
+        if not on_joint or model.jnt_type[j] in (FREE, BALL):
+            notes.add("actuators that do not drive a hinge or a slide are left out", [name], warn=True)
+            continue
+        plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
+        if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
+            notes.add("servos and actuators with dynamics are plain forces here", [name], warn=True)
+        gear = float(model.actuator_gear[a, 0]) * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
+        joint, dof = homes[j]
+        inputs.append(Input(joint, dof=dof, name=name))
+        rows.append((gear, *_bounds(model, a, gear, bool(plain))))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return inputs, table[:, 0], table[:, 1], table[:, 2]
+
+
+def _bounds(model: Any, a: int, gear: float, plain: bool) -> tuple[float, float]:
+    """Bounds of the force on the joint [N, N m]."""
+    low, high = -np.inf, np.inf
+    if plain and model.actuator_ctrllimited[a]:
+        low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    if model.actuator_forcelimited[a]:
+        ends = sorted(float(model.actuator_gear[a, 0] * x) for x in model.actuator_forcerange[a])
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return low, high
+
+
+def left_out(model: Any, notes: Notes) -> None:
+    """Notes on what the file has and the mechanism does not."""
+    if model.neq:
+        notes.add(
+            "equality constraints are left out", [name_of(model, "equality", k) for k in range(model.neq)], warn=True
+        )
+    if model.ntendon:
+        notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)])
+    if model.npair:
+        notes.add("explicit contact pairs are left out", [name_of(model, "pair", k) for k in range(model.npair)])
+    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
+    if rough:
+        notes.add("dry friction of joints is left out", [name_of(model, "joint", j) for j in rough], warn=True)
+    for field, what in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
+        if np.any(getattr(model, field, 0.0)):
+            notes.add(f"{what} is left out", warn=True)
+    if model.opt.density or model.opt.viscosity:
+        notes.add("the drag of a fluid is left out", warn=True)
+    if np.any(model.body_gravcomp):
+        notes.add("gravity compensation is left out", warn=True)
+    moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
+    types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
+    if len(moving) and np.any(types[:, None] & affinities[None, :]):
+        notes.add("bodies do not collide with one another")

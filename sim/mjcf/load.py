@@ -1,0 +1,173 @@
+"""load_mjcf: a Mechanism from an MJCF file."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim import checks
+from sim.mjcf.contacts import find_contacts
+from sim.mjcf.drives import find_inputs, left_out
+from sim.mjcf.groups import Group, drawn, find_groups
+from sim.mjcf.joints import BALL, FREE, carry
+from sim.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
+from sim.parts import LAWS, Body, Joint
+from sim.urdf.pose import Pose
+from sim.urdf.report import Frame, Notes
+from sim.urdf.stance import gaps, lifted
+
+
+def load_mjcf(
+    source: str | Path,
+    *,
+    ground: bool = True,
+    friction: float | None = None,
+    law: str = "nonlinear",
+    merge: bool = True,
+    keyframe: int | None = None,
+    rim_points: int = 4,
+    gravity: ArrayLike | None = None,
+) -> MjcfMechanism:
+    """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
+
+        ground      whether geoms cannot enter the planes of the file
+        friction    coefficient of all contacts; None: that of the geoms
+        law         of contacts with friction, see Contact; geoms with condim 1 are without
+        merge       whether slides and a hinge in a row become one joint where there is a kind for it; the coordinates
+                    are the same. All other joints in a row are a chain with bodies without mass between them.
+        keyframe    number of the keyframe whose qpos is the neutral state; None: the default one, joints that it has
+                    outside their range in its middle, and a floating base so high that nothing is in the ground
+        rim_points  points per rim of a cylinder
+        gravity     [m/s^2]; None: that of the file
+
+    The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
+    slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
+    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move; actuators on hinges and
+    slides as inputs in N and N m, u = report.gear * ctrl. Not represented, and listed in `mechanism.report.notes`:
+    equality constraints, tendons, collisions between bodies, dry friction of joints, servos, fluids, meshes, height
+    fields, explicit pairs. What changes the motion in a way that a user would not expect is also an MjcfWarning.
+
+    ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
+    whose inertia no rigid body has; OSError for a file that is not there.
+    """
+    model, file = _compile(source)
+    checks.one_of("load_mjcf(law=...)", law, LAWS)
+    if not isinstance(rim_points, int | np.integer) or rim_points < 3:
+        raise ValueError(f"load_mjcf(rim_points=...): expected a whole number >= 3, got {rim_points!r}")
+    mu = None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0)
+    notes = Notes()
+    groups, where = find_groups(model)
+    bodies: list[Body] = []
+    joints: list[Joint] = []
+    homes: dict[int, tuple[str, int]] = {}
+    for group in groups:
+        carried = carry(model, group, merge, notes)
+        inertia = group.inertia
+        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group)) if inertia.mass else None
+        bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
+        joints += carried.joints
+        homes |= carried.homes
+    if not joints:
+        raise ValueError(f"load_mjcf: {file}: no joint is free to move")
+    inputs, gear, low, high = find_inputs(model, homes, notes)
+    left_out(model, notes)
+    mech = MjcfMechanism(
+        bodies,
+        joints,
+        find_contacts(model, where, (mu, law, int(rim_points)), notes) if ground else [],
+        inputs,
+        gravity=model.opt.gravity if gravity is None else gravity,
+        name=Path(file).stem,
+        neutral=_neutral(model, keyframe, notes),
+    )
+    mech = _without_constant_gaps(mech, notes)
+    if keyframe is None:
+        mech = _clear(mech)
+    known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
+    report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
+    for note in report.notes:
+        if note.warn:
+            warnings.warn(f"load_mjcf: {file}: {note}", MjcfWarning, stacklevel=2)
+    return replace(mech, report=report)
+
+
+def _compile(source: str | Path) -> tuple[Any, str]:
+    """MuJoCo's model of a file or a text, and a name for messages."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ImportError('load_mjcf needs MuJoCo: pip install "dojo-opt[mjcf]"') from error
+    text = isinstance(source, str) and source.lstrip().startswith("<")
+    if not text and not Path(source).is_file():
+        raise FileNotFoundError(f"load_mjcf: no file {str(source)!r}")
+    try:
+        if text:
+            return mujoco.MjModel.from_xml_string(str(source)), "model"
+        return mujoco.MjModel.from_xml_path(str(source)), Path(source).name
+    except ValueError as error:
+        raise ValueError(f"load_mjcf: {'the text' if text else source}: {error}") from None
+
+
+def _neutral(model: Any, keyframe: int | None, notes: Notes) -> Any:
+    """qpos of a keyframe, or the default one within the ranges of its joints."""
+    if keyframe is not None:
+        if not isinstance(keyframe, int | np.integer) or not 0 <= keyframe < model.nkey:
+            raise ValueError(f"load_mjcf(keyframe=...): the file has {model.nkey} keyframes, got {keyframe!r}")
+        q = np.array(model.key_qpos[keyframe], dtype=np.float64)
+    else:
+        q = np.array(model.qpos0, dtype=np.float64)
+    for j in range(model.njnt):
+        a = int(model.jnt_qposadr[j])
+        kind = int(model.jnt_type[j])
+        if kind in (FREE, BALL):
+            a += 3 if kind == FREE else 0
+            q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
+        elif keyframe is None and model.jnt_limited[j] and not model.jnt_range[j, 0] <= q[a] <= model.jnt_range[j, 1]:
+            q[a] = model.jnt_range[j].mean()
+            notes.add("neutral coordinates that were outside their range are in its middle", [model.joint(j).name])
+    return q
+
+
+def _without_constant_gaps(mech: MjcfMechanism, notes: Notes) -> MjcfMechanism:
+    """Without the contacts that no joint can open or close, as of a disc that slides in the plane it lies on."""
+    rng = np.random.default_rng(0)
+    seen = []
+    for _ in range(4):
+        q = rng.uniform(-1.0, 1.0, mech.nq)
+        for joint in mech.joints:
+            if joint.nrot == 3:
+                stop = mech.q_slice(joint.name).stop
+                q[stop - 4 : stop] /= np.linalg.norm(q[stop - 4 : stop])
+        seen.append(gaps(mech, q))
+    moving = np.ptp(seen, axis=0) > 1e-9 if mech.contacts else np.zeros(0, dtype=bool)
+    if moving.all():
+        return mech
+    notes.add(
+        "contacts that no joint can open or close are left out",
+        [c.name for c, moves in zip(mech.contacts, moving, strict=True) if not moves],
+        warn=True,
+    )
+    return replace(mech, contacts=[c for c, moves in zip(mech.contacts, moving, strict=True) if moves])
+
+
+def _clear(mech: MjcfMechanism) -> MjcfMechanism:
+    """The mechanism with its floating base, if it has one, lifted out of the ground."""
+    bases = [j.name for j in mech.joints if j.kind == "floating"]
+    if len(bases) != 1 or not mech.contacts or gaps(mech, np.asarray(mech.neutral)).min() >= 0.0:
+        return mech
+    return replace(mech, neutral=lifted(mech, bases[0]))
+
+
+def _frames(model: Any, where: dict[int, tuple[Group | None, Pose]]) -> dict[str, Frame]:
+    """Where the bodies of the file are."""
+    out = {}
+    for b, (group, pose) in where.items():
+        point = pose.point - (group.com if group else 0.0)
+        name = model.body(b).name or f"body_{b}"
+        out[name] = Frame(group.name if group else None, tuple(float(x) for x in point), pose.quaternion)
+    return out

@@ -1,0 +1,113 @@
+"""Joints with two rotations, Dojo's orbital ones: the child turns about any direction across the axis, never about it.
+
+    rotation       exp(t),  t = p1 V1 + p2 V2,   V1, V2 across the axis     so the quaternion has no part along the axis
+    coordinates    p, two plain numbers [rad]: a step adds h v to them, springs, dampers, limits and inputs act on them
+    columns        d(rotation)/d(p_k) = J(t)^T V_k in the child's axes, J the left Jacobian of exp
+
+The coordinates are regular for |p| < 2 pi. This is no universal joint, which is two hinges one after the other and
+turns its child about the axis by an amount of second order.
+
+Scenes without such joints do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from math import cos, sqrt
+from typing import Any
+
+from sim.layout import model_view, work_view
+from sim.model import Model, Vector
+from sim.rotation import Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients
+from solvers.jit import kernel, late
+from solvers.record import floats
+
+
+@kernel
+def swing(model: Model, i: int, p1: float, p2: float) -> Vec3:
+    """t = p1 V1 + p2 V2"""
+    V = model.joint_swing_axes[i]
+    return p1 * V[0] + p2 * V[3], p1 * V[1] + p2 * V[4], p1 * V[2] + p2 * V[5]
+
+
+@late
+def swing_pose(model_at: Any, out_at: Any, i: int, p1: float, p2: float) -> int:
+    """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p.
+
+    out, the rows S[d] and S[d + 1] of the joint: (x, y, z, column 1), (w, -, -, column 2).
+    """
+    model = model_view(model_at)
+    out = floats(out_at, 12)
+    t = swing(model, i, p1, p2)
+    w, x, y, z = quat_exp(t[0], t[1], t[2])
+    J = left_jacobian(-t[0], -t[1], -t[2])
+    V = model.joint_swing_axes[i]
+    for r in range(3):
+        out[3 + r] = J[3 * r] * V[0] + J[3 * r + 1] * V[1] + J[3 * r + 2] * V[2]
+        out[9 + r] = J[3 * r] * V[3] + J[3 * r + 1] * V[4] + J[3 * r + 2] * V[5]
+    out[0] = x
+    out[1] = y
+    out[2] = z
+    out[6] = w
+    return 0
+
+
+@kernel
+def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
+    """d(J(t)^T x)/dt along y, with J^T x = a x - b t x x + c t (t.x) and a, b, c functions of s = |t|^2:
+
+    2 (t.y) (a' x - b' t x x + c' t (t.x)) - b y x x + c (y (t.x) + t (x.y))
+    a' = (cos|t| - a)/(2 s),   b' = (a - 2 b)/(2 s),   c' = (b - 3 c)/(2 s)
+    """
+    s = t[0] * t[0] + t[1] * t[1] + t[2] * t[2]
+    a, b, c = so3_coefficients(s)
+    if s < 1e-2:
+        da = -1 / 6 * (1 - s / 10 * (1 - s / 28 * (1 - s / 54)))
+        db = -1 / 24 * (1 - s / 15 * (1 - s / 37.33333333333333 * (1 - s / 67.5)))
+        dc = -1 / 120 * (1 - s / 21 * (1 - s / 48 * (1 - s / 82.5)))
+    else:
+        da = 0.5 * (cos(sqrt(s)) - a) / s
+        db = 0.5 * (a - 2.0 * b) / s
+        dc = 0.5 * (b - 3.0 * c) / s
+    tx = t[0] * x[0] + t[1] * x[1] + t[2] * x[2]
+    ty = 2.0 * (t[0] * y[0] + t[1] * y[1] + t[2] * y[2])
+    xy = x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+    u = cross(t[0], t[1], t[2], x[0], x[1], x[2])
+    w = cross(y[0], y[1], y[2], x[0], x[1], x[2])
+    k = ty * dc * tx + c * xy
+    return (
+        ty * (da * x[0] - db * u[0]) - b * w[0] + c * y[0] * tx + k * t[0],
+        ty * (da * x[1] - db * u[1]) - b * w[1] + c * y[1] * tx + k * t[1],
+        ty * (da * x[2] - db * u[2]) - b * w[2] + c * y[2] * tx + k * t[2],
+    )
+
+
+@late
+def swing_curvature(model_at: Any, work_at: Any, i: int, p1: float, p2: float) -> int:
+    """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
+
+    All in the child's axes. A test direction turns with its joint, which `residual_derivatives` knows, and in the child's axes it also changes.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    c = model.joint_child_point[i]
+    x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
+    x, y, z = (
+        x + work.pos2[i, 0] - work.origin[0],
+        y + work.pos2[i, 1] - work.origin[1],
+        z + work.pos2[i, 2] - work.origin[2],
+    )
+    f = work.subtree[i]
+    x, y, z = cross(x, y, z, f[0], f[1], f[2])
+    x, y, z = f[3] - x, f[4] - y, f[5] - z
+    R = work.rot2[i]
+    m0 = R[0] * x + R[3] * y + R[6] * z
+    m1 = R[1] * x + R[4] * y + R[7] * z
+    m2 = R[2] * x + R[5] * y + R[8] * z
+    d = model.body_vadr[i + 1] - 2
+    t = swing(model, i, p1, p2)
+    V = model.joint_swing_axes[i]
+    for j in range(2):
+        for k in range(2):
+            g = column_derivative(t, V[3 * j : 3 * j + 3], V[3 * k : 3 * k + 3])
+            work.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2
+    return 0
