@@ -14,7 +14,7 @@ from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options, Stage
 from dojo_opt.plan import table_header, table_line
-from dojo_opt.problem import Problem
+from sim.horizon import Horizon
 from solvers.riccati import Promise
 from solvers.status import Status
 
@@ -38,9 +38,9 @@ class Continuation:
     now: Iterate
 
     def __init__(
-        self, problem: Problem, options: Options, objective: Objective, descent: Descent, line_search: LineSearch
+        self, horizon: Horizon, options: Options, objective: Objective, descent: Descent, line_search: LineSearch
     ) -> None:
-        self._problem = problem
+        self._horizon = horizon
         self._options = options
         self._objective = objective
         self._descent = descent
@@ -58,6 +58,7 @@ class Continuation:
         self.kappa = kappa
         self._kappa_grad = 0.0
         self._fresh = False  # the quadratic model belongs to `now`
+        self._known: tuple[float, Any] | None = None  # derivatives at the first iterate, and their smoothing
 
     def first_stage(self, stages: tuple[Stage, ...]) -> int:
         """Which stage a guess of states begins with: the smoothest at which it fits nearly as well as at any.
@@ -67,14 +68,17 @@ class Continuation:
         """
         if self.kappa is not None or len(stages) == 1:
             return 0
-        problem, now = self._problem, self.now
-        misfit = []
+        now, fits = self.now, []
         for stage in stages:
-            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
-            gaps = problem.sim.difference(linear.x_next, now.x[1:])
-            misfit.append(float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf)
-        best = min(misfit)
-        return next(i for i, value in enumerate(misfit) if value <= _FITS * best) if best < np.inf else 0
+            linear = self._horizon.linearize(now.x, now.u, stage.kappa_eval)
+            gaps = self._horizon.gaps(linear, now.x)
+            fits.append((float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf, linear))
+        best = min(misfit for misfit, _ in fits)
+        if best == np.inf:
+            return 0
+        chosen = next(i for i, (misfit, _) in enumerate(fits) if misfit <= _FITS * best)
+        self._known = stages[chosen].kappa_eval, fits[chosen][1]
+        return chosen
 
     def remeasure(self) -> None:
         """The multipliers have changed: the merit and the model of the objective are out of date."""
@@ -112,12 +116,15 @@ class Continuation:
             return Status.SOLVED
         if self._options.reopen == "feedback" and started and self.follow(stage.kappa_eval):
             return Status.SOLVED
-        problem, now = self._problem, self.now
-        linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
+        now = self.now
+        if self._known is not None and self._known[0] == stage.kappa_eval:
+            linear = self._known[1]
+        else:
+            linear = self._horizon.linearize(now.x, now.u, stage.kappa_eval)
+        self._known = None
         if np.any(linear.status):
             return Status.SOLVED if self.roll_with_gains(stage.kappa_eval) else Status.SIMULATION_FAILED
-        gaps = np.zeros((problem.horizon + 1, problem.sim.ndx))
-        gaps[1:] = problem.sim.difference(linear.x_next, now.x[1:])
+        gaps = self._horizon.gaps(linear, now.x)
         closed = float(np.abs(gaps).max()) <= self._options.gap
         self.now = now._replace(gaps=None if closed else gaps)
         self.kappa = stage.kappa_eval
@@ -191,7 +198,9 @@ class Continuation:
         """One line search, and the regularisation that follows from its step size."""
         descent = self._descent
         self._line_search.start_step = descent.start_step
-        alpha, self.now = self._line_search.search(self.now, promise, descent.k, descent.K, stage.kappa_eval)
+        alpha, self.now = self._line_search.search(
+            self.now, promise, descent.k, descent.K, stage.kappa_eval, descent.linear
+        )
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:
             descent.lower_regularization()

@@ -12,6 +12,7 @@ from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
+from sim.horizon import Horizon
 from solvers.riccati import Promise, Quadratic, Regularization, backward, work_size
 from solvers.status import Status
 
@@ -24,13 +25,14 @@ _USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less 
 class Descent:
     """Gains K (T, nu, ndx), k (T, nu) at an iterate, with all buffers of the backward pass."""
 
-    def __init__(self, problem: Problem, objective: Objective, options: Options) -> None:
+    def __init__(self, problem: Problem, horizon: Horizon, objective: Objective, options: Options) -> None:
         sim, T = problem.sim, problem.horizon
         self.K = np.zeros((T, sim.nu, sim.ndx))
         self.k = np.zeros((T, sim.nu))
         self.mu = 0.0
         self._growth = 1.0
         self._problem = problem
+        self._horizon = horizon
         self._objective = objective
         self._options = options
         self._damping = np.ones(sim.nu)
@@ -38,7 +40,8 @@ class Descent:
         self._buffer = np.zeros(work_size(sim.ndx, sim.nu))
         self._no_gaps = np.zeros((T + 1, sim.ndx))
         self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
-        self._linear: Any = None
+        self.linear: Any = None  # derivatives of the dynamics
+        self._apart: tuple[float, Matrix] | None = None
         self._start = None if problem.free_start is None else FreeStart(problem)
 
     @property
@@ -58,7 +61,7 @@ class Descent:
 
     def use(self, linear: Any, now: Iterate) -> None:
         """Take a linearisation of the dynamics at `now` and expand the objective there."""
-        self._linear = linear
+        self.linear = linear
         self.expand(now)
 
     def expand(self, now: Iterate) -> None:
@@ -73,16 +76,22 @@ class Descent:
 
         kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
         """
-        problem = self._problem
         status = Status.SOLVED
         for level in (kappa, 10.0 * kappa, kappa_eval):
-            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=level)
+            apart = level != kappa_eval
+            linear = self._horizon.linearize(now.x, now.u, level, self._guess(now, level) if apart else None)
             failed = np.flatnonzero(linear.status)
             if failed.size == 0:
+                if apart:
+                    self._apart = level, linear.x_next - now.x[1:]
                 self.use(linear, now)
                 return Status.SOLVED
             status = Status(int(linear.status[failed[0]]))
         return status
+
+    def _guess(self, now: Iterate, kappa: float) -> Any:
+        """(T, nx) next states at a smoothing that is not that of the trajectory: as far from it as the last time."""
+        return None if self._apart is None or self._apart[0] != kappa else now.x[1:] + self._apart[1]
 
     def gains(self, now: Iterate) -> Promise:
         """K and k at the first regularisation, from now upwards, that leaves every Q_uu positive definite."""
@@ -90,7 +99,7 @@ class Descent:
         if self._problem.control_limits is not None:
             lo, hi = (bound - now.u for bound in self._problem.control_limits)
         gaps = self._no_gaps if now.gaps is None else now.gaps
-        model = Quadratic(self._linear.A, self._linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+        model = Quadratic(self.linear.A, self.linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
         while True:
             value = self.mu * self._options.value_regularization
             promise = backward(

@@ -54,10 +54,11 @@ class Solver:
     def __init__(self, problem: Problem, options: Options | None = None) -> None:
         self.problem = problem
         self.options = Options() if options is None else options
+        self.horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
         self.objective = Objective(problem, self.options)
-        self.descent = Descent(problem, self.objective, self.options)
-        self.line_search = LineSearch(problem, self.objective, self.options)
-        self.continuation = Continuation(problem, self.options, self.objective, self.descent, self.line_search)
+        self.descent = Descent(problem, self.horizon, self.objective, self.options)
+        self.line_search = LineSearch(problem, self.horizon, self.objective, self.options)
+        self.continuation = Continuation(self.horizon, self.options, self.objective, self.descent, self.line_search)
 
     def solve(
         self, controls: ArrayLike | None = None, states: ArrayLike | None = None, warm_start: Plan | None = None
@@ -84,7 +85,7 @@ class Solver:
             us = np.clip(us, *problem.control_limits)
         xs = problem.states0 if states is None and controls is None else states
         if xs is not None:
-            xs = problem.check_states("ilqr(states=...)", xs)
+            xs = self.horizon.states("ilqr(states=...)", problem.check_states("ilqr(states=...)", xs))
             self.continuation.start(Iterate(xs, us, None, *self.objective.evaluate(xs, us)), None)
             return Status.SOLVED, ""
         idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us, None, np.inf, np.inf)

@@ -161,7 +161,7 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = self._ahead(now)
+        start = self._solver.horizon.states("MPC(x)", self._ahead(now))
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
