@@ -21,6 +21,9 @@ Stack = NDArray[np.float64]
 _LENGTHEN = 4.0  # the first trial, relative to the step that was last taken: a rollout costs as much as a linearisation
 
 
+Gains = tuple[Matrix, Stack, Any]  # k (T, nu), K (T, nu, ndx), and the step (ndx,) of a free start or None
+
+
 class Iterate(NamedTuple):
     """A trajectory and how good it is."""
 
@@ -55,7 +58,7 @@ class LineSearch:
     def reset(self) -> None:
         """Try the full step first again."""
         self._first = 1.0
-        self.start_step: Any = None  # of a free start, at full length
+        self._start_step: Any = None  # of a free start, at full length
 
     def roll(
         self, now: Iterate, k: Matrix | None, K: Stack | None, alpha: float, kappa: float, linear: Any = None
@@ -68,7 +71,7 @@ class LineSearch:
         if problem.free_start is not None:
             start = now.x[0]
             if k is not None:
-                start = problem.sim.integrate(start, alpha * self.start_step)
+                start = problem.sim.integrate(start, alpha * self._start_step)
         return self._horizon.roll(
             start, now.x, now.u, kappa, k=k, K=K, gaps=now.gaps, alpha=alpha, linear=linear, steps=now.steps
         )
@@ -78,11 +81,10 @@ class LineSearch:
         cost, merit = self._objective.evaluate(shot.x, shot.u)
         return Iterate(shot.x, shot.u, gaps, cost, merit, shot.steps)
 
-    def search(
-        self, now: Iterate, promise: Promise, k: Matrix, K: Stack, kappa: float, linear: Any
-    ) -> tuple[float, Iterate]:
+    def search(self, now: Iterate, promise: Promise, linear: Any, gains: Gains, kappa: float) -> tuple[float, Iterate]:
         """(step size, new iterate), or (0, the old one) when no step size is good enough."""
         options = self._options
+        k, K, self._start_step = gains
         alpha = self._first
         while alpha >= 0.5**options.halvings:
             shot = self.roll(now, k, K, alpha, kappa, linear)
