@@ -124,10 +124,8 @@ class Continuation:
         if self._options.reopen == "feedback" and started and self.follow(stage.kappa_eval):
             return Status.SOLVED
         now = self.now
-        if self._known is not None and self._known[0] == stage.kappa_eval:
-            linear = self._known[1]
-        else:
-            linear = self._horizon.linearize(now.x, now.u, stage.kappa_eval)
+        known = self._known is not None and self._known[0] == stage.kappa_eval
+        linear = self._known[1] if self._known and known else self._horizon.linearize(now.x, now.u, stage.kappa_eval)
         self._known = None
         if np.any(linear.status):
             return Status.SOLVED if self.roll_with_gains(stage.kappa_eval) else Status.SIMULATION_FAILED
@@ -209,11 +207,9 @@ class Continuation:
         alpha, self.now = self._line_search.search(before, promise, descent.linear, gains, stage.kappa_eval)
         linear = None
         if alpha < self._options.shooting and before.gaps is not None:
-            shot, there, linear = self._shooting.search(before, promise, descent.linear, gains, stage.kappa_eval)
+            shot, there, beside = self._shooting.search(before, promise, descent.linear, gains, stage.kappa_eval)
             if shot > alpha:
-                alpha, self.now = shot, there
-            else:
-                linear = None
+                alpha, self.now, linear = shot, there, beside
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:
             descent.lower_regularization()
@@ -223,10 +219,9 @@ class Continuation:
             and (self.now.gaps is None or descent.mu < _FIRM or stage is self._options.stages[-1])
         ):
             descent.raise_regularization()
-        self._fresh = self._fresh and alpha == 0.0
-        if linear is not None and stage.kappa_eval == self._kappa_grad:
+        self._fresh = self._fresh and alpha == 0.0 or (linear is not None and stage.kappa_eval == self._kappa_grad)
+        if linear is not None and self._fresh:
             descent.use(linear, self.now)
-            self._fresh = True
         return alpha
 
     def _report(self, stage: Stage, promise: Promise, alpha: float) -> bool:

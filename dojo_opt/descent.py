@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.cycle import periodic_gains
 from dojo_opt.free_start import FreeStart
 from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
@@ -68,7 +69,7 @@ class Descent:
         """Expand the objective at `now`, and take the mean control weight as the unit of regularisation."""
         self._objective.expand(now.x, now.u)
         n = self._problem.sim.ndx
-        weight = np.einsum("tii->i", self._objective.H[:-1, n:, n:]) / self._problem.horizon
+        weight = self._objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
         self._damping = np.where(weight > 0.0, weight, 1.0)
 
     def linearize(self, now: Iterate, kappa: float, kappa_eval: float) -> Status:
@@ -95,11 +96,7 @@ class Descent:
 
     def gains(self, now: Iterate) -> Promise:
         """K and k at the first regularisation, from now upwards, that leaves every Q_uu positive definite."""
-        lo, hi = self._free_limits
-        if self._problem.control_limits is not None:
-            lo, hi = (bound - now.u for bound in self._problem.control_limits)
-        gaps = self._no_gaps if now.gaps is None else now.gaps
-        model = Quadratic(self.linear.A, self.linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+        model = self._model(now)
         while True:
             value = self.mu * self._options.value_regularization
             promise = backward(
@@ -110,6 +107,26 @@ class Descent:
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()
+
+    def _model(self, now: Iterate) -> Quadratic:
+        """The linear-quadratic problem around `now`."""
+        lo, hi = self._free_limits
+        if self._problem.control_limits is not None:
+            lo, hi = (bound - now.u for bound in self._problem.control_limits)
+        gaps = self._no_gaps if now.gaps is None else now.gaps
+        return Quadratic(self.linear.A, self.linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+
+    @property
+    def stride(self) -> Any:
+        """(ndx,) by what a motion that repeats itself moves on, None for others."""
+        return None if self._start is None else self._start.stride
+
+    def repeat(self, now: Iterate) -> bool:
+        """Replace K by the gains of the motion repeated for ever; False, and nothing changed, where there are none."""
+        K = periodic_gains(self._model(now))
+        if K is not None:
+            self.K[:] = K
+        return K is not None
 
     def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise, now: Iterate) -> Promise:
         """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""

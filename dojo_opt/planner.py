@@ -162,7 +162,9 @@ class Solver:
         continuation, journal, options = self.continuation, self.continuation.journal, self.options
         if status != Status.SIMULATION_FAILED:
             continuation.finish(options.stages[-1])
-        now = continuation.now
+        now, stride = continuation.now, self.descent.stride
+        if stride is not None and status == Status.SOLVED and not self.descent.repeat(now):
+            detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
         violation = self.objective.violation(now.x, now.u)
         plan = Plan(
             success=status == Status.SOLVED,
@@ -179,6 +181,7 @@ class Solver:
             seconds=time.perf_counter() - journal.begin,
             time_step=float(self.problem.sim.time_step),
             substeps=self.problem.substeps,
+            stride=stride,
             history=journal.records,
             multipliers=[term.slope.copy() for term in self.objective.constraints],
             penalties=[2.0 * term.weight for term in self.objective.constraints],

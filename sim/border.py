@@ -62,7 +62,8 @@ class Border:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        rows = [np.ascontiguousarray(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
+        # copies: what broadcast_to returns is read-only, and kernels would be compiled once more for it
+        rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | None, ...]) -> Floats:

@@ -62,6 +62,11 @@ def work_size(n: int, m: int) -> int:
     return n * n + 2 * n * p + p * p + 5 * m * n + m * m + 2 * n + 3 * p + m + 2 * m * m + 3 * m
 
 
+def value_hessian(buffer: Vector, n: int) -> Matrix:
+    """(n, n) Hessian of the value at the first knot, from the scratch of the last `backward`."""
+    return buffer[: n * n].reshape((n, n))
+
+
 @kernel
 def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: Matrix, q: Vector) -> None:
     """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t.   FV: (2, n, n + m) scratch."""
