@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.descent import Descent
+from dojo_opt.journal import Journal
 from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options, Stage
-from dojo_opt.plan import table_header, table_line
-from dojo_opt.problem import Problem
+from dojo_opt.shooting import Shooting
+from sim.horizon import Horizon
 from solvers.riccati import Promise
 from solvers.status import Status
 
@@ -27,6 +26,7 @@ _SLOW = 2  # short steps in a row that bring next to nothing end a stage
 _SLOW_OPEN = 6  # the same with open gaps and a model that promises more: standing still is a poor guess of a trot
 _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
 _PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
+_CREEPING = 15  # short or rejected steps in a row: of 116 gaits and hops that are planned, none takes more than 11
 _FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
 _FITS = 2.0  # times the least sum of squared gaps: what counts as a good fit of a guess
 _SMALL = 1e-9  # merit below which changes are judged absolutely
@@ -38,19 +38,26 @@ class Continuation:
     now: Iterate
 
     def __init__(
-        self, problem: Problem, options: Options, objective: Objective, descent: Descent, line_search: LineSearch
+        self,
+        horizon: Horizon,
+        options: Options,
+        objective: Objective,
+        descent: Descent,
+        line_search: LineSearch,
+        shooting: Shooting,
     ) -> None:
-        self._problem = problem
+        self._horizon = horizon
         self._options = options
         self._objective = objective
         self._descent = descent
         self._line_search = line_search
-        self.reset()
+        self._shooting = shooting
+        self.journal = Journal(options)
 
     def reset(self) -> None:
         """Forget the last solve and start the clock."""
-        self.begin = self._tick = time.perf_counter()
-        self.history: list[dict[str, Any]] = []
+        self.journal.reset()
+        self._shooting.reset()
 
     def start(self, now: Iterate, kappa: float | None) -> None:
         """Begin at `now`, a rollout at `kappa`, or states whose gaps are not known yet (None)."""
@@ -58,6 +65,7 @@ class Continuation:
         self.kappa = kappa
         self._kappa_grad = 0.0
         self._fresh = False  # the quadratic model belongs to `now`
+        self._known: tuple[float, Any] | None = None  # derivatives at the first iterate, and their smoothing
 
     def first_stage(self, stages: tuple[Stage, ...]) -> int:
         """Which stage a guess of states begins with: the smoothest at which it fits nearly as well as at any.
@@ -67,14 +75,17 @@ class Continuation:
         """
         if self.kappa is not None or len(stages) == 1:
             return 0
-        problem, now = self._problem, self.now
-        misfit = []
+        now, fits = self.now, []
         for stage in stages:
-            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
-            gaps = problem.sim.difference(linear.x_next, now.x[1:])
-            misfit.append(float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf)
-        best = min(misfit)
-        return next(i for i, value in enumerate(misfit) if value <= _FITS * best) if best < np.inf else 0
+            linear = self._horizon.linearize(now.x, now.u, stage.kappa_eval)
+            gaps = self._horizon.gaps(linear, now.x)
+            fits.append((float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf, linear))
+        best = min(misfit for misfit, _ in fits)
+        if best == np.inf:
+            return 0
+        chosen = next(i for i, (misfit, _) in enumerate(fits) if misfit <= _FITS * best)
+        self._known = stages[chosen].kappa_eval, fits[chosen][1]
+        return chosen
 
     def remeasure(self) -> None:
         """The multipliers have changed: the merit and the model of the objective are out of date."""
@@ -112,12 +123,13 @@ class Continuation:
             return Status.SOLVED
         if self._options.reopen == "feedback" and started and self.follow(stage.kappa_eval):
             return Status.SOLVED
-        problem, now = self._problem, self.now
-        linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=stage.kappa_eval)
+        now = self.now
+        known = self._known is not None and self._known[0] == stage.kappa_eval
+        linear = self._known[1] if self._known and known else self._horizon.linearize(now.x, now.u, stage.kappa_eval)
+        self._known = None
         if np.any(linear.status):
             return Status.SOLVED if self.roll_with_gains(stage.kappa_eval) else Status.SIMULATION_FAILED
-        gaps = np.zeros((problem.horizon + 1, problem.sim.ndx))
-        gaps[1:] = problem.sim.difference(linear.x_next, now.x[1:])
+        gaps = self._horizon.gaps(linear, now.x)
         closed = float(np.abs(gaps).max()) <= self._options.gap
         self.now = now._replace(gaps=None if closed else gaps)
         self.kappa = stage.kappa_eval
@@ -132,7 +144,7 @@ class Continuation:
         if status != Status.SOLVED:
             return status
         self._line_search.reset()
-        rejected = slow = 0
+        rejected = slow = short = 0
         self._kappa_grad = stage.kappa_grad
         for _ in range(stage.iterations):
             if not self._fresh:
@@ -147,7 +159,7 @@ class Continuation:
             promised = -(promise.d0 + 0.5 * promise.d1)
             if self.now.gaps is None and self._descent.mu <= _LIGHT and promised <= small:
                 return Status.SOLVED
-            status = self._over_budget()
+            status = self.journal.budget()
             if status != Status.SOLVED:
                 return status
             before = self.now
@@ -155,9 +167,10 @@ class Continuation:
             if self._report(stage, promise, alpha):
                 return Status.STOPPED
             rejected = 0 if alpha > 0.0 else rejected + 1
+            short = 0 if alpha >= _POOR_STEP else short + 1
             if rejected >= self._options.rejections and self._unstick(stage):
                 rejected = 0
-            elif rejected >= _PATIENCE * self._options.rejections:
+            elif rejected >= _PATIENCE * self._options.rejections or short >= _CREEPING:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
                 slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
@@ -189,9 +202,14 @@ class Continuation:
 
     def _advance(self, stage: Stage, promise: Promise) -> float:
         """One line search, and the regularisation that follows from its step size."""
-        descent = self._descent
-        self._line_search.start_step = descent.start_step
-        alpha, self.now = self._line_search.search(self.now, promise, descent.k, descent.K, stage.kappa_eval)
+        descent, before = self._descent, self.now
+        gains = (descent.k, descent.K, descent.start_step)
+        alpha, self.now = self._line_search.search(before, promise, descent.linear, gains, stage.kappa_eval)
+        linear = None
+        if alpha < self._options.shooting and before.gaps is not None:
+            shot, there, beside = self._shooting.search(before, promise, descent.linear, gains, stage.kappa_eval)
+            if shot > alpha:
+                alpha, self.now, linear = shot, there, beside
         self._mu = descent.mu
         if alpha >= _GOOD_STEP:
             descent.lower_regularization()
@@ -201,46 +219,26 @@ class Continuation:
             and (self.now.gaps is None or descent.mu < _FIRM or stage is self._options.stages[-1])
         ):
             descent.raise_regularization()
-        self._fresh = self._fresh and alpha == 0.0
+        self._fresh = self._fresh and alpha == 0.0 or (linear is not None and stage.kappa_eval == self._kappa_grad)
+        if linear is not None and self._fresh:
+            descent.use(linear, self.now)
         return alpha
 
-    def _over_budget(self) -> Status:
-        if len(self.history) >= self._options.max_iterations:
-            return Status.MAX_ITERATIONS
-        if time.perf_counter() - self.begin >= self._options.time_limit:
-            return Status.TIME_LIMIT
-        return Status.SOLVED
-
     def _report(self, stage: Stage, promise: Promise, alpha: float) -> bool:
-        """Record the iteration, print it, call back; True when the callback wants to stop."""
-        now, tock = self.now, time.perf_counter()
-        record = {
-            "iteration": len(self.history) + 1,
-            "cost": now.cost,
-            "merit": now.merit,
-            "gradient": promise.gradient,
-            "kappa_eval": stage.kappa_eval,
-            "kappa_grad": self._kappa_grad,
-            "mu": self._mu,
-            "alpha": alpha,
-            "promised": alpha * (promise.d0 + 0.5 * alpha * promise.d1),
-            "gap": now.gap,
-            "violation": self._objective.violation(now.x, now.u),
-            "milliseconds": 1e3 * (tock - self._tick),
-        }
-        self._tick = tock
-        self.history.append(record)
-        if self._options.verbose:
-            stream = self._options.stream or sys.stdout
-            if len(self.history) == 1:
-                print(table_header(), file=stream)
-            print(table_line(record), file=stream)
-        if self._options.callback is not None:
-            try:
-                self._options.callback(record)
-            except StopIteration:
-                return True
-        return False
+        """Record the iteration; True when the callback wants to stop."""
+        now = self.now
+        return self.journal.add(
+            cost=now.cost,
+            merit=now.merit,
+            gradient=promise.gradient,
+            kappa_eval=stage.kappa_eval,
+            kappa_grad=self._kappa_grad,
+            mu=self._mu,
+            alpha=alpha,
+            promised=alpha * (promise.d0 + 0.5 * alpha * promise.d1),
+            gap=now.gap,
+            violation=self._objective.violation(now.x, now.u),
+        )
 
     def finish(self, stage: Stage) -> None:
         """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned."""

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.cycle import periodic_gains
 from dojo_opt.free_start import FreeStart
 from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
+from sim.horizon import Horizon
 from solvers.riccati import Promise, Quadratic, Regularization, backward, work_size
 from solvers.status import Status
 
@@ -24,13 +26,14 @@ _USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less 
 class Descent:
     """Gains K (T, nu, ndx), k (T, nu) at an iterate, with all buffers of the backward pass."""
 
-    def __init__(self, problem: Problem, objective: Objective, options: Options) -> None:
+    def __init__(self, problem: Problem, horizon: Horizon, objective: Objective, options: Options) -> None:
         sim, T = problem.sim, problem.horizon
         self.K = np.zeros((T, sim.nu, sim.ndx))
         self.k = np.zeros((T, sim.nu))
         self.mu = 0.0
         self._growth = 1.0
         self._problem = problem
+        self._horizon = horizon
         self._objective = objective
         self._options = options
         self._damping = np.ones(sim.nu)
@@ -38,7 +41,8 @@ class Descent:
         self._buffer = np.zeros(work_size(sim.ndx, sim.nu))
         self._no_gaps = np.zeros((T + 1, sim.ndx))
         self._free_limits = (np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf))
-        self._linear: Any = None
+        self.linear: Any = None  # derivatives of the dynamics
+        self._apart: tuple[float, Matrix] | None = None
         self._start = None if problem.free_start is None else FreeStart(problem)
 
     @property
@@ -58,14 +62,14 @@ class Descent:
 
     def use(self, linear: Any, now: Iterate) -> None:
         """Take a linearisation of the dynamics at `now` and expand the objective there."""
-        self._linear = linear
+        self.linear = linear
         self.expand(now)
 
     def expand(self, now: Iterate) -> None:
         """Expand the objective at `now`, and take the mean control weight as the unit of regularisation."""
         self._objective.expand(now.x, now.u)
         n = self._problem.sim.ndx
-        weight = np.einsum("tii->i", self._objective.H[:-1, n:, n:]) / self._problem.horizon
+        weight = self._objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
         self._damping = np.where(weight > 0.0, weight, 1.0)
 
     def linearize(self, now: Iterate, kappa: float, kappa_eval: float) -> Status:
@@ -73,24 +77,26 @@ class Descent:
 
         kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
         """
-        problem = self._problem
         status = Status.SOLVED
         for level in (kappa, 10.0 * kappa, kappa_eval):
-            linear = problem.sim.linearize_trajectory(now.x, now.u, substeps=problem.substeps, kappa=level)
+            apart = level != kappa_eval
+            linear = self._horizon.linearize(now.x, now.u, level, self._guess(now, level) if apart else None)
             failed = np.flatnonzero(linear.status)
             if failed.size == 0:
+                if apart:
+                    self._apart = level, linear.x_next - now.x[1:]
                 self.use(linear, now)
                 return Status.SOLVED
             status = Status(int(linear.status[failed[0]]))
         return status
 
+    def _guess(self, now: Iterate, kappa: float) -> Any:
+        """(T, nx) next states at a smoothing that is not that of the trajectory: as far from it as the last time."""
+        return None if self._apart is None or self._apart[0] != kappa else now.x[1:] + self._apart[1]
+
     def gains(self, now: Iterate) -> Promise:
         """K and k at the first regularisation, from now upwards, that leaves every Q_uu positive definite."""
-        lo, hi = self._free_limits
-        if self._problem.control_limits is not None:
-            lo, hi = (bound - now.u for bound in self._problem.control_limits)
-        gaps = self._no_gaps if now.gaps is None else now.gaps
-        model = Quadratic(self._linear.A, self._linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+        model = self._model(now)
         while True:
             value = self.mu * self._options.value_regularization
             promise = backward(
@@ -101,6 +107,26 @@ class Descent:
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()
+
+    def _model(self, now: Iterate) -> Quadratic:
+        """The linear-quadratic problem around `now`."""
+        lo, hi = self._free_limits
+        if self._problem.control_limits is not None:
+            lo, hi = (bound - now.u for bound in self._problem.control_limits)
+        gaps = self._no_gaps if now.gaps is None else now.gaps
+        return Quadratic(self.linear.A, self.linear.B, self._objective.g, self._objective.H, gaps, lo, hi)
+
+    @property
+    def stride(self) -> Any:
+        """(ndx,) by what a motion that repeats itself moves on, None for others."""
+        return None if self._start is None else self._start.stride
+
+    def repeat(self, now: Iterate) -> bool:
+        """Replace K by the gains of the motion repeated for ever; False, and nothing changed, where there are none."""
+        K = periodic_gains(self._model(now))
+        if K is not None:
+            self.K[:] = K
+        return K is not None
 
     def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise, now: Iterate) -> Promise:
         """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""

@@ -30,6 +30,11 @@ class FreeStart:
         self._terms = [term for term in problem.constraints if isinstance(term, PeriodicTerm)]
         self.step = np.zeros(problem.sim.ndx)
 
+    @property
+    def stride(self) -> Array | None:
+        """(ndx,) by what the end is ahead of the start, None unless all of the end is tied to the start."""
+        return next((term.shift for term in self._terms if term.mask.all()), None)
+
     def solve(
         self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array
     ) -> tuple[Array, float, float]:

@@ -50,6 +50,7 @@ class Options:
     ascent: float = 2.0  # with open gaps: allowed multiple of a predicted increase
     halvings: int = 6  # of the step size
     rejections: int = 2  # failed line searches in a row before gaps are closed by force or derivatives sharpened
+    shooting: float = 0.1  # with open gaps, a shorter step is compared with one of multiple shooting
     time_limit: float = float("inf")  # [s]
     callback: Callable[[dict[str, Any]], None] | None = None  # once per iteration; may raise StopIteration
     verbose: bool = False

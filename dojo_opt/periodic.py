@@ -43,10 +43,10 @@ class PeriodicTerm(StateTerm):
 
     def __init__(self, sim: Any, horizon: int, mask: Array, shift: Array, layout: Integers) -> None:
         super().__init__("Periodic", np.array([horizon]), mask, np.zeros((1, sim.nx)), layout)
-        self._sim, self._shift = sim, shift
+        self._sim, self.shift = sim, shift
 
     def update(self, xs: Array, us: Array) -> None:
-        self.reference[0] = self._sim.integrate(xs[0], self._shift)
+        self.reference[0] = self._sim.integrate(xs[0], self.shift)
         super().update(xs, us)
 
     def coupling(self, xs: Array, us: Array) -> tuple[Array, Array, Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +41,8 @@ class Plan:
     """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
 
     u(x) = u_t + K_t (x (-) x_t)
+
+    Of a problem whose start is free and whose end is the start again (`Periodic`), K is periodic, too: see `repeated`.
     """
 
     success: bool
@@ -57,6 +59,7 @@ class Plan:
     seconds: float  # that the solve took
     time_step: float  # [s]
     substeps: int  # simulation steps per knot
+    stride: Matrix | None = None  # (ndx,) of a motion that repeats itself: by what its end is ahead; K is then periodic
     history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
     multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
     penalties: list[Matrix] = field(default_factory=list)
@@ -66,6 +69,23 @@ class Plan:
     def time(self) -> Matrix:
         """(T + 1,) times of the knots [s]."""
         return np.arange(float(len(self.x))) * (self.time_step * self.substeps)
+
+    def repeated(self, count: int) -> Plan:
+        """The motion of a periodic plan `count` times in a row, with the gains that go with it.
+
+        fun is that of all cycles; multipliers, penalties and history stay behind. ValueError for a plan that does not
+        repeat itself, or that was loaded from a file and knows no simulator.
+        """
+        if isinstance(count, bool) or int(count) != count or count < 1:
+            raise ValueError(f"Plan.repeated(count): expected a positive number of cycles, got {count!r}")
+        if self.stride is None or self.problem is None:
+            why = "its end is not its start (Periodic)" if self.stride is None else "it has no problem"
+            raise ValueError(f"Plan.repeated: this plan cannot be repeated, {why}")
+        n, stride = int(count), self.stride
+        cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * stride) for i in range(n)]
+        u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
+        x, fun = np.concatenate(cycles), n * self.fun
+        return replace(self, x=x, u=u, K=K, k=k, stride=n * stride, fun=fun, multipliers=[], penalties=[])
 
     def summary(self) -> str:
         """The table of iterations and a closing line."""
@@ -82,6 +102,7 @@ class Plan:
     def save(self, path: str | Path) -> None:
         """Write all fields to an .npz file."""
         arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
+        arrays |= {} if self.stride is None else {"stride": self.stride}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
         arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
         scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
@@ -97,5 +118,5 @@ class Plan:
             count = sum(name.startswith("multiplier_") for name in data.files)
             multipliers = [data[f"multiplier_{i}"] for i in range(count)]
             penalties = [data[f"penalty_{i}"] for i in range(count)]
-            arrays = {name: data[name] for name in ("x", "u", "K", "k")}
+            arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data.files}
             return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties)

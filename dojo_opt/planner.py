@@ -23,10 +23,13 @@ from dojo_opt.objective import Objective
 from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
+from dojo_opt.shooting import Shooting
 from solvers.status import MESSAGES, Status
 
 __all__ = ["Solver", "ilqr"]
 
+_LESS = 0.9  # share of the least violation so far: what counts as progress
+_STALLED = 5  # multiplier updates of the last stage without progress
 _SOFTEN = 3  # times that a stuck last stage may go back to the one before it
 
 
@@ -54,10 +57,18 @@ class Solver:
     def __init__(self, problem: Problem, options: Options | None = None) -> None:
         self.problem = problem
         self.options = Options() if options is None else options
+        self.horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
         self.objective = Objective(problem, self.options)
-        self.descent = Descent(problem, self.objective, self.options)
-        self.line_search = LineSearch(problem, self.objective, self.options)
-        self.continuation = Continuation(problem, self.options, self.objective, self.descent, self.line_search)
+        self.descent = Descent(problem, self.horizon, self.objective, self.options)
+        self.line_search = LineSearch(problem, self.horizon, self.objective, self.options)
+        self.continuation = Continuation(
+            self.horizon,
+            self.options,
+            self.objective,
+            self.descent,
+            self.line_search,
+            Shooting(problem, self.horizon, self.objective, self.options),
+        )
 
     def solve(
         self, controls: ArrayLike | None = None, states: ArrayLike | None = None, warm_start: Plan | None = None
@@ -84,7 +95,7 @@ class Solver:
             us = np.clip(us, *problem.control_limits)
         xs = problem.states0 if states is None and controls is None else states
         if xs is not None:
-            xs = problem.check_states("ilqr(states=...)", xs)
+            xs = self.horizon.states("ilqr(states=...)", problem.check_states("ilqr(states=...)", xs))
             self.continuation.start(Iterate(xs, us, None, *self.objective.evaluate(xs, us)), None)
             return Status.SOLVED, ""
         idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us, None, np.inf, np.inf)
@@ -102,10 +113,12 @@ class Solver:
 
         Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
         few times; after that the solve ends, where it used to repeat failed line searches up to its iteration limit.
+        It ends, too, when updates in a row no longer bring the violation down.
         """
         options = self.options
         last = len(options.stages) - 1
         index, softened = self.continuation.first_stage(options.stages), 0
+        least, stalled = np.inf, 0
         for _ in range(last + options.max_updates + 1):
             status = self._stage(options.stages[index], options.bisections)
             if status == Status.SIMULATION_FAILED and index < last:
@@ -115,9 +128,13 @@ class Solver:
                 return status
             now = self.continuation.now
             if index == last:
-                met = self.objective.mismatch(now.x, now.u) <= options.violation
-                if met and now.gap <= options.gap:
+                mismatch = self.objective.mismatch(now.x, now.u)
+                if mismatch <= options.violation and now.gap <= options.gap:
                     return status
+                stalled = 0 if mismatch < _LESS * least else stalled + 1
+                least = min(least, mismatch)
+                if stalled >= _STALLED:
+                    return Status.INFEASIBLE
                 if status == Status.LINE_SEARCH and last > 0:
                     if softened >= _SOFTEN:
                         return status
@@ -142,16 +159,18 @@ class Solver:
 
     def _plan(self, status: Status, detail: str) -> Plan:
         """What was reached, made consistent at the last smoothing, with the gains that belong to it."""
-        continuation, options = self.continuation, self.options
+        continuation, journal, options = self.continuation, self.continuation.journal, self.options
         if status != Status.SIMULATION_FAILED:
             continuation.finish(options.stages[-1])
-        now = continuation.now
+        now, stride = continuation.now, self.descent.stride
+        if stride is not None and status == Status.SOLVED and not self.descent.repeat(now):
+            detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
         violation = self.objective.violation(now.x, now.u)
         plan = Plan(
             success=status == Status.SOLVED,
             status=status,
             message=MESSAGES[status] + detail,
-            nit=len(continuation.history),
+            nit=len(journal.records),
             fun=now.cost,
             x=now.x,
             u=now.u,
@@ -159,10 +178,11 @@ class Solver:
             k=self.descent.k.copy(),
             violation=violation,
             gap=now.gap,
-            seconds=time.perf_counter() - continuation.begin,
+            seconds=time.perf_counter() - journal.begin,
             time_step=float(self.problem.sim.time_step),
             substeps=self.problem.substeps,
-            history=continuation.history,
+            stride=stride,
+            history=journal.records,
             multipliers=[term.slope.copy() for term in self.objective.constraints],
             penalties=[2.0 * term.weight for term in self.objective.constraints],
             problem=self.problem,

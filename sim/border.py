@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim.calls import Calls
 from sim.mechanism import Mechanism
+from sim.policy import Policy
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,8 @@ class Border:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        rows = [np.ascontiguousarray(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
+        # copies: what broadcast_to returns is read-only, and kernels would be compiled once more for it
+        rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
@@ -72,11 +74,9 @@ class Border:
         """A positive kappa, or None for that of the simulator."""
         return None if kappa is None else checks.number(f"Simulator.{method}(kappa=...)", kappa, above=0.0)
 
-    def policy(
-        self, call: str, start: Floats, knots: int, parts: tuple[ArrayLike | None, ...]
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        """(xs, ks, Ks, gaps) of a policy; zero where left out, and the states then `start` throughout."""
-        ndx = self._calls.ndx
+    def policy(self, call: str, start: Floats, us: Floats, parts: tuple[ArrayLike | None, ...]) -> Policy:
+        """Policy around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
+        ndx, knots = self._calls.ndx, len(us)
         shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
         xs, ks, Ks, gaps = (
             np.zeros(shape) if part is None else checks.array(f"{call}({name}=...)", part, shape)
@@ -86,7 +86,7 @@ class Border:
             if parts[2] is not None:
                 raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
             xs[:] = start
-        return self.states(f"{call}(xs=...)", xs), ks, Ks, gaps
+        return Policy(self.states(f"{call}(xs=...)", xs), us, ks, Ks, gaps, *self._calls.unknown)
 
     def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
         """(lower, upper) of every input, infinite where free."""

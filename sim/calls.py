@@ -20,11 +20,12 @@ from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
 from sim.build import bind
 from sim.layout import allocate_work, sizes_of, table
 from sim.model import Integers, Model, Vector
+from sim.policy import Path, Policy, closed_loop
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-REPORT, CONTACT = 5, 8
+REPORT, CONTACT, CONE, BOUND = 5, 8, 12, 2  # numbers of a step, or of one of its contacts or limits
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 _CHUNKS = 4  # per core: evens out knots that take longer
 
@@ -53,6 +54,16 @@ class Calls:
         self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
         bind(model)  # addresses are those of this process
         self._model = table(model)
+        # what a policy need not know: derivatives and cone variables of its steps
+        self.unknown = tuple(
+            np.empty((0, *shape))
+            for shape in (
+                (self.ndx, self.ndx),
+                (self.ndx, self.nu),
+                (self.sizes.ncontact, CONE),
+                (self.sizes.nlimit, BOUND),
+            )
+        )
         self._scratch = threading.local()
 
     def __getstate__(self) -> tuple[Model, Settings]:
@@ -104,50 +115,56 @@ class Calls:
     def closed_loop(
         self,
         x: Vector,
-        us: Floats,
-        policy: tuple[Floats, Floats, Floats, Floats],
+        policy: Policy,
         alpha: float,
         limits: tuple[Floats, Floats],
         substeps: int,
         kappa: float | None,
-    ) -> tuple[int, Floats, Floats, Vector]:
-        """(number of solved knots, states, inputs, report of the last step); policy: xs, ks, Ks, gaps."""
-        xs, u_out, report = np.zeros((len(us) + 1, self.nx)), np.zeros((len(us), self.nu)), np.zeros(REPORT)
-        settings = self.settings.array(kappa)
-        knot = rollout.closed_loop(
-            self._model,
-            self._work(),
-            settings,
-            x,
-            us,
-            policy,
-            alpha,
-            limits,
-            substeps,
-            xs,
-            u_out,
-            report,
-            self.hard,
-            self.smooth,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
+        knots = len(policy.us)
+        kept = knots if keep else 0
+        path = Path(
+            np.empty((knots + 1, self.nx)),
+            np.empty((knots, self.nu)),
+            np.empty((kept, self.sizes.ncontact, CONE)),
+            np.empty((kept, self.sizes.nlimit, BOUND)),
+            np.zeros(REPORT),
         )
-        if knot < len(us):
-            np.nan_to_num(report, copy=False, nan=np.inf, posinf=np.inf)
-        return int(knot), xs, u_out, report
+        settings, how = self.settings.array(kappa), (self.hard, self.smooth)
+        knot = closed_loop(self._model, self._work(), settings, x, policy, alpha, limits, substeps, path, *how)
+        if knot < knots:
+            np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
+        return int(knot), path
 
-    def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
-        """(A, B, next states, report of every knot) of all knots; in parallel where that pays."""
+    def linearize(
+        self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
+    ) -> tuple[Floats, ...]:
+        """(A, B, next states, report of every knot) of all knots; in parallel where that pays.
+
+        guess: (T, nx) next states to start from, the states themselves when left out.
+        """
         n = len(us)
-        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
-        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
+        x_next, reports = np.empty((n, self.nx)), np.zeros((n, REPORT))
+        if guess is not None:
+            x_next[:] = guess
+        else:
+            x_next[: len(xs) - 1] = xs[1 : n + 1]
+            if len(xs) == n:
+                x_next[-1:] = xs[-1:]
         line = rollout.Linearized(xs, us, A, B, x_next, reports)
         settings, how = self.settings.array(kappa), (self.hard, self.smooth)
         if n * substeps * self.ndx < _WORTH_THREADS:
             rollout.linearize(self._model, self._work(), settings, (0, n), substeps, line, *how)
         else:
             rollout.linearize_knots(self._model, self._chunks(n), settings, substeps, line, *how)
-        unsolved = reports[:, 0] != Status.SOLVED
-        for array in (A, B, x_next):
-            array[unsolved] = 0.0
+        if reports[:, 0].any():
+            unsolved = reports[:, 0] != Status.SOLVED
+            for array in (A, B, x_next):
+                array[unsolved] = 0.0
         return A, B, x_next, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:

@@ -1,4 +1,4 @@
-"""Whole horizons, where Python enters compiled code: rollouts, feedback rollouts, linearizations, batches.
+"""Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
@@ -17,7 +17,6 @@ from sim.gradients import gradient
 from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Guess, Integers, Matrix, Options, Vector, Work
-from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.jit import kernel, parallel_kernel, prange
 from solvers.record import Table
@@ -31,16 +30,17 @@ Cube = Matrix  # (n, rows, columns)
 class Linearized(NamedTuple):
     """Knots of a trajectory, and what their linearization fills in."""
 
-    xs: Matrix  # (T, nx) or (T + 1, nx) states, in; the next one is where a step of a knot starts to look
+    xs: Matrix  # (T, nx) or (T + 1, nx) states, in
     us: Matrix  # (T, nu) inputs, in
     A: Cube  # (T, ndx, ndx)
     B: Cube  # (T, ndx, nu)
-    x_next: Matrix  # (T, nx)
+    x_next: Matrix  # (T, nx), in: where the steps of one-step knots start to look for their velocities
     reports: Matrix  # (T, 5)
 
 
 @kernel
-def _options(settings: Vector) -> Options:
+def options_of(settings: Vector) -> Options:
+    """Options of a step."""
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 
@@ -63,7 +63,7 @@ def roll(
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = _options(settings)
+    options = options_of(settings)
     nq = work.theta1.shape[0]
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
@@ -75,66 +75,6 @@ def roll(
             return t
         if hard is not None:
             report_contacts(model, work, contacts[t])
-    return us.shape[0]
-
-
-@kernel
-def closed_loop(
-    model_at: Table,
-    work_at: Table,
-    settings: Vector,
-    x: Vector,
-    us: Matrix,
-    policy: tuple[Matrix, Matrix, Cube, Matrix],
-    alpha: float,
-    limits: tuple[Vector, Vector],
-    substeps: int,
-    xs: Matrix,
-    u_out: Matrix,
-    report: Vector,
-    hard: int | None,
-    smooth: int | None,
-) -> int:
-    """Rollout under the policy (xs_ref, k, K, gaps) of a backward pass; returns the number of solved knots.
-
-        u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_ref_t))
-        x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1        gap_t+1 = f(xs_ref_t, us_t) (-) xs_ref_t+1
-
-    us, u_out: (T, nu); xs, xs_ref: (T + 1, nx); k: (T, nu); K: (T, nu, ndx); gaps: (T + 1, ndx).
-    """
-    model = model_view(model_at)
-    work = work_view(work_at)
-    options = _options(settings)
-    nq = work.theta1.shape[0]
-    xs_ref, ks, Ks, gaps = policy
-    low, high = limits
-    ndx = gaps.shape[1]
-    dx = work.chain[0]
-    for k in range(x.shape[0]):
-        xs[0, k] = x[k]
-    for t in range(us.shape[0]):
-        state_difference(model, xs_ref[t], xs[t], dx[:ndx])
-        for j in range(us.shape[1]):
-            f = us[t, j] + alpha * ks[t, j]
-            K = Ks[t, j]
-            for k in range(ndx):
-                f += K[k] * dx[k]
-            u_out[t, j] = min(max(f, low[j]), high[j])
-        b = xs[t + 1]
-        for k in range(x.shape[0]):
-            b[k] = xs[t, k]
-        for s in range(substeps):
-            for k in range(x.shape[0]):
-                work.step_x[0, k] = b[k]
-            guess = Guess(xs_ref[t + 1, nq:] if substeps == 1 else work.step_x[0, nq:], t + s > 0)
-            if step(model, work, options, work.step_x[0], u_out[t], guess, b, report, hard, smooth) != _SOLVED:
-                return t
-        if alpha < 1.0:
-            for k in range(ndx):
-                dx[k] = (alpha - 1.0) * gaps[t + 1, k]
-            for k in range(x.shape[0]):
-                work.step_x[0, k] = b[k]
-            integrate_state(model, work.step_x[0], dx[:ndx], b)
     return us.shape[0]
 
 
@@ -180,7 +120,7 @@ def linearize(
     """Derivatives of the knots from knots[0] up to knots[1]: products of the derivatives of their steps."""
     model = model_view(model_at)
     work = work_view(work_at)
-    options = _options(settings)
+    options = options_of(settings)
     nq = work.theta1.shape[0]
     x = work.step_x[0]
     for t in range(knots[0], knots[1]):
@@ -188,13 +128,15 @@ def linearize(
         B = line.B[t]
         x_next = line.x_next[t]
         report = line.reports[t]
+        velocity = work.step_x[1, nq:]
+        for k in range(velocity.shape[0]):
+            velocity[k] = x_next[nq + k]
         for k in range(x.shape[0]):
             x_next[k] = line.xs[t, k]
         for s in range(substeps):
             for k in range(x.shape[0]):
                 x[k] = x_next[k]
-            known = substeps == 1 and t + 1 < line.xs.shape[0]
-            guess = Guess(line.xs[t + 1, nq:] if known else x[nq:], s > 0)
+            guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
             if step(model, work, options, x, line.us[t], guess, x_next, report, hard, smooth) != _SOLVED:
                 break
             Js = A if s == 0 else work.step_A
@@ -238,7 +180,7 @@ def _roll_one(
     """A rollout that keeps its states only: (status, number of solved steps)."""
     model = model_view(model_at)
     work = work_view(work_at)
-    options = _options(settings)
+    options = options_of(settings)
     nq = work.theta1.shape[0]
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]

@@ -12,6 +12,7 @@ from sim import checks
 from sim.border import whole
 from sim.calls import Settings
 from sim.describe import describe
+from sim.horizon import Horizon
 from sim.mechanism import Mechanism, with_contacts
 from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
 from sim.states import States
@@ -163,16 +164,15 @@ class Simulator(States):
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
         name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
-        knot, x_out, u_out, report = self._calls.closed_loop(
+        knot, path = self._calls.closed_loop(
             state,
-            inputs,
-            self._border.policy(name, state, len(inputs), (xs, ks, Ks, gaps)),
+            self._border.policy(name, state, inputs, (xs, ks, Ks, gaps)),
             factor,
             self._border.limits(name, limits),
             whole(f"{name}(substeps=...)", substeps),
             self._border.kappa(call, kappa),
         )
-        return Shot(x_out[: knot + 1], u_out[:knot], Status(int(report[0])), knot, float(report[2]))
+        return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
     # ---- derivatives
 
@@ -206,3 +206,14 @@ class Simulator(States):
         level = self._border.kappa("linearize_trajectory", kappa)
         A, B, x_next, reports = self._calls.linearize(states, inputs, steps, level)
         return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))
+
+    def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
+        """Rollouts and derivatives of trajectories of so many knots, for a planner: see `sim.horizon`."""
+        call = "Simulator.horizon"
+        return Horizon(
+            self._calls,
+            self._border,
+            whole(f"{call}(knots=...)", knots),
+            whole(f"{call}(substeps=...)", substeps),
+            self._border.limits(call, limits),
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.dense import cholesky, cholesky_solve
+from solvers.dense import cholesky, cholesky_solve, dot
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -24,26 +24,28 @@ def _value(H: Matrix, g: Vector, x: Vector) -> float:
     """1/2 x^T H x + g^T x"""
     total = 0.0
     for i in range(x.shape[0]):
-        row = 0.0
-        for j in range(x.shape[0]):
-            row += H[i, j] * x[j]
-        total += x[i] * (0.5 * row + g[i])
+        total += x[i] * (0.5 * dot(H[i], x) + g[i])
     return total
 
 
 @kernel
-def _find_free(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, gradient: Vector, free: Integers) -> int:
-    """gradient = H x + g; free = indices whose bound does not hold x against the gradient; returns their number."""
+def _find_free(
+    H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, gradient: Vector, free: Integers
+) -> tuple[int, bool]:
+    """gradient = H x + g; free = indices whose bound does not hold x against the gradient.
+
+    Returns their number, and whether `free` held the same as far as they go.
+    """
     count = 0
+    same = True
     for i in range(x.shape[0]):
-        total = g[i]
-        for j in range(x.shape[0]):
-            total += H[i, j] * x[j]
+        total = g[i] + dot(H[i], x)
         gradient[i] = total
         if (x[i] > lo[i] or total < 0.0) and (x[i] < hi[i] or total > 0.0):
+            same = same and free[count] == i
             free[count] = i
             count += 1
-    return count
+    return count, same
 
 
 @kernel
@@ -102,10 +104,13 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
     trial = work[2 * n * n + 2 * n : 2 * n * n + 3 * n]
     for i in range(n):
         x[i] = min(max(x[i], lo[i]), hi[i])
+    nfactored = -1
     for _ in range(_MAX_ITERATIONS):
-        nfree = _find_free(H, g, lo, hi, x, gradient, free)
-        if not factor_free(H, free, nfree, sub, work):
-            return Status.SINGULAR, nfree
+        nfree, same = _find_free(H, g, lo, hi, x, gradient, free)
+        if nfree != nfactored or not same:
+            if not factor_free(H, free, nfree, sub, work):
+                return Status.SINGULAR, nfree
+            nfactored = nfree
         size, scale = 0.0, 0.0
         for i in range(nfree):
             f = free[i]

@@ -1,7 +1,7 @@
 """Small dense linear algebra in loops, without allocation.
 
 All matrices are C-ordered. The inner loop always runs along a row, so that it vectorises without reordering a sum, and
-products take four terms of the sum at a time, so that each result is loaded and stored a quarter as often.
+products take four terms of the sums of four rows at a time, so that each number is loaded and stored less often.
 """
 
 from __future__ import annotations
@@ -18,51 +18,65 @@ Matrix = NDArray[np.float64]
 
 
 @kernel
+def copy(A: Matrix, out: Matrix) -> None:
+    """out = A"""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[i, j] = A[i, j]
+
+
+@kernel
 def dot(a: Vector, b: Vector) -> float:
-    """a . b"""
-    total = 0.0
-    for i in range(a.shape[0]):
-        total += a[i] * b[i]
-    return total
+    """a . b, as four sums, which vectorise."""
+    n = a.shape[0]
+    whole = n - n % 4
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, whole, 4):
+        s0 += a[i] * b[i]
+        s1 += a[i + 1] * b[i + 1]
+        s2 += a[i + 2] * b[i + 2]
+        s3 += a[i + 3] * b[i + 3]
+    for i in range(whole, n):
+        s0 += a[i] * b[i]
+    return (s0 + s1) + (s2 + s3)
 
 
 @kernel
-def mul(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out = A B"""
-    n, p = A.shape
-    m = B.shape[1]
-    whole = p - p % 4
-    for i in range(n):
-        for j in range(m):
-            out[i, j] = 0.0
-        for k in range(0, whole, 4):
-            a0, a1, a2, a3 = A[i, k], A[i, k + 1], A[i, k + 2], A[i, k + 3]
-            for j in range(m):
-                out[i, j] += a0 * B[k, j] + a1 * B[k + 1, j] + a2 * B[k + 2, j] + a3 * B[k + 3, j]
-        for k in range(whole, p):
-            a0 = A[i, k]
-            for j in range(m):
-                out[i, j] += a0 * B[k, j]
+def axpy(a: float, x: Vector, y: Vector) -> None:
+    """y += a x"""
+    for i in range(x.shape[0]):
+        y[i] += a * x[i]
 
 
 @kernel
-def add_mul_tn_symmetric(A: Matrix, B: Matrix, out: Matrix) -> None:
-    """out += A^T B where the sum is known to be symmetric: the upper triangle is computed and mirrored."""
-    p = A.shape[0]
-    n = out.shape[0]
-    whole = p - p % 4
-    for i in range(n):
+def add_mul_tn(A: Matrix, B: Matrix, out: Matrix, symmetric: bool) -> None:
+    """out += A^T B by blocks of 4 x 4; of a symmetric sum the upper triangle is computed and mirrored."""
+    p, m = A.shape
+    rows, whole = m - m % 4, p - p % 4
+    for i in range(0, rows, 4):
+        # rows as arrays of their own, counted from 0: an index that might be negative does not vectorise
+        first = i if symmetric else 0
+        y0, y1, y2, y3 = out[i, first:], out[i + 1, first:], out[i + 2, first:], out[i + 3, first:]
         for k in range(0, whole, 4):
+            x0, x1, x2, x3 = B[k, first:], B[k + 1, first:], B[k + 2, first:], B[k + 3, first:]
             a0, a1, a2, a3 = A[k, i], A[k + 1, i], A[k + 2, i], A[k + 3, i]
-            for j in range(i, n):
-                out[i, j] += a0 * B[k, j] + a1 * B[k + 1, j] + a2 * B[k + 2, j] + a3 * B[k + 3, j]
-        for k in range(whole, p):
-            a0 = A[k, i]
-            for j in range(i, n):
-                out[i, j] += a0 * B[k, j]
-    for i in range(n):
-        for j in range(i):
-            out[i, j] = out[j, i]
+            b0, b1, b2, b3 = A[k, i + 1], A[k + 1, i + 1], A[k + 2, i + 1], A[k + 3, i + 1]
+            c0, c1, c2, c3 = A[k, i + 2], A[k + 1, i + 2], A[k + 2, i + 2], A[k + 3, i + 2]
+            d0, d1, d2, d3 = A[k, i + 3], A[k + 1, i + 3], A[k + 2, i + 3], A[k + 3, i + 3]
+            for j in range(y0.shape[0]):
+                e0, e1, e2, e3 = x0[j], x1[j], x2[j], x3[j]
+                y0[j] += a0 * e0 + a1 * e1 + a2 * e2 + a3 * e3
+                y1[j] += b0 * e0 + b1 * e1 + b2 * e2 + b3 * e3
+                y2[j] += c0 * e0 + c1 * e1 + c2 * e2 + c3 * e3
+                y3[j] += d0 * e0 + d1 * e1 + d2 * e2 + d3 * e3
+    for i in range(m):
+        first = i if symmetric else 0
+        for k in range(whole if i < rows else 0, p):
+            axpy(A[k, i], B[k, first:], out[i, first:])
+    if symmetric:
+        for i in range(m):
+            for j in range(i):
+                out[i, j] = out[j, i]
 
 
 @kernel

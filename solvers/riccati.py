@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
-from solvers.dense import add_mul_tn_symmetric, cholesky_solve, dot, mul
+from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
 from solvers.jit import kernel
 from solvers.status import Status
 
@@ -59,7 +59,12 @@ class Promise(NamedTuple):
 def work_size(n: int, m: int) -> int:
     """Floats of scratch that `backward` needs."""
     p = n + m
-    return n * n + n + 2 * n * p + p * p + 2 * p + m * m + 2 * n * m + m + n + 2 * m * m + 3 * m
+    return n * n + 2 * n * p + p * p + 5 * m * n + m * m + 2 * n + 3 * p + m + 2 * m * m + 3 * m
+
+
+def value_hessian(buffer: Vector, n: int) -> Matrix:
+    """(n, n) Hessian of the value at the first knot, from the scratch of the last `backward`."""
+    return buffer[: n * n].reshape((n, n))
 
 
 @kernel
@@ -68,20 +73,24 @@ def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: M
     n = v.shape[0]
     F, VF = FV[0], FV[1]
     for i in range(n):
+        a, b, f, fb, vf = quad.A[t, i], quad.B[t, i], F[i], F[i, n:], VF[i]
         for j in range(n):
-            F[i, j] = quad.A[t, i, j]
-            v[j] += V[i, j] * quad.gaps[t + 1, i]
-        for j in range(n, q.shape[0]):
-            F[i, j] = quad.B[t, i, j - n]
+            f[j] = a[j]
+        for j in range(b.shape[0]):
+            fb[j] = b[j]
+        for j in range(vf.shape[0]):
+            vf[j] = 0.0
+        if quad.gaps[t + 1, i] != 0.0:
+            axpy(quad.gaps[t + 1, i], V[i], v)
     for i in range(q.shape[0]):
         q[i] = quad.g[t, i]
+        h, out = quad.H[t, i], Q[i]
         for j in range(q.shape[0]):
-            Q[i, j] = quad.H[t, i, j]
-    mul(V, F, VF)
-    add_mul_tn_symmetric(F, VF, Q)
+            out[j] = h[j]
+    add_mul_tn(V, F, VF, False)
+    add_mul_tn(F, VF, Q, True)
     for i in range(n):
-        for j in range(q.shape[0]):
-            q[j] += v[i] * F[i, j]
+        axpy(v[i], F[i], q)
 
 
 @kernel
@@ -120,34 +129,35 @@ def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> 
 
 
 @kernel
-def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, W: Matrix, w: Vector, V: Matrix, v: Vector) -> None:
-    """V = Q_xx + K^T (Q_uu K + Q_ux) + Q_xu K and v = q_x + K^T (Q_uu k + q_u) + Q_xu k: exact for any gains."""
+def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, w: Vector, V: Matrix, v: Vector) -> None:
+    """V = Q_xx + K^T W + Q_xu K and v = q_x + K^T w + Q_xu k with W = Q_ux + Q_uu K, w = q_u + Q_uu k: exact for any
+    gains.   CD: (2, 2 m, n) scratch for (K, Q_ux) and (W, K), whose product is the change of Q_xx.
+    """
     m, n = K.shape
+    C, D = CD[0], CD[1]
     for r in range(m):
-        w[r] = q[n + r]
+        w[r] = q[n + r] + dot(Q[n + r, n:], k)
+        a, b = K[r], Q[n + r]
+        c, d, e, f = C[r], C[m + r], D[r], D[m + r]
         for j in range(n):
-            W[r, j] = Q[n + r, j]
-        for i in range(m):
-            a = Q[n + r, n + i]
-            w[r] += a * k[i]
-            for j in range(n):
-                W[r, j] += a * K[i, j]
+            c[j] = a[j]
+            f[j] = a[j]
+            d[j] = b[j]
+            e[j] = b[j]
+    add_mul_tn(Q[n:, n:], K, D[:m], False)
     for i in range(n):
         v[i] = q[i]
-        for j in range(i, n):
-            V[i, j] = Q[i, j]
-        for r in range(m):
-            a, b = K[r, i], Q[n + r, i]
-            v[i] += a * w[r] + b * k[r]
-            for j in range(i, n):
-                V[i, j] += a * W[r, j] + b * K[r, j]
-    for i in range(n):
-        for j in range(i):
-            V[i, j] = V[j, i]
+        a, b = V[i], Q[i]
+        for j in range(n):
+            a[j] = b[j]
+    for r in range(m):
+        axpy(w[r], K[r], v)
+        axpy(k[r], C[m + r], v)
+    add_mul_tn(C, D, V, True)
 
 
 @kernel
-def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, dx: Vector) -> tuple[float, float]:
+def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vector) -> tuple[float, float]:
     """(d0, d1) from the linear rollout of the full step."""
     T, m, n = K.shape
     d0, d1 = 0.0, 0.0
@@ -158,13 +168,16 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, dx: Vector) -> tup
             z[i] = dx[i]
         for i in range(m):
             z[n + i] = k[t, i] + dot(K[t, i], dx) if t < T else 0.0
-        d0 += dot(quad.g[t], z)
+        for i in range(n + m):
+            y[i] = 0.0
         for i in range(n + m):
             if z[i] != 0.0:
-                d1 += z[i] * dot(quad.H[t, i], z)
+                axpy(z[i], quad.H[t, i], y)
+        d0 += dot(quad.g[t], z)
+        d1 += dot(y, z)
         if t < T:
             for i in range(n):
-                dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], z) + dot(quad.B[t, i], z[n:])
+                dx[i] = quad.gaps[t + 1, i] + dot(quad.A[t, i], z[:n]) + dot(quad.B[t, i], z[n:])
     return d0, d1
 
 
@@ -179,14 +192,15 @@ def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: In
     a = n * n
     b = a + 2 * n * p
     c = b + p * p
-    d = c + 2 * m * n
-    e = d + m * m
-    f = e + 2 * n
-    h = f + 2 * p
+    d = c + m * n
+    e = d + 4 * m * n
+    f = e + m * m
+    h = f + 2 * n
     V, FV, Q = buffer[:a].reshape((n, n)), buffer[a:b].reshape((2, n, p)), buffer[b:c].reshape((p, p))
-    ZW, Huu = buffer[c:d].reshape((2, m, n)), buffer[d:e].reshape((m, m))
-    v, dx, q, z = buffer[e : e + n], buffer[e + n : f], buffer[f : f + p], buffer[f + p : h]
-    w, box = buffer[h : h + m], buffer[h + m :]
+    Z, CD = buffer[c:d].reshape((m, n)), buffer[d:e].reshape((2, 2 * m, n))
+    Huu, v, dx = buffer[e:f].reshape((m, m)), buffer[f : f + n], buffer[f + n : h]
+    q, z, y = buffer[h : h + p], buffer[h + p : h + 2 * p], buffer[h + 2 * p : h + 3 * p]
+    w, box = buffer[h + 3 * p : h + 3 * p + m], buffer[h + 3 * p + m :]
     for i in range(n):
         v[i] = quad.g[T, i]
         for j in range(n):
@@ -194,14 +208,14 @@ def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: In
     gradient = 0.0
     for t in range(T - 1, -1, -1):
         _action_value(quad, t, V, v, FV, Q, q)
-        _regularize(reg, FV[0], Q, Huu, ZW[0])
+        _regularize(reg, FV[0], Q, Huu, Z)
         status, nfree = box_qp(Huu, q[n:], quad.lo[t], quad.hi[t], k[t], free, box)
         if status != Status.SOLVED:
             return Promise(status, t, 0.0, 0.0, gradient)
         for i in range(nfree):
             gradient = max(gradient, abs(q[n + free[i]]))
-        _gains(ZW[0], free, nfree, box, K[t])
-        _value(K[t], k[t], Q, q, ZW[1], w, V, v)
-    d0, d1 = _predict(quad, K, k, z, dx)
+        _gains(Z, free, nfree, box, K[t])
+        _value(K[t], k[t], Q, q, CD, w, V, v)
+    d0, d1 = _predict(quad, K, k, z, y, dx)
     finite = abs(d0) < np.inf and abs(d1) < np.inf
     return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)

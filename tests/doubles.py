@@ -21,6 +21,14 @@ class Shot(NamedTuple):
     residual: float
 
 
+class Trial(NamedTuple):
+    x: Any
+    u: Any
+    status: Status
+    knot: int
+    steps: Any = None
+
+
 class Linearization(NamedTuple):
     A: Any
     B: Any
@@ -92,6 +100,9 @@ class System:
                 x[t + 1] = self.integrate(x[t + 1], (alpha - 1.0) * gaps[t + 1])
         return Shot(x, u, Status.SOLVED, T, 0.0)
 
+    def horizon(self, knots, substeps=1, limits=None):
+        return Horizon(self, substeps, limits)
+
     def linearize_trajectory(self, xs, us, substeps=1, kappa=None):
         T = len(us)
         A, B = np.zeros((T, self.ndx, self.ndx)), np.zeros((T, self.ndx, self.nu))
@@ -113,6 +124,29 @@ class System:
                     plus, minus = (self.advance(*shift(s), substeps, kappa) for s in (step, -step))
                     out[:, i] = (self.difference(plus, center) - self.difference(minus, center)) / (2 * eps)
         return Linearization(A, B, x_next, status)
+
+
+class Horizon:
+    """The interface of `sim.horizon.Horizon` around a system, which learns nothing from the steps before."""
+
+    def __init__(self, system, substeps, limits):
+        self.system, self.substeps, self.limits = system, substeps, limits
+
+    def states(self, call, xs):
+        return np.array(xs)
+
+    def roll(self, x0, xs, us, kappa, *, k=None, K=None, gaps=None, alpha=1.0, linear=None, steps=None):
+        gaps = gaps if alpha < 1.0 else None
+        shot = self.system.closed_loop(x0, us, xs, k, K, gaps, alpha, self.limits, self.substeps, kappa)
+        return Trial(shot.x, shot.u, shot.status, shot.knot)
+
+    def linearize(self, xs, us, kappa, guess=None):
+        return self.system.linearize_trajectory(xs, us, self.substeps, kappa)
+
+    def gaps(self, linear, xs):
+        gaps = np.zeros((len(xs), self.system.ndx))
+        gaps[1:] = self.system.difference(linear.x_next, xs[1:])
+        return gaps
 
 
 class DoubleIntegrator(System):

@@ -161,7 +161,7 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = self._ahead(now)
+        start = self._solver.horizon.states("MPC(x)", self._ahead(now))
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
@@ -179,7 +179,7 @@ class MPC:
         else:
             continuation.start(guess, kappa)
             status = continuation.run(solver.options.stages[0])
-        history = continuation.history
+        history = continuation.journal.records
         alpha = history[-1]["alpha"] if history else 1.0
         taken = status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT) and self._usable()
         rolled = not taken and status in (Status.SOLVED, Status.LINE_SEARCH) and self._roll()
@@ -205,7 +205,7 @@ class MPC:
 
     def _usable(self) -> bool:
         """Whether the present iterate is a trajectory of the model, up to what a short step leaves open."""
-        now, history = self._solver.continuation.now, self._solver.continuation.history
+        now, history = self._solver.continuation.now, self._solver.continuation.journal.records
         moved = any(record["alpha"] > 0.0 for record in history)
         return bool(np.isfinite(now.merit)) and (moved or now.gaps is None)
 

@@ -14,8 +14,8 @@ from solvers.status import Status
 
 Vector = NDArray[np.float64]
 
-# penalties that grew with every tick would never stop
-_OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6)
+# penalties that grew with every tick would never stop; a second line search would take its time
+_OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
 GUESSES = ("states", "feedback", "open loop")
 
 __all__ = ["GUESSES", "Settings", "Tick", "milliseconds"]

@@ -14,6 +14,7 @@ from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.planner import Solver, ilqr
 from dojo_opt.problem import Problem
+from dojo_opt.shooting import Shooting
 from solvers.status import MESSAGES, Status
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
@@ -23,9 +24,9 @@ def lqr(horizon=30, **settings):
     return Problem(DoubleIntegrator(), [1.0, 0.0], horizon, cost=[Tracking(np.zeros(2), 1.0), Effort(0.1)], **settings)
 
 
-def swingup(**settings):
+def swingup(sim=None, **settings):
     up = np.array([np.pi, 0.0])
-    return Problem(Pendulum(), np.zeros(2), 30, cost=[Tracking(up, 0.1), Effort(0.01)], **settings)
+    return Problem(sim or Pendulum(), np.zeros(2), 30, cost=[Tracking(up, 0.1), Effort(0.01)], **settings)
 
 
 def gaps(problem, plan, kappa):
@@ -374,3 +375,48 @@ def test_a_good_guess_of_states_skips_the_smooth_stages():
     poor = ilqr(problem, controls=plan.u, states=np.tile([1.0, 0.0], (21, 1)))
     assert poor.history[0]["kappa_eval"] == 3e-2
     assert again.success and poor.success
+
+
+# multiple shooting
+
+
+def test_a_step_of_all_states_solves_a_linear_problem():
+    problem = lqr()
+    solver = Solver(problem, Options(stages=ONE_STAGE))
+    solver.solve()  # makes buffers belong to the problem
+    solver.continuation.reset()
+    solver.descent.reset()
+    solver._guess(None, np.zeros_like(solver.continuation.now.x))
+    solver.continuation._enter(ONE_STAGE[0])
+    now = solver.continuation.now
+    assert now.gaps is not None
+    solver.descent.linearize(now, 1e-4, 1e-4)
+    promise = solver.descent.gains(now)
+    shooting = Shooting(problem, solver.horizon, solver.objective, solver.options)
+    alpha, there, linear = shooting.search(
+        now, promise, solver.descent.linear, (solver.descent.k, solver.descent.K, None), 1e-4
+    )
+    assert alpha == 1.0 and there.gap < 1e-9
+    np.testing.assert_allclose(there.x, ilqr(problem).x, atol=1e-7)
+    np.testing.assert_allclose(linear.x_next, there.x[1:], atol=1e-9)
+
+
+class Lost(Pendulum):
+    """Its rollouts fail, the first so many of them."""
+
+    lost = 14
+
+    def closed_loop(self, x0, us, *rest):
+        self.lost -= 1
+        shot = super().closed_loop(x0, us, *rest)
+        return shot if self.lost < 0 else shot._replace(status=Status.MAX_ITERATIONS)
+
+
+def test_steps_of_all_states_are_taken_where_rollouts_are_lost():
+    states = np.linspace([0.0, 0.0], [np.pi, 0.0], 31)
+    with_shooting, without = (
+        ilqr(swingup(Lost()), states=states, stages=ONE_STAGE, shooting=bar, rejections=3) for bar in (0.1, 0.0)
+    )
+    assert with_shooting.history[0]["alpha"] > 0.0 and with_shooting.history[0]["gap"] > 0.0
+    assert without.history[0]["alpha"] == 0.0
+    assert with_shooting.success and gaps(with_shooting.problem, with_shooting, 1e-4) < 1e-12

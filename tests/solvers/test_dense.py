@@ -8,27 +8,36 @@ from solvers import dense
 pytestmark = pytest.mark.kernel
 
 
-@pytest.mark.parametrize("n, p, m", [(1, 1, 1), (3, 4, 5), (7, 9, 2), (14, 14, 17)])
-def test_mul(n, p, m):
+@pytest.mark.parametrize("n, p, m", [(1, 1, 1), (3, 4, 5), (7, 9, 2), (14, 14, 17), (12, 8, 6)])
+def test_add_mul_tn(n, p, m):
     rng = np.random.default_rng(0)
-    A, B, out = rng.normal(size=(n, p)), rng.normal(size=(p, m)), np.full((n, m), np.nan)
-    dense.mul(A, B, out)
-    np.testing.assert_allclose(out, A @ B, rtol=1e-12, atol=1e-12)
+    A, B, start = rng.normal(size=(p, n)), rng.normal(size=(p, m)), rng.normal(size=(n, m))
+    out = start.copy()
+    dense.add_mul_tn(A, B, out, False)
+    np.testing.assert_allclose(out, start + A.T @ B, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("p, n", [(1, 1), (4, 3), (6, 7), (14, 17)])
+@pytest.mark.parametrize("p, n", [(1, 1), (4, 3), (6, 7), (14, 17), (8, 12)])
 def test_add_mul_tn_symmetric(p, n):
     rng = np.random.default_rng(1)
     A, S = rng.normal(size=(p, n)), rng.normal(size=(p, p))
     S, start = S + S.T, rng.normal(size=(n, n))
     start = start + start.T
     out = start.copy()
-    dense.add_mul_tn_symmetric(A, S @ A, out)
+    dense.add_mul_tn(A, S @ A, out, True)
     np.testing.assert_allclose(out, start + A.T @ S @ A, rtol=1e-12, atol=1e-12)
 
 
 def test_dot():
     assert dense.dot(np.array([1.0, 2.0]), np.array([3.0, -4.0])) == -5.0
+    assert dense.dot(np.arange(7.0), np.arange(7.0)) == 91.0
+
+
+def test_copy_and_axpy():
+    A, out = np.arange(6.0).reshape(2, 3), np.full((2, 3), np.nan)
+    dense.copy(A, out)
+    dense.axpy(2.0, A[0], out[1])
+    np.testing.assert_array_equal(out, [[0.0, 1.0, 2.0], [3.0, 6.0, 9.0]])
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 12])

@@ -1,0 +1,106 @@
+"""Horizon against the calls of Simulator: the same results, from better starts."""
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.05)
+T = 8
+
+
+def trajectory(kappa=1e-4):
+    rng = np.random.default_rng(0)
+    us = np.array([0.0, 0.0, 4.18 * 9.81]) + rng.normal(size=(T, 3))
+    return HOPPER.closed_loop(HOPPER.neutral(), us, kappa=kappa).x, us
+
+
+def gains():
+    rng = np.random.default_rng(1)
+    return rng.normal(size=(T, 3)), 0.1 * rng.normal(size=(T, 3, 14)), 1e-3 * rng.normal(size=(T + 1, 14))
+
+
+def counted(horizon, *given, **named):
+    """A rollout, and the Newton iterations that it took."""
+    calls, seen = horizon._calls.closed_loop, []
+
+    def count(*args, **more):
+        seen.append(calls(*args, **more))
+        return seen[-1]
+
+    horizon._calls.closed_loop = count
+    try:
+        return horizon.roll(*given, **named), seen[0][1].report[1]
+    finally:
+        del horizon._calls.closed_loop
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.5])
+def test_rollouts_are_those_of_the_simulator(alpha):
+    xs, us = trajectory()
+    k, K, gaps = gains()
+    horizon = HOPPER.horizon(T, limits=(-50.0, 50.0))
+    expected = HOPPER.closed_loop(
+        xs[0], us, xs=xs, ks=k, Ks=K, gaps=gaps, alpha=alpha, limits=(-50.0, 50.0), kappa=1e-4
+    )
+    near = horizon.roll(xs[0], xs, us, 1e-4)
+    np.testing.assert_allclose(near.x, xs, atol=1e-7)
+    linear = horizon.linearize(xs, us, 1e-4)
+    for known in ({}, {"linear": linear}, {"linear": linear, "steps": near.steps}):
+        trial = horizon.roll(xs[0], xs, us, 1e-4, k=k, K=K, gaps=gaps, alpha=alpha, **known)
+        assert trial.status == 0 and trial.knot == T
+        np.testing.assert_allclose(trial.x, expected.x, atol=1e-6)
+        np.testing.assert_allclose(trial.u, expected.u, atol=1e-4)
+
+
+def test_what_is_known_saves_iterations():
+    xs, us = trajectory()
+    horizon = HOPPER.horizon(T)
+    near, linear = horizon.roll(xs[0], xs, us, 1e-4), horizon.linearize(xs, us, 1e-4)
+    k = np.full((T, 3), 0.01)
+    _, alone = counted(horizon, xs[0], xs, us, 1e-4, k=k)
+    _, helped = counted(horizon, xs[0], xs, us, 1e-4, k=k, linear=linear, steps=near.steps)
+    assert helped <= 2 * T and helped < alone
+
+
+def test_a_rollout_of_no_change_takes_one_iteration_per_step():
+    xs, us = trajectory(1e-6)
+    horizon = HOPPER.horizon(T)
+    near = horizon.roll(xs[0], xs, us, 1e-6)
+    again, iterations = counted(horizon, xs[0], near.x, us, 1e-6, steps=near.steps)
+    assert iterations == T
+    np.testing.assert_allclose(again.x, near.x, atol=1e-8)
+
+
+def test_derivatives_and_gaps_are_those_of_the_simulator():
+    xs, us = trajectory()
+    horizon = HOPPER.horizon(T)
+    expected = HOPPER.linearize_trajectory(xs, us, kappa=1e-3)
+    for guess in (None, expected.x_next):
+        linear = horizon.linearize(xs, us, 1e-3, guess)
+        np.testing.assert_allclose(linear.A, expected.A, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(linear.B, expected.B, rtol=1e-5, atol=1e-6)
+    gaps = horizon.gaps(linear, xs)
+    assert not gaps[0].any()
+    np.testing.assert_allclose(gaps[1:], HOPPER.difference(linear.x_next, xs[1:]), atol=1e-12)
+
+
+def test_knots_of_several_steps():
+    xs, us = trajectory()
+    horizon = HOPPER.replace(time_step=0.01).horizon(T, substeps=5)
+    trial = horizon.roll(xs[0], xs, us, 1e-4)
+    shot = HOPPER.replace(time_step=0.01).closed_loop(xs[0], us, xs=xs, substeps=5, kappa=1e-4)
+    assert trial.steps is None
+    np.testing.assert_allclose(trial.x, shot.x, atol=1e-7)
+
+
+def test_states_are_checked_once():
+    xs, _ = trajectory()
+    horizon = HOPPER.horizon(T)
+    xs[2, 3:7] *= 1.0 + 1e-7
+    np.testing.assert_allclose(np.linalg.norm(horizon.states("call", xs)[:, 3:7], axis=1), 1.0, atol=1e-15)
+    xs[2, 3:7] *= 1.1
+    with pytest.raises(ValueError, match=r"ilqr\(states=...\): joint .* in row 2: expected a unit quaternion"):
+        horizon.states("ilqr(states=...)", xs)
+    with pytest.raises(ValueError, match=r"Simulator.horizon\(knots=...\): expected a whole number >= 1"):
+        HOPPER.horizon(0)
