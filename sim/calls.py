@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
+from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
 from sim.layout import allocate_work, sizes_of, table
 from sim.model import Integers, Model, Vector
 from solvers.status import Status
@@ -167,6 +167,19 @@ class Calls:
         x = np.concatenate([q, v])
         status = start.start_at(self._model, self._work(), self.settings.time_step, v, x)
         return int(status), x
+
+    def node_velocities(self, xs: Floats) -> Floats:
+        """Joint velocities at the node of every row, (n, nv)."""
+        out = np.zeros((len(xs), self.sizes.nv))
+        velocity.node_velocities(self._model, self._work(), self.settings.time_step, xs, out)
+        return out
+
+    def bodies(self, xs: Floats) -> Floats:
+        """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
+        nbody = self.sizes.nbody
+        out = np.zeros((len(xs) * nbody, 13))
+        velocity.body_states(self._model, self._work(), xs, out)
+        return out.reshape(len(xs), nbody, 13)
 
     def integrate(self, xs: Floats, dxs: Floats) -> Floats:
         """x (+) dx of every row."""

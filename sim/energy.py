@@ -99,12 +99,11 @@ def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
 
 
 @kernel
-def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
-    """p.M^-1 p / 2, with p = S2^T (momenta of the bodies) + springs and M = S2^T (inertia) S2 at configuration 2."""
-    node_momentum(model, work, h, x, work.wrench)
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    add_spring_momentum(model, h, x, work.residual)
+def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
+    """out = M^-1 p with M = S2^T (inertia) S2 at configuration 2 in `work`, O the origin of the world.
+
+    Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
+    """
     spatial_inertia(model, work, work.A)
     for d in range(work.S2.shape[0]):
         for k in range(6):
@@ -112,8 +111,26 @@ def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
     for i in range(work.joint_block.shape[0]):
         for k in range(36):
             work.joint_block[i, k] = 0.0
-    factor(model, work)
-    solve(model, work, work.residual, work.dnu)
+    if not factor(model, work):
+        return False
+    solve(model, work, p, out)
+    return True
+
+
+@kernel
+def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
+    """work.dnu = M^-1 p, with p = S2^T (momenta of the bodies) + springs left in work.residual."""
+    node_momentum(model, work, h, x, work.wrench)
+    subtree_sums(model, work.wrench, work.subtree)
+    project(model, work.S2, work.subtree, work.residual)
+    add_spring_momentum(model, h, x, work.residual)
+    return solve_mass_matrix(model, work, work.residual, work.dnu)
+
+
+@kernel
+def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
+    """p.M^-1 p / 2."""
+    node_velocity(model, work, h, x)
     energy = 0.0
     for d in range(work.dnu.shape[0]):
         energy += 0.5 * work.residual[d] * work.dnu[d]

@@ -54,6 +54,24 @@ class States:
             raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
         return x
 
+    def velocity(self, x: ArrayLike) -> Floats:
+        """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
+
+        They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node.
+        """
+        xs, lead = self._border.stacked("velocity", "x", x)
+        return self._calls.node_velocities(xs).reshape(*lead, self.nv)
+
+    def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """(nbody, 13) per body [position, velocity (world), quaternion, omega (body)] where the joints have the
+        coordinates q (nq,) and the velocities v (nv,) at this moment; leading axes are broadcast.
+
+        `maximal` has mean velocities over the last interval instead.
+        """
+        qs, vs, lead = self._border.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
+        xs = self._border.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
+        return self._calls.bodies(xs).reshape(*lead, self.nbody, 13)
+
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
         xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
