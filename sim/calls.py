@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
+from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
 from sim.build import bind
 from sim.layout import allocate_work, sizes_of, table
 from sim.model import Integers, Model, Vector
@@ -37,10 +37,11 @@ class Settings(NamedTuple):
     kappa: float  # central-path parameter [N s m]
     tolerance: float
     max_iterations: int
+    order: int = 2  # of a step
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given."""
-        return np.array(self if kappa is None else self._replace(kappa=kappa), dtype=np.float64)
+        """As kernels read it, at another kappa when given; without the order, which chooses the kernels."""
+        return np.array((self if kappa is None else self._replace(kappa=kappa))[:4], dtype=np.float64)
 
 
 class Calls:
@@ -186,6 +187,19 @@ class Calls:
         x = np.concatenate([q, v])
         status = start.start_at(self._model, self._work(), self.settings.time_step, v, x)
         return int(status), x
+
+    def node_velocities(self, xs: Floats) -> Floats:
+        """Joint velocities at the node of every row, (n, nv)."""
+        out = np.zeros((len(xs), self.sizes.nv))
+        velocity.node_velocities(self._model, self._work(), self.settings.time_step, xs, out)
+        return out
+
+    def bodies(self, xs: Floats) -> Floats:
+        """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
+        nbody = self.sizes.nbody
+        out = np.zeros((len(xs) * nbody, 13))
+        velocity.body_states(self._model, self._work(), xs, out)
+        return out.reshape(len(xs), nbody, 13)
 
     def integrate(self, xs: Floats, dxs: Floats) -> Floats:
         """x (+) dx of every row."""

@@ -76,14 +76,15 @@ def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
 
 @kernel
 def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
-    """out[i] = inertia of body i about the origin of the world, 6 x 6 row-major, at configuration 2:
+    """out[i] = inertia of body i about O, 6 x 6 row-major, at configuration 2:
 
     [ m I       -m [d]           ]
-    [ m [d]     J - m [d] [d]    ]       d: to the centre of mass
+    [ m [d]     J - m [d] [d]    ]       d: from O to the centre of mass
     """
     for i in range(model.body_parent.shape[0]):
         m = model.body_mass[i]
-        x, y, z = work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2]
+        o = work.origin
+        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
         s = x * x + y * y + z * z
         J = work.inertia_world[i]
         A = out[i]
@@ -111,19 +112,36 @@ def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
 
 
 @kernel
-def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
-    """p.M^-1 p / 2, p = S2^T (momenta of the bodies) + springs, M = S2^T (inertia) S2 + armature at configuration 2."""
-    node_momentum(model, work, h, x, work.wrench)
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    add_spring_momentum(model, h, x, work.residual)
+def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
+    """out = M^-1 p with M = S2^T (inertia) S2 + armature at configuration 2 in `work`.
+
+    Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
+    """
     spatial_inertia(model, work, work.A)
     for d in range(work.S2.shape[0]):
         for k in range(6):
             work.S3nu[d, k] = work.S2[d, k]
     armature_blocks(model, 1.0, work.joint_block)
-    factor(model, work)
-    solve(model, work, work.residual, work.dnu)
+    if not factor(model, work):
+        return False
+    solve(model, work, p, out)
+    return True
+
+
+@kernel
+def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
+    """work.dnu = M^-1 p, with p = S2^T (momenta of the bodies) + springs left in work.residual."""
+    node_momentum(model, work, h, x, work.wrench)
+    subtree_sums(model, work.wrench, work.subtree)
+    project(model, work.S2, work.subtree, work.residual)
+    add_spring_momentum(model, h, x, work.residual)
+    return solve_mass_matrix(model, work, work.residual, work.dnu)
+
+
+@kernel
+def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
+    """p.M^-1 p / 2."""
+    node_velocity(model, work, h, x)
     energy = 0.0
     for d in range(work.dnu.shape[0]):
         energy += 0.5 * work.residual[d] * work.dnu[d]

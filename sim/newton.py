@@ -27,6 +27,17 @@ def residual_scale(work: Work) -> float:
 
 
 @kernel
+def rounding(model: Model, work: Work, h: float) -> float:
+    """Residual that cannot be told from zero: momenta are differences of rounded positions, divided by h."""
+    total = 0.0
+    o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
+    for i in range(model.body_parent.shape[0]):
+        x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
+        total += model.body_mass[i] * x * (1.0 + x + o)
+    return 1e-15 * total / abs(h)
+
+
+@kernel
 def norm(x: Vector) -> float:
     """Largest absolute entry; NaN if any entry is NaN."""
     r = 0.0
@@ -45,6 +56,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     """
     h = options.h
     scale = residual_scale(work)
+    tolerance = options.tolerance + rounding(model, work, h) / scale
     for d in range(v.shape[0]):
         work.nu_trial[d] = guess.velocity[d]
         work.dnu[d] = 0.0
@@ -65,7 +77,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         project(model, work.S2, work.subtree, work.residual)
         joint_impulses(model, work, h, q, v, u)
         r = norm(work.residual) / scale
-        if not (inside and r < max(last, options.tolerance)):
+        if not (inside and r < max(last, tolerance)):
             if halvings > 40:
                 status = _NO_PROGRESS
                 break
@@ -75,7 +87,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
                     work.nu_trial[d] *= 0.7
             alpha *= 0.5
             continue
-        if r < options.tolerance:
+        if r < tolerance:
             status = _SOLVED
             break
         if iterations == options.max_iterations:

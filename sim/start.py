@@ -8,6 +8,7 @@ from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spat
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
+from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -24,12 +25,8 @@ _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> None:
     """out = M(q) v = S2^T (inertia (S2 v)) + I v, at the poses of configuration 2 in `work`.   out: (nv,)."""
     spatial_inertia(model, work, work.A)
+    joint_twists(model, work, v)
     for i in range(model.body_parent.shape[0]):
-        p = model.body_parent[i]
-        for k in range(6):
-            work.twist[i, k] = work.twist[p, k] if p >= 0 else 0.0
-            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                work.twist[i, k] += work.S2[d, k] * v[d]
         for r in range(6):
             f = 0.0
             for k in range(6):

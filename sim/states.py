@@ -12,10 +12,21 @@ from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls, Settings
 from sim.mechanism import Mechanism
+from sim.model import Model
 from sim.results import SimulationError
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
+
+
+def _composed(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
+    """Calls of a higher order; their module is imported by those who ask for it."""
+    from sim.composed import Composed, check
+
+    check(mechanism, settings)
+    calls = Composed(model, settings)
+    calls.check_dampers(mechanism)
+    return calls
 
 
 class States:
@@ -23,11 +34,11 @@ class States:
 
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
-        self.time_step, self.kappa, self.tolerance, self.max_iterations = settings
+        self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order = settings
         self.model = pack(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._calls = Calls(self.model, settings)
+        self._calls = Calls(self.model, settings) if self.order == 2 else _composed(self.model, mechanism, settings)
         self._border = Border(mechanism, self._calls)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -53,6 +64,24 @@ class States:
             reason = Status(status)
             raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
         return x
+
+    def velocity(self, x: ArrayLike) -> Floats:
+        """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
+
+        They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node.
+        """
+        xs, lead = self._border.stacked("velocity", "x", x)
+        return self._calls.node_velocities(xs).reshape(*lead, self.nv)
+
+    def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
+        """(nbody, 13) per body [position, velocity (world), quaternion, omega (body)] where the joints have the
+        coordinates q (nq,) and the velocities v (nv,) at this moment; leading axes are broadcast.
+
+        `maximal` has mean velocities over the last interval instead.
+        """
+        qs, vs, lead = self._border.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
+        xs = self._border.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
+        return self._calls.bodies(xs).reshape(*lead, self.nbody, 13)
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""

@@ -1,0 +1,23 @@
+"""Engines: simulators that studies run side by side on the same mechanism; peers appear where they are installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+
+from dojo_opt.report.engines.ours import Ours
+from dojo_opt.report.engines.run import Engine, Run
+
+__all__ = ["Engine", "Ours", "Run", "installed"]
+
+# package that has to be there -> module of this folder with `engines()`
+_PEERS = {"mujoco": "mujoco"}
+
+
+def installed() -> list[Engine]:
+    """One engine per integrator of every peer that can be imported here."""
+    peers: list[Engine] = []
+    for package, module in _PEERS.items():
+        if find_spec(package) is not None:
+            peers += import_module(f"dojo_opt.report.engines.{module}").engines()
+    return peers

@@ -1,0 +1,103 @@
+"""MuJoCo as an engine: one per integrator, on the same mechanism converted by mujoco_scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.report import mujoco_scene
+from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
+from sim.mechanism import Mechanism
+from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+INTEGRATORS = ("Euler", "implicitfast", "implicit", "discrete", "RK4")
+_LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
+
+
+@dataclass(frozen=True)
+class MuJoCo:
+    """One integrator, elliptic friction cones and MuJoCo's defaults otherwise.
+
+    options: attributes of MJCF's <option>, such as {"tolerance": "1e-10"}.
+    """
+
+    integrator: str
+    options: Mapping[str, str] = field(default_factory=dict)
+    rounds: int = 3  # a run shorter than a second is clocked so many times
+
+    @property
+    def name(self) -> str:
+        """As it stands in a table."""
+        return f"MuJoCo {self.integrator}"
+
+    def simulate(
+        self,
+        mechanism: Mechanism,
+        *,
+        time_step: float,
+        q: ArrayLike,
+        v: ArrayLike,
+        duration: float,
+        samples: int,
+        inputs: ArrayLike | None = None,
+    ) -> Run:
+        """As Engine.simulate. Held inputs are stepped inside MuJoCo, from sample to sample."""
+        import mujoco
+
+        marks = nodes(time_step, duration, samples)
+        u = held(mechanism, inputs, int(marks[-1]))
+        sim = Simulator(mechanism, time_step=time_step)
+        model = mujoco_scene.load(sim.model, time_step, integrator=self.integrator, **self.options)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a scene that is lost is not started again
+        start = np.concatenate([np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)])
+        data = mujoco_scene.state(model, start)
+        with _quiet(mujoco):
+            (xs, steps), seconds = clocked(lambda: _steps(mujoco, model, data, start, u, marks), self.rounds)
+        times = time_step * marks[: len(xs)].astype(np.float64)
+        message = "" if steps == marks[-1] else f"lost between {times[-1]:g} s and {time_step * steps:g} s"
+        return observe(sim, times, xs[:, : sim.nq], xs[:, sim.nq :], seconds, steps, message)
+
+
+def engines() -> list[MuJoCo]:
+    """All integrators."""
+    return [MuJoCo(integrator) for integrator in INTEGRATORS]
+
+
+def _steps(
+    mujoco: Any, model: Any, data: Any, start: Floats, u: Floats, marks: NDArray[np.int64]
+) -> tuple[Floats, int]:
+    """([q; v] at the marks, number of steps taken); stops at a sample that is not finite, and leaves it out."""
+    mujoco.mj_resetData(model, data)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = start[: model.nq], start[model.nq :], u[0]
+    xs = np.empty((len(marks), len(start)))
+    xs[0] = start
+    for k in range(1, len(marks)):
+        first, last = int(marks[k - 1]), int(marks[k])
+        if len(u) == 1:
+            mujoco.mj_step(model, data, last - first)
+        else:
+            for step in range(first, last):
+                data.ctrl[:] = u[step]
+                mujoco.mj_step(model, data)
+        xs[k, : model.nq], xs[k, model.nq :] = data.qpos, data.qvel
+        if not np.abs(xs[k]).max() < _LOST:
+            return xs[:k], last
+    return xs, int(marks[-1])
+
+
+@contextmanager
+def _quiet(mujoco: Any) -> Iterator[None]:
+    """Warnings of unstable scenes are dropped: MuJoCo would write them to a file where the user stands."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

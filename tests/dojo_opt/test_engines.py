@@ -1,0 +1,103 @@
+"""Engines: one protocol, the same motion, honest ends."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.report.engines import Engine, Ours, Run, installed
+from dojo_opt.report.engines.run import nodes
+
+ENGINES = [Ours(rounds=1), *installed()]
+SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]
+
+
+def swing(engine: Engine, time_step: float = 1e-3, duration: float = 0.5, samples: int = 5, **kwargs: object) -> Run:
+    mech = dojo.models.npendulum(2, spring=3.0)
+    return engine.simulate(
+        mech, time_step=time_step, q=[0.6, -0.4], v=[1.0, 2.0], duration=duration, samples=samples, **kwargs
+    )
+
+
+@pytest.mark.parametrize("engine", ENGINES, ids=lambda e: e.name)
+def test_a_run_has_the_shapes_it_promises(engine: Engine) -> None:
+    run = swing(engine)
+    np.testing.assert_allclose(run.time, np.linspace(0.0, 0.5, 6), atol=1e-12)
+    shapes = [run.position.shape, run.quaternion.shape, run.velocity.shape, run.energy.shape, run.momentum.shape]
+    assert shapes == [(6, 2, 3), (6, 2, 4), (6, 2, 6), (6,), (6, 6)]
+    assert run.steps == 500 and run.seconds > 0.0 and run.message == ""
+    np.testing.assert_allclose(run.energy, run.energy[0], atol=0.05)
+
+
+@pytest.mark.parametrize("engine", ENGINES, ids=lambda e: e.name)
+def test_the_start_is_the_same_for_all(engine: Engine) -> None:
+    """Poses, velocities, energy and momentum of the first sample, against the sums over the bodies by hand."""
+    run, first = swing(engine), swing(ENGINES[0])
+    for name in ("position", "quaternion", "velocity", "energy", "momentum"):
+        np.testing.assert_allclose(getattr(run, name)[0], getattr(first, name)[0], atol=1e-10, err_msg=name)
+    assert abs(first.velocity[0, 0, 3] - 1.0) < 1e-10 and abs(first.velocity[0, 1, 3] - 3.0) < 1e-10
+
+
+@pytest.mark.parametrize("engine", SECOND_ORDER, ids=lambda e: e.name)
+def test_velocity_is_the_derivative_of_position(engine: Engine) -> None:
+    run = swing(engine, duration=0.1, samples=100)
+    rate = (run.position[2:] - run.position[:-2]) / 2e-3
+    np.testing.assert_allclose(run.velocity[1:-1, :, :3], rate, atol=2e-4)
+
+
+def test_energy_of_a_run_is_that_of_the_simulator() -> None:
+    mech = dojo.models.quadruped(spring=5.0, limits=False)
+    sim = dojo.Simulator(mech, time_step=0.01)
+    rng = np.random.default_rng(2)
+    q, v = sim.neutral()[: sim.nq] + np.r_[0, 0, 2.0, np.zeros(16)], rng.normal(size=sim.nv)
+    x = sim.start(q, v)
+    run = Ours(rounds=1).simulate(mech, time_step=0.01, q=q, v=v, duration=0.02, samples=2)
+    trajectory = sim.rollout(x, np.zeros((2, sim.nu)))
+    np.testing.assert_allclose(run.energy, sim.energy(trajectory.x), rtol=1e-10)
+    np.testing.assert_allclose(run.momentum, np.hstack(sim.momentum(trajectory.x)), atol=1e-10)
+    np.testing.assert_allclose(sim.velocity(x), v, atol=1e-10)
+
+
+def test_inputs_are_held_or_given_step_by_step() -> None:
+    u = np.array([0.3, -0.2])
+    for engine in SECOND_ORDER:
+        once, each = swing(engine, inputs=u), swing(engine, inputs=np.tile(u, (500, 1)))
+        np.testing.assert_allclose(once.position, each.position, atol=1e-12)
+        assert np.abs(once.position - swing(engine).position).max() > 1e-3
+
+
+def test_a_run_that_is_lost_says_so_and_keeps_what_was_good() -> None:
+    mech = dojo.models.npendulum(2)
+    args = {"time_step": 0.1, "q": [1.0, 0.0], "duration": 1.0, "samples": 10}
+    ours = Ours().simulate(mech, v=[400.0, 0.0], **args)
+    assert len(ours.time) == 1 and "half a turn" in ours.message and ours.steps == 0
+    if find_spec("mujoco"):
+        euler = next(e for e in ENGINES if e.name == "MuJoCo Euler")
+        stiff = dojo.models.npendulum(2, spring=1e7)
+        run = euler.simulate(stiff, v=[5.0, 0.0], **args)
+        assert "lost between" in run.message
+        assert len(run.time) == len(run.energy) < 11 and np.isfinite(run.position).all()
+
+
+def test_nothing_is_written_where_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    test_a_run_that_is_lost_says_so_and_keeps_what_was_good()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_durations_samples_and_inputs_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ValueError, match="whole steps of 0.03 s, got 1 s"):
+        nodes(0.03, 1.0, 1)
+    with pytest.raises(ValueError, match="expected 1 to 10 samples"):
+        nodes(0.1, 1.0, 11)
+    with pytest.raises(ValueError, match=r"inputs \(2,\) or \(500, 2\), got \(1, 3\)"):
+        swing(ENGINES[0], inputs=[1.0, 2.0, 3.0])
+
+
+def test_peers_have_names_of_their_own() -> None:
+    names = [engine.name for engine in ENGINES]
+    assert len(set(names)) == len(names)
