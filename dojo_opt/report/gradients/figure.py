@@ -53,6 +53,9 @@ def _steps(axes: Any, measured: Mapping[str, Any]) -> None:
             axes.plot(x, y, marker, color=colour, label=label, alpha=0.75)
             best = min(own, key=lambda p: p.error)
             axes.annotate(f"eps {best.eps:.0e}", (best.microseconds, best.error), (4, -10), **_SMALL)
+    for p, marker in zip((p for p in points if one_step.AUTODIFF in p.method), "^D", strict=False):
+        label = p.method.replace(one_step.AUTODIFF, "AutoDiffXd")
+        axes.plot(p.microseconds, max(p.error, _LEAST), marker, color="C2", label=label)
     for method, face, label in ((one_step.IMPLICIT, "C3", "1e-8"), (one_step.TIGHTLY, "none", "1e-13")):
         own = [p for p in points if p.method == method]
         x, y = [p.microseconds for p in own], [max(p.error, _LEAST) for p in own]

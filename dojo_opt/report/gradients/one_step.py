@@ -29,12 +29,15 @@ MUJOCO_EPS = 1e-6  # what MuJoCo's documentation uses
 TIGHT = (
     1e-13  # tolerance of steps that are differenced: at 1e-8 neighbours stop at other iterations, and differ by that
 )
-_KNOTS = 50  # gradients per clocked call
-_BATCHES = 5  # Jacobians by differences per clocked call
+_KNOTS, _BATCHES, _CALLS = 50, 5, 10  # Jacobians per clocked call: ours and MuJoCo's, by differences of ours, Drake's
 
 IMPLICIT, TIGHTLY = "implicit", "implicit, solved to 1e-13"
 FORWARD, CENTRED = "differences, one-sided", "differences, centred"
+AUTODIFF = "AutoDiffXd, by the state alone"
 MUJOCO_FORWARD, MUJOCO_CENTRED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"
+
+
+Cases = dict[str, tuple[Callable[[], Any], int]]  # what is clocked, and how many Jacobians it computes
 
 
 class Scene(NamedTuple):
@@ -81,40 +84,47 @@ def scene_of(mechanism: Mechanism) -> Scene:
     return Scene(mechanism.name, sim, sim.neutral(), np.zeros(sim.nu), 50, "discrete")
 
 
-def measure(scene: Scene, rounds: int) -> tuple[list[Point], str]:
-    """All ways, and a note. MuJoCo's where it is installed and can represent the mechanism.
+def measure(scene: Scene, rounds: int) -> tuple[list[Point], list[str]]:
+    """All ways, and notes. Others' where they are installed and can represent the mechanism.
 
     SimulationError: the scene cannot be stepped.
     """
+    points, cases = _ours(scene)
+    notes = []
+    for name, package, peer in (("MuJoCo", "mujoco", _mujoco), ("Drake", "pydrake", _drake)):
+        if find_spec(package) is None:
+            continue
+        try:
+            found, clocked = peer(scene)
+        except ValueError as error:
+            notes.append(f"{scene.name}: without {name}: {error}")
+        else:
+            points += found
+            cases |= clocked
+    clocks = interleave({name: run for name, (run, _) in cases.items()}, rounds)
+    each = {name: 1e6 * float(np.median(s)) / cases[name][1] for name, s in clocks.items()}
+    return [p._replace(microseconds=each[f"{p.method} {p.kappa}"]) for p in points], notes
+
+
+def _ours(scene: Scene) -> tuple[list[Point], Cases]:
+    """The implicit function theorem at every kappa, differences at one."""
     x = scene.sim.rollout(scene.start, np.tile(scene.u, (scene.steps, 1)), throw=True).x[-1]
     hard = scene.sim.ncontact > 0 or len(scene.sim.model.limit_dof) > 0
-    kappas = KAPPAS if hard else (DIFFERENCED,)
     points: list[Point] = []
-    cases: dict[str, Callable[[], Any]] = {}
-    for kappa in kappas:
+    cases: Cases = {}
+    for kappa in KAPPAS if hard else (DIFFERENCED,):
         sim = scene.sim.replace(kappa=kappa)
         tight = sim.replace(tolerance=TIGHT)
         reference = extrapolated(Stepper(tight, x, scene.u).jacobian)
         for name, solved in ((IMPLICIT, sim), (TIGHTLY, tight)):
             error = relative_error(np.concatenate(solved.linearize(x, scene.u, kappa=kappa), axis=1), reference.value)
             points.append(Point(name, kappa, None, error, reference.doubt, np.nan))
-            cases[f"{name} {kappa}"] = _implicit(solved, x, scene.u)
+            cases[f"{name} {kappa}"] = _implicit(solved, x, scene.u), _KNOTS
         if kappa == DIFFERENCED:
             points += _differences(tight, x, scene.u, reference)
             for name, centred in ((FORWARD, False), (CENTRED, True)):
-                cases[f"{name} {kappa}"] = _batch(tight, x, scene.u, centred=centred)
-    note = ""
-    if find_spec("mujoco") is not None:
-        try:
-            found, clocked = _mujoco(scene)
-        except ValueError as error:
-            note = f"{scene.name}: without MuJoCo: {error}"
-        else:
-            points += found
-            cases |= clocked
-    seconds = {name: float(np.median(s)) for name, s in interleave(cases, rounds).items()}
-    points = [p._replace(microseconds=1e6 * seconds[f"{p.method} {p.kappa}"] / _calls(p.method)) for p in points]
-    return points, note
+                cases[f"{name} {kappa}"] = _batch(tight, x, scene.u, centred=centred), _BATCHES
+    return points, cases
 
 
 def smoothed(scene: Scene, kappas: Sequence[float] = KAPPAS) -> list[float]:
@@ -123,10 +133,6 @@ def smoothed(scene: Scene, kappas: Sequence[float] = KAPPAS) -> list[float]:
     sim = scene.sim.replace(tolerance=TIGHT)
     levels = [np.concatenate(sim.linearize(x, scene.u, kappa=kappa), axis=1) for kappa in (*kappas, 1e-2 * kappas[-1])]
     return [relative_error(level, levels[-1]) for level in levels[:-1]]
-
-
-def _calls(method: str) -> int:
-    return _BATCHES if method in (FORWARD, CENTRED) else _KNOTS
 
 
 def _differences(sim: Simulator, x: Vector, u: Vector, reference: Any) -> list[Point]:
@@ -150,7 +156,7 @@ def _batch(sim: Simulator, x: Vector, u: Vector, *, centred: bool) -> Callable[[
     return lambda: sim.rollout_batch(xs, us)
 
 
-def _mujoco(scene: Scene) -> tuple[list[Point], dict[str, Callable[[], Any]]]:
+def _mujoco(scene: Scene) -> tuple[list[Point], Cases]:
     """MuJoCo's own differences, against their own extrapolation with a solver that converges to round-off."""
     import mujoco
 
@@ -170,7 +176,7 @@ def _mujoco(scene: Scene) -> tuple[list[Point], dict[str, Callable[[], Any]]]:
     reference = extrapolated(lambda eps: jacobian(eps, True))
     model.opt.tolerance, model.opt.iterations = default
     points: list[Point] = []
-    cases: dict[str, Callable[[], Any]] = {}
+    cases: Cases = {}
     for name, centred in ((MUJOCO_FORWARD, False), (MUJOCO_CENTRED, True)):
         for eps in EPS:
             error = relative_error(jacobian(eps, centred), reference.value)
@@ -180,5 +186,26 @@ def _mujoco(scene: Scene) -> tuple[list[Point], dict[str, Callable[[], Any]]]:
             for _ in range(_KNOTS):
                 jacobian(MUJOCO_EPS, centred)
 
-        cases[f"{name} None"] = clocked
+        cases[f"{name} None"] = clocked, _KNOTS
+    return points, cases
+
+
+def _drake(scene: Scene) -> tuple[list[Point], Cases]:
+    """Drake's automatic differentiation, against the extrapolated differences of its update."""
+    from dojo_opt.report.gradients.drake_step import APPROXIMATIONS, DrakeStep
+
+    points: list[Point] = []
+    cases: Cases = {}
+    for approximation in APPROXIMATIONS:
+        step = DrakeStep(scene.sim.model, scene.sim.time_step, approximation)
+        step.settle(scene.start, scene.u, scene.steps)
+        jacobian, reference = step.autodiff(), step.reference()
+        name = f"Drake {approximation[1:]}, {AUTODIFF}"
+        points.append(Point(name, None, None, relative_error(jacobian(), reference.value), reference.doubt, np.nan))
+
+        def clocked(jacobian: Callable[[], Any] = jacobian) -> None:
+            for _ in range(_CALLS):
+                jacobian()
+
+        cases[f"{name} None"] = clocked, _CALLS
     return points, cases

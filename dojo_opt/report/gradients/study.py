@@ -67,9 +67,9 @@ class Gradients:
         given = one_step.scenes() if self.mechanism is None else [one_step.scene_of(self.mechanism)]
         measured: dict[str, Any] = {}
         for scene in given[-1:] if self.quick else given:
-            points, note = one_step.measure(scene, 3 if self.quick else 20)
+            points, notes = one_step.measure(scene, 3 if self.quick else 20)
             bias = one_step.smoothed(scene)
-            report.notes += [note] if note else []
+            report.notes += notes
             report.notes += [] if self.mechanism is None else _advice(scene.sim)
             for method, bar in ((one_step.TIGHTLY, EXACT), (one_step.IMPLICIT, None)):
                 worst = max(p.error for p in points if p.method == method)

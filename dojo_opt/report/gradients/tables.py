@@ -20,7 +20,8 @@ def step_table(scene: str, points: Sequence[Point], bias: Sequence[float]) -> Ta
     for p in points:
         if p.eps is None:
             of = smoothed.get(p.kappa or 0.0) if p.method == TIGHTLY else None
-            rows.append([f"{p.method}, kappa {p.kappa:g}", p.microseconds, p.error, None, of])
+            name = f"{p.method}, kappa {p.kappa:g}" if p.kappa else p.method
+            rows.append([name, p.microseconds, p.error, None, of])
     for method in dict.fromkeys(p.method for p in points if p.eps is not None):
         own = [p for p in points if p.method == method]
         best = min(own, key=lambda p: p.error if p.error == p.error else float("inf"))
@@ -30,6 +31,8 @@ def step_table(scene: str, points: Sequence[Point], bias: Sequence[float]) -> Ta
     note = "us: the step and its Jacobian. Errors are relative (Frobenius norm); the reference is good to "
     note += f"{max(p.doubt for p in points):.0e}. Steps are solved to 1e-8, "
     note += "those of differences of ours to 1e-13. "
+    if any("Drake" in p.method for p in points):
+        note += "Drake: in its own coordinates, called from Python. "
     note += f"Bias: from (A, B) at kappa {1e-2 * KAPPAS[-1]:g}, by our own step."
     header = ("", "us", "error", "best, at a step size of", "bias")
     return Table(f"(A, B) of one step: {scene}", header, rows, note)
