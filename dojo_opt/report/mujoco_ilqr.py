@@ -5,8 +5,9 @@ same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJo
 whose expansion is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C; backward pass
 and line search are NumPy. Multiple shooting with the gaps of FDDP, regularised Q_uu, augmented Lagrangian.
 
-What it does not do: soften contact on the way (MuJoCo's contact is as soft as its default solimp and solref make it),
-and control limits in the backward pass: inputs are clipped in the rollouts.
+What it does not do: soften contact on the way (MuJoCo's contact is as soft as its default solimp and solref make it,
+or, with `Settings.smooth`, switches on smoothly, as its manual proposes for derivatives), and control limits in the
+backward pass: inputs are clipped in the rollouts.
 
 Tassa, Mansard, Todorov 2014 (backward pass); Mastalli et al. 2020, "Crocoddyl" (gaps and their line search).
 """
@@ -22,6 +23,7 @@ from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
 from dojo_opt.report import mujoco_scene
+from dojo_opt.report.mujoco_warnings import quiet
 from sim.model import Matrix, Vector
 
 FD_STEP = 1e-6  # one-sided
@@ -31,59 +33,96 @@ ARMIJO, ASCENT, HALVINGS = 1e-2, 2.0, 8
 MU_FIRST, MU_LAST = 1e-6, 1e6  # regularisation of Q_uu, relative to the control weight
 
 
+class Settings(NamedTuple):
+    """How MuJoCo is used."""
+
+    step: float = STEP  # [s] longest time step
+    centred: bool = False  # differences
+    smooth: bool = False  # solimp[0] = 0: a contact that begins has no force yet
+
+
 class Solution(NamedTuple):
     """Where the solver ended, and what it took."""
 
     x: Matrix  # (T + 1, nq + nv)
     u: Matrix  # (T, nu)
+    K: Any  # (T, nu, ndx) of the last backward pass
     cost: float
     violation: float
     gap: float
     iterations: int
     seconds: Vector  # (iterations,) of processor time
+    history: Matrix  # (iterations, 3) cost, violation, gap
+    message: str = ""  # why it did not succeed
 
 
 class MujocoIlqr:
-    """iLQR on `problem`, which has a fixed start. MuJoCo takes `substeps` steps per knot, of at most 12.5 ms."""
+    """iLQR on `problem`, which has a fixed start, with `substeps` steps per knot, of at most `settings.step`."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, settings: Settings = Settings()) -> None:  # noqa: B008
         import mujoco
 
         self._mujoco = mujoco
         self._problem = problem
-        self.substeps = int(np.ceil(problem.knot_time / STEP - 1e-9))
+        self._settings = settings
+        self.substeps = int(np.ceil(problem.knot_time / settings.step - 1e-9))
         self.time_step = problem.knot_time / self.substeps
         self._model = mujoco_scene.load(problem.sim.model, self.time_step, integrator="Euler")
         self._model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # a blown-up trial has to look it
+        if settings.smooth:
+            self._model.pair_solimp[:, 0] = 0.0
         self._data = mujoco.MjData(self._model)
         self._objective = Objective(problem, Options())
         self._limits = problem.control_limits or (-np.inf, np.inf)
 
     def solve(self, *, max_iterations: int = 200, violation: float = 1e-3, tolerance: float = 1e-3) -> Solution:
         """Plan from the guess of the problem; tolerances as those of `Options`."""
+        with quiet():
+            return self._solve(max_iterations, violation, tolerance)
+
+    def _solve(self, max_iterations: int, tight: float, tolerance: float) -> Solution:
         objective = self._objective
         objective.reset()
         xs, us = self._guess()
         merit, mu, alpha = objective.evaluate(xs, us)[1], 0.0, 1.0
+        K, k = np.zeros((len(us), us.shape[1], self._problem.sim.ndx)), np.zeros_like(us)
         seconds: list[float] = []
-        while len(seconds) < max_iterations and mu <= MU_LAST:
+        history: list[tuple[float, float, float]] = []
+        message = "" if np.isfinite(merit) else "the rollout of the guess is lost"
+        while not message:
             start, before = time.process_time(), merit
             if alpha > 0.0:  # else the last derivatives are still those of (xs, us)
                 A, B, gaps = self._linearize(xs, us)
             objective.expand(xs, us)
-            K, k, mu = self._backward(A, B, gaps, mu)
+            gains = self._backward(A, B, gaps, mu)
+            if gains is None:
+                message = "the backward pass fails at any regularisation"
+                break
+            K, k, mu = gains
             promise = self._promise(A, B, gaps, K, k)
             alpha, merit, xs, us = self._search(merit, xs, us, gaps, K, k, promise)
             mu = max(10.0 * mu, MU_FIRST) if alpha < 0.1 else (0.1 * mu if mu > MU_FIRST else 0.0)
             seconds.append(time.process_time() - start)
-            closed = float(np.abs(gaps).max()) * (1.0 - alpha) < 1e-8
-            if closed and alpha > 0.0 and abs(before - merit) <= tolerance * abs(before):
-                if objective.violation(xs, us) <= violation:
+            gap = float(np.abs(gaps).max()) * (1.0 - alpha)
+            history.append((objective.evaluate(xs, us)[0], objective.violation(xs, us), gap))
+            if gap < 1e-8 and alpha > 0.0 and abs(before - merit) <= tolerance * abs(before):
+                if history[-1][1] <= tight:
                     break
                 objective.update_multipliers(xs, us)
                 merit = objective.evaluate(xs, us)[1]
+            if len(seconds) >= max_iterations:
+                message = "the iterations are used up"
+            elif mu > MU_LAST:
+                message = "no step is accepted at any regularisation"
         cost, gap = objective.evaluate(xs, us)[0], float(np.abs(self._gaps(xs, us)).max())
-        return Solution(xs, us, cost, objective.violation(xs, us), gap, len(seconds), np.array(seconds))
+        reached, count = objective.violation(xs, us), len(seconds)
+        return Solution(xs, us, K, cost, reached, gap, count, np.array(seconds), np.array(history), message)
+
+    def replay(self, solution: Solution, refine: int = 5) -> tuple[Matrix, Matrix]:
+        """(xs, us) of a solution under its gains, with time steps `refine` times as short."""
+        fine = MujocoIlqr(self._problem, self._settings._replace(step=self.time_step / refine))
+        with quiet():
+            return fine._rollout(solution.x, solution.u, None, solution.K, np.zeros_like(solution.u), 0.0)
 
     def _guess(self) -> tuple[Matrix, Matrix]:
         """States and inputs to start from: the states of the problem, or the rollout of its inputs."""
@@ -130,14 +169,14 @@ class MujocoIlqr:
 
     def _linearize(self, xs: Matrix, us: Matrix) -> tuple[Any, Any, Matrix]:
         """A (T, ndx, ndx) and B (T, ndx, nu), chained over the time steps of each knot, and the gaps (T + 1, ndx)."""
-        sim, T = self._problem.sim, len(us)
+        sim, T, model, data = self._problem.sim, len(us), self._model, self._data
         A, B, gaps = np.empty((T, sim.ndx, sim.ndx)), np.empty((T, sim.ndx, sim.nu)), np.zeros((T + 1, sim.ndx))
         step_A, step_B = np.empty((sim.ndx, sim.ndx)), np.empty((sim.ndx, sim.nu))
         for t in range(T):
             self._set(xs[t], us[t])
             for i in range(self.substeps):
-                self._mujoco.mjd_transitionFD(self._model, self._data, FD_STEP, False, step_A, step_B, None, None)
-                self._mujoco.mj_step(self._model, self._data)
+                self._mujoco.mjd_transitionFD(model, data, FD_STEP, self._settings.centred, step_A, step_B, None, None)
+                self._mujoco.mj_step(model, data)
                 A[t] = step_A @ A[t] if i else step_A
                 B[t] = step_A @ B[t] + step_B if i else step_B
             gaps[t + 1] = self._difference(self._next(), xs[t + 1])
@@ -151,8 +190,8 @@ class MujocoIlqr:
         dx[nv:] = x[nq:] - origin[nq:]
         return dx
 
-    def _backward(self, A: Any, B: Any, gaps: Matrix, mu: float) -> tuple[Any, Matrix, float]:
-        """Gains K (T, nu, ndx), k (T, nu), and the regularisation at which every Q_uu was positive definite.
+    def _backward(self, A: Any, B: Any, gaps: Matrix, mu: float) -> tuple[Any, Matrix, float] | None:
+        """Gains K (T, nu, ndx), k (T, nu), and the regularisation at which every Q_uu was positive definite, if any.
 
         V_x <- V_x + V_xx gap,  Q_z = l_z + F^T V_x,  Q_zz = l_zz + F^T V_xx F,  F = (A, B)
         (k, K) = -(Q_uu + mu w I)^-1 (Q_u, Q_ux)
@@ -179,7 +218,7 @@ class MujocoIlqr:
                 return K, k, mu
             except np.linalg.LinAlgError:
                 if mu > MU_LAST:
-                    raise RuntimeError("MujocoIlqr: the backward pass fails at any regularisation") from None
+                    return None
                 mu = max(10.0 * mu, MU_FIRST)
 
     def _promise(self, A: Any, B: Any, gaps: Matrix, K: Any, k: Matrix) -> tuple[float, float]:

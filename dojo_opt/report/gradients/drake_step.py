@@ -1,0 +1,82 @@
+"""d(next state)/d(state) of one step in Drake, by its automatic differentiation (AutoDiffXd)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.report.drake_scene import DrakeScene
+from dojo_opt.report.gradients.differences import Reference, extrapolated
+from sim.model import InputKind, Model, Vector
+
+Matrix = NDArray[np.float64]
+
+APPROXIMATIONS = ("kLagged", "kSap")  # its default, and its convex one
+
+
+class DrakeStep:
+    """The discrete update at the state to which `steps` steps from `start` lead, in Drake's own coordinates.
+
+    ValueError: a mechanism, or inputs, that cannot be represented.
+    """
+
+    def __init__(self, model: Model, time_step: float, approximation: str) -> None:
+        self._scene = DrakeScene(model, time_step, approximation)
+        self._plant, self._diagram = self._scene.plant, self._scene.diagram
+        self._root = self._diagram.CreateDefaultContext()
+        self._context = self._plant.GetMyMutableContextFromRoot(self._root)
+
+    def settle(self, start: Vector, u: Vector, steps: int) -> None:
+        """Take the steps, and stay where they end."""
+        self._force = self._generalized(u)
+        self._plant.get_applied_generalized_force_input_port().FixValue(self._context, self._force)
+        self._x = self._scene.state(start)
+        for _ in range(steps):
+            self._x = self._step(self._x)
+
+    def reference(self) -> Reference:
+        """By extrapolated differences."""
+        return extrapolated(self._central)
+
+    def autodiff(self) -> Callable[[], Matrix]:
+        """A call that gives the Jacobian."""
+        from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+
+        diagram = self._diagram.ToAutoDiffXd()
+        root = diagram.CreateDefaultContext()
+        plant = diagram.GetSubsystemByName(self._plant.get_name())
+        context = plant.GetMyMutableContextFromRoot(root)
+        constant = np.array([AutoDiffXd(value) for value in self._force])
+        plant.get_applied_generalized_force_input_port().FixValue(context, constant)
+        x = InitializeAutoDiff(self._x).ravel()
+
+        def jacobian() -> Matrix:
+            context.SetDiscreteState(x)
+            return np.asarray(ExtractGradient(diagram.EvalUniquePeriodicDiscreteUpdate(root).value()))
+
+        return jacobian
+
+    def _step(self, x: Vector) -> Vector:
+        self._context.SetDiscreteState(x)
+        return np.array(self._diagram.EvalUniquePeriodicDiscreteUpdate(self._root).value())
+
+    def _central(self, eps: float) -> Matrix:
+        try:
+            columns = [(self._step(self._x + dx) - self._step(self._x - dx)) for dx in eps * np.eye(len(self._x))]
+        except RuntimeError:  # its solver did not converge
+            return np.full((len(self._x), len(self._x)), np.nan)
+        return np.array(columns).T / (2.0 * eps)
+
+    def _generalized(self, u: Vector) -> Vector:
+        """Inputs as forces on joints with one degree of freedom."""
+        model: Any = self._scene.model
+        force = np.zeros(self._plant.num_velocities())
+        for k in np.flatnonzero(u):
+            start = self._scene.velocity_of(int(model.input_index[k])) if model.input_kind[k] == InputKind.JOINT else -1
+            if start < 0:
+                raise ValueError(f"DrakeStep: no input that does not act on a joint with one degree of freedom ({k})")
+            force[start] += u[k]
+        return force

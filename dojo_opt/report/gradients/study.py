@@ -1,0 +1,175 @@
+"""Gradients: derivatives of one step and of whole motions, ours and others', against what is known about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.report.clock import slope
+from dojo_opt.report.engines import installed
+from dojo_opt.report.gradients import one_step, sliding, smoothing, touchdown
+from dojo_opt.report.gradients.figure import draw
+from dojo_opt.report.gradients.tables import motion_table, resting_table, smoothing_table, step_table
+from dojo_opt.report.result import Report, Row
+from dojo_opt.report.study import Progress
+from sim.mechanism import Mechanism
+from sim.simulator import Simulator
+from solvers.jit import threads
+
+KAPPAS = (1e-6, 1e-8, 1e-10)  # of whole motions
+JUDGED = 1e-8  # the one that is held against the bars
+TIME_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2)  # [s]
+BARRED = (1e-3, 1e-2)
+EPS = (1e-5, 1e-2)  # of differenced motions: what one would choose, and a wide one that averages
+CHAINED = ("implicitfast", "discrete")  # of the integrators of which MuJoCo gives Jacobians
+EXACT = 1e-6  # bar of one step, relative
+AHEAD = 5e-3  # [m] above the height from which a step reaches the ground
+_NO_MUJOCO = 'without MuJoCo; pip install ".[bench]" for its rows'
+
+
+@dataclass(frozen=True)
+class Gradients:
+    """The reference scenes; with a mechanism: one step of it, half a second after it was let go.
+
+    quick: one time step, fewer rounds, engines and points.
+    """
+
+    quick: bool = False
+    mechanism: Mechanism | None = None
+
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        report = Report("Derivatives: error and cost", "dojo-opt report gradients" + (" --quick" if self.quick else ""))
+        parts: dict[str, Callable[[Report], Any]] = {"one step": self._one_step}
+        if self.mechanism is None:
+            parts |= {"motions": self._motions, "touch-down": self._touchdown, "smoothing": _smoothing}
+        results: dict[str, Any] = {}
+        with threads(1):
+            for name, part in progress([(name, (name, part)) for name, part in parts.items()], "gradients"):
+                results[name] = part(report)
+        report.summary = (
+            "Every Jacobian of one step is compared with the extrapolated differences of the very same step"
+            + ("." if self.mechanism else ", derivatives of whole motions with the answers of Coulomb's law, ")
+            + ("" if self.mechanism else "touch-down and smoothing with those of hard contact.")
+            + " Times are processor time on one core."
+        )
+        report.figure = draw(results)
+        if find_spec("mujoco") is None:
+            report.notes.append(_NO_MUJOCO)
+        return report
+
+    def _one_step(self, report: Report) -> dict[str, Any]:
+        """Error and cost of (A, B)."""
+        given = one_step.scenes() if self.mechanism is None else [one_step.scene_of(self.mechanism)]
+        measured: dict[str, Any] = {}
+        for scene in given[-1:] if self.quick else given:
+            points, notes = one_step.measure(scene, 3 if self.quick else 20)
+            bias = one_step.smoothed(scene)
+            report.notes += notes
+            report.notes += [] if self.mechanism is None else _advice(scene.sim)
+            for method, bar in ((one_step.TIGHTLY, EXACT), (one_step.IMPLICIT, None)):
+                worst = max(p.error for p in points if p.method == method)
+                report.rows.append(Row(f"{scene.name}: {method}, error of (A, B)", worst, "", bar, note="any kappa"))
+            report.tables.append(step_table(scene.name, points, bias))
+            measured[scene.name] = {"points": points, "bias": bias}
+        report.details["one_step"] = {
+            name: {"points": [p._asdict() for p in m["points"]], "kappas": one_step.KAPPAS, "bias": m["bias"]}
+            for name, m in measured.items()
+        }
+        return measured
+
+    def _motions(self, report: Report) -> list[sliding.Derivative]:
+        """Derivatives of whole motions."""
+        engines = [e for e in installed() if e.name != "MuJoCo implicit"]  # of a block the same as implicitfast
+        if self.quick:
+            engines = [e for e in engines if e.name == "MuJoCo implicitfast"]
+        steps = BARRED[-1:] if self.quick else TIME_STEPS
+        found: list[sliding.Derivative] = []
+        for motion in sliding.motions():
+            for h in steps:
+                found += [sliding.chained(motion, h, kappa) for kappa in KAPPAS]
+                found.append(sliding.ours_differenced(motion, h, EPS[0], JUDGED))
+                found += [sliding.differenced(engine, motion, h, eps) for engine in engines for eps in EPS]
+                if find_spec("mujoco") is not None:
+                    found += [sliding.mujoco_chained(motion, h, name) for name in CHAINED[: 1 if self.quick else 2]]
+        for h in (h for h in BARRED if h in steps):
+            report.tables.append(motion_table(found, h))
+            for d in found:
+                if (d.time_step, d.kappa, d.how) == (h, JUDGED, sliding.CHAINED):
+                    name = f"{d.motion}, steps of {1e3 * h:g} ms: error"
+                    report.rows.append(Row(name, d.error, "", 2.0 * h, note=f"{d.value:.5g}, exact {d.exact:.5g}"))
+        report.details["motions"] = [d._asdict() for d in found]
+        return found
+
+    def _touchdown(self, report: Report) -> tuple[Any, list[touchdown.Curve]]:
+        """Gradient against height."""
+        heights = np.linspace(-0.01, 0.05, 61 if self.quick else 361)  # 0, where MuJoCo's contact begins, among them
+        curves = [touchdown.ours(heights, kappa) for kappa in touchdown.KAPPAS]
+        if find_spec("mujoco") is not None:
+            curves += [touchdown.mujoco_ball(heights, label) for label in touchdown.MUJOCO]
+        h = touchdown.H
+        at = {k: touchdown.ours(np.array([touchdown.TOUCH, touchdown.TOUCH + AHEAD]), k) for k in touchdown.KAPPAS}
+        off = max(abs(curve.gradient[0] + 0.5 / h) * h for curve in at.values())
+        steepest = max(float(np.abs(curve.gradient).max()) for curve in curves if curve.kappa is not None)
+        report.rows += [
+            Row("touch-down: h times the steepest gradient", h * steepest, "", 1.0 + EXACT, note="any kappa; hard: 1"),
+            Row("touch-down: at the touch, off -1/2h", off, "", EXACT, note="any kappa, times h"),
+            Row(
+                "touch-down: h times the gradient 5 mm ahead of it, kappa 1e-3",
+                -h * float(at[1e-3].gradient[1]),
+                "",
+                0.05,
+                at_least=True,
+                note="hard contact, and MuJoCo: 0",
+            ),
+        ]
+        for curve in curves:
+            if curve.kappa is None:
+                value = h * float(np.abs(curve.gradient).max())
+                report.rows.append(Row(f"touch-down: h times the steepest gradient, {curve.label}", value, ""))
+        report.details["touchdown"] = {"heights": heights, **{c.label: c._asdict() for c in curves}}
+        return heights, curves
+
+
+def _advice(sim: Simulator) -> list[str]:
+    """kappa that a mechanism needs, from what its contacts carry."""
+    if not sim.ncontact:
+        return ["without contacts, kappa and its bias matter to joint limits only"]
+    carried = float(np.sum(sim.model.body_mass)) / sim.ncontact
+    gravity = float(np.linalg.norm(sim.model.gravity))
+    needed = [f"{smoothing.resting_kappa(carried, h, gravity):.1g} at {1e3 * h:g} ms" for h in smoothing.STEPS[2:]]
+    return [
+        f"{sim.ncontact} contacts that share {carried * sim.ncontact:.3g} kg evenly have derivatives within "
+        f"{100 * smoothing.ALLOWED:g} % of hard contact up to a kappa of " + ", ".join(needed)
+    ]
+
+
+def _smoothing(report: Report) -> dict[str, Any]:
+    """Bias against kappa, and the reach that it buys."""
+    bias = {regime.name: smoothing.bias(regime) for regime in smoothing.regimes()}
+    reach = np.array([smoothing.reach(kappa) for kappa in smoothing.KAPPAS])
+    felt = [smoothing.gradient_at(kappa, d) for kappa, d in zip(smoothing.KAPPAS, reach, strict=True)]
+    kappas = np.array(smoothing.KAPPAS)
+    default = int(np.argmin(np.abs(np.log(kappas / 1e-6))))
+    small = kappas < 1.1e-6
+    for name, errors in bias.items():
+        note = "of hard contact, 1 kg, 20 ms"
+        report.rows.append(Row(f"bias at kappa 1e-6, {name}", errors[default], "", 1e-2, note=note))
+        if name != "touching":
+            report.rows.append(Row(f"bias by kappa: slope, {name}", slope(kappas[small], errors[small]), "", 1.05))
+    off = float(np.abs(np.array(felt) / smoothing.FELT - 1.0).max())
+    note = "where the gradient is 1 % of a contact's"
+    report.rows.append(Row("reach sqrt(kappa h / m): off the formula", off, "", 1e-4, note=note))
+    needed = np.array([smoothing.resting_kappa(1.0, h) for h in smoothing.STEPS])
+    resting = np.array([smoothing.resting_bias(kappa, h) for kappa, h in zip(needed, smoothing.STEPS, strict=True)])
+    usual = np.array([smoothing.resting_bias(1e-6, h) for h in smoothing.STEPS])
+    off = float(np.abs(resting - smoothing.ALLOWED / (1.0 + smoothing.ALLOWED)).max())
+    report.rows.append(Row("bias of a resting contact: off kappa / m g^2 h^3", off, "", EXACT, note="1 to 50 ms"))
+    report.tables += [smoothing_table(kappas, bias, reach), resting_table(needed, usual)]
+    report.details["smoothing"] = {"kappas": kappas, "reach": reach, **bias}
+    report.details["resting"] = {"time_steps": smoothing.STEPS, "kappa_needed": needed, "bias_at_1e-6": usual}
+    return {"kappas": kappas, "reach": reach, "bias": bias}
