@@ -20,6 +20,7 @@ from typing import NamedTuple
 from sim.central_path import first_attempt, residuals, start
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, solve
+from sim.friction import slip_noise
 from sim.inequalities import (
     boundary_step,
     condense_inequalities,
@@ -172,6 +173,16 @@ def search(
     return now, _HALVINGS + 1
 
 
+@inlined
+def on_path(model: Model, work: Work, h: float, kappa: float, spread: float, violation: float) -> bool:
+    """Whether products and friction laws hold to `spread`; friction laws to their rounding, where that is coarser."""
+    if violation < spread:
+        return True
+    if not violation < spread + slip_noise(model, work, h):
+        return False
+    return products(model, work, kappa)[1] < spread
+
+
 @kernel
 def try_from(
     model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], attempt: int, iterations: int
@@ -181,7 +192,7 @@ def try_from(
     h = options.h
     kappa = options.kappa
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
-    scale = residual_scale(work)
+    scale = residual_scale(model, work, options)
     smoothing = start(model, work, options, q, v, attempt)
     ratio = 1e-2
     patience = iterations + _PATIENCE
@@ -197,8 +208,9 @@ def try_from(
             if smoothing < before:
                 patience = max(patience, iterations + _PATIENCE // 2)
         merit = Merit(merit.residual, max(merit.violation, slip), merit.mean)
-        solved = merit.residual < options.tolerance and merit.violation < spread and smoothing <= kappa
-        if solved and iterations > 0:  # a guess within the tolerance gets one step too: the error is squared
+        solved = merit.residual < options.tolerance and smoothing <= kappa
+        # a guess within the tolerance gets one step too: the error is squared
+        if solved and iterations > 0 and on_path(model, work, h, kappa, spread, merit.violation):
             return Outcome(_SOLVED, iterations, merit.residual, merit.violation)
         if iterations >= options.max_iterations:
             return Outcome(_MAX_ITERATIONS, iterations, merit.residual, merit.violation)

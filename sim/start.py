@@ -86,6 +86,16 @@ def newton_direction(model: Model, work: Work, h: float, v: Vector) -> bool:
 
 
 @kernel
+def _momentum_noise(model: Model, work: Work, h: float) -> float:
+    """Rounding of node momenta, which are differences of positions over h: sum of eps m |x| (1 + |x|) / h."""
+    noise = 0.0
+    for i in range(work.pos2.shape[0]):
+        length = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
+        noise += 1e-15 * model.body_mass[i] * length * (1.0 + length) / h
+    return noise
+
+
+@kernel
 def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector) -> int:
     """Solve p(q, v15) = M(q) velocity for v15 by Newton's method with backtracking.
 
@@ -96,9 +106,12 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
     v = x[nq:]
     momentum_error(model, work, h, x, velocity, work.residual)  # for the poses
     momentum_of_velocity(model, work, velocity, work.nu)
-    scale = 1.0
     for d in range(nv):
-        scale = max(scale, abs(work.nu[d]))
+        work.rhs[d] = 0.0
+    add_spring_momentum(model, h, x, work.rhs)
+    scale = 1.0
+    for d in range(nv):  # a stiff spring is rounded like its own half impulse
+        scale = max(scale, abs(work.nu[d]), abs(work.rhs[d]))
     error = momentum_error(model, work, h, x, work.nu, work.residual)
     for _ in range(50):
         _turn_back(work)
@@ -124,7 +137,7 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
         if alpha <= 1e-6:
             for d in range(nv):
                 v[d] = work.nu_trial[d]
-            return _SOLVED if error <= 1e-11 * scale else _NO_PROGRESS
+            return _SOLVED if error <= 1e-11 * scale + _momentum_noise(model, work, h) else _NO_PROGRESS
         error = trial
     return _MAX_ITERATIONS
 

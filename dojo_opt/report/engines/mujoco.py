@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -25,17 +25,19 @@ _LOST = 1e8  # [m/s, rad/s] faster than this, the simulation has blown up
 class MuJoCo:
     """One integrator, elliptic friction cones and MuJoCo's defaults otherwise.
 
-    options: attributes of MJCF's <option>, such as {"tolerance": "1e-10"}.
+    options: attributes of MJCF's <option>, such as {"tolerance": "1e-10"}; contacts: solref and solimp of all contacts.
     """
 
     integrator: str
     options: Mapping[str, str] = field(default_factory=dict)
     rounds: int = 3  # a run shorter than a second is clocked so many times
+    contacts: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    label: str = ""  # names what is not default
 
     @property
     def name(self) -> str:
         """As it stands in a table."""
-        return f"MuJoCo {self.integrator}"
+        return f"MuJoCo {self.integrator}" + (f", {self.label}" if self.label else "")
 
     def simulate(
         self,
@@ -56,6 +58,8 @@ class MuJoCo:
         sim = Simulator(mechanism, time_step=time_step)
         model = mujoco_scene.load(sim.model, time_step, integrator=self.integrator, **self.options)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a scene that is lost is not started again
+        for name, values in self.contacts.items():
+            getattr(model, f"pair_{name}")[:] = values
         start = np.concatenate([np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)])
         data = mujoco_scene.state(model, start)
         with _quiet(mujoco):
@@ -68,6 +72,12 @@ class MuJoCo:
 def engines() -> list[MuJoCo]:
     """All integrators."""
     return [MuJoCo(integrator) for integrator in INTEGRATORS]
+
+
+def stiff() -> MuJoCo:
+    """The hardest contacts that hold at steps of 1 to 10 ms: a time constant of 1 ms, impedances next to 1."""
+    contacts = {"solref": (0.001, 1.0), "solimp": (0.99, 0.999, 0.0001, 0.5, 2.0)}
+    return MuJoCo("discrete", contacts=contacts, label="stiff contacts")
 
 
 def _steps(

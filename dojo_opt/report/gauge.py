@@ -1,0 +1,43 @@
+"""Gauge: what studies read off a run, by one formula for every engine."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.report.engines.run import Run, rotated
+from sim.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+
+def gaps(mechanism: Mechanism, run: Run) -> Floats:
+    """Distance of every contact to its half-space, (n, ncontact) [m]; negative is penetration."""
+    bodies = [mechanism.body_names.index(contact.body) for contact in mechanism.contacts]
+    out = np.empty((len(run.time), len(bodies)))
+    for c, (body, contact) in enumerate(zip(bodies, mechanism.contacts, strict=True)):
+        arm = rotated(run.quaternion[:, body], np.broadcast_to(np.asarray(contact.point), (len(out), 3)))
+        out[:, c] = (run.position[:, body] + arm) @ np.asarray(contact.normal) - contact.radius - contact.height
+    return out
+
+
+def penetration(mechanism: Mechanism, run: Run) -> float:
+    """Deepest penetration of any contact at any sample [m]; below zero when nothing was even touched."""
+    return float(-gaps(mechanism, run).min())
+
+
+def energy_change(run: Run) -> tuple[float, float]:
+    """(smallest, largest) energy minus that of the start [J]."""
+    change = run.energy - run.energy[0]
+    return float(change.min()), float(change.max())
+
+
+def momentum_drift(run: Run) -> float:
+    """Largest change of the angular momentum about the origin, over its size."""
+    angular = run.momentum[:, 3:]
+    return float(np.linalg.norm(angular - angular[0], axis=1).max() / np.linalg.norm(angular[0]))
+
+
+def complete(run: Run) -> bool:
+    """Whether the engine went through to the end, with finite numbers."""
+    return not run.message and bool(np.isfinite(run.energy).all())

@@ -1,0 +1,33 @@
+"""The figure of the stability study: trials down, engines across."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from dojo_opt.report.stability.trial import Trial, Verdict
+
+
+def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
+    """Green where the rule is met, red where it is not, with the measured value."""
+    rows, columns = len(trials), len(verdicts)
+    figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")
+    ax = figure.subplots()
+    passed = np.array([[verdict.passed for verdict in found] for found in verdicts.values()], dtype=float).T
+    ax.imshow(passed, cmap=ListedColormap(["#e8a49c", "#a9d8b0"]), vmin=0.0, vmax=1.0, aspect="auto")
+    for column, found in enumerate(verdicts.values()):
+        for row, verdict in enumerate(found):
+            ax.text(column, row, verdict.text, ha="center", va="center", fontsize=7)
+    ax.set_xticks(range(columns), [name.replace(" ", "\n", 1) for name in verdicts], fontsize=8)
+    ax.xaxis.tick_top()
+    ax.set_yticks(range(rows), [f"{trial.group}: {trial.name}" for trial in trials], fontsize=7)
+    edges = [k for k in range(1, rows) if trials[k].group != trials[k - 1].group]
+    ax.hlines(np.array(edges) - 0.5, -0.5, columns - 0.5, color="white", lw=2.0)
+    ax.vlines(np.arange(1, columns) - 0.5, -0.5, rows - 0.5, color="white", lw=1.0)
+    ax.tick_params(length=0)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    return figure

@@ -1,0 +1,81 @@
+"""Trial: one extreme scene with the rule by which it passes, stated before it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import nan
+from typing import NamedTuple
+
+from numpy.typing import ArrayLike
+
+from dojo_opt.report.engines import Engine, Run
+from dojo_opt.report.gauge import complete
+from sim.mechanism import Mechanism
+
+Measure = Callable[[Mechanism, Run], float]
+
+
+class Verdict(NamedTuple):
+    """What an engine made of a trial."""
+
+    value: float  # not-a-number where it did not get through
+    passed: bool
+    text: str  # as it stands in a table
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A motion, what is measured on it, and the largest value that passes.
+
+    rule      in words, with unit and bar
+    refusal   words in the reason with which the engine has to refuse the scene, where it cannot be represented
+    why       it cannot be, or why the time step is the one that it is
+    """
+
+    group: str
+    name: str
+    rule: str
+    mechanism: Mechanism
+    q: ArrayLike
+    v: ArrayLike
+    time_step: float  # [s]
+    duration: float  # [s]
+    measure: Measure
+    bar: float
+    samples: int = 0  # 0: every step
+    inputs: ArrayLike | None = None
+    kappa: float = 0.0  # of ours [N s m]; 0: the one that the study recommends
+    tolerance: float = 1e-8  # of ours
+    refusal: str = ""
+    why: str = ""
+    peer_duration: float = 0.0  # [s] of other engines, where the whole would take minutes; 0: the whole
+    slow: bool = False  # left out of quick runs
+
+    def run(self, engine: Engine, duration: float = 0.0) -> Run:
+        """The motion by one engine, the whole or part of it."""
+        seconds = duration or self.duration
+        steps = round(seconds / self.time_step)
+        return engine.simulate(
+            self.mechanism,
+            time_step=self.time_step,
+            q=self.q,
+            v=self.v,
+            duration=seconds,
+            samples=min(self.samples or steps, steps),
+            inputs=self.inputs,
+        )
+
+    def judge(self, run: Run, *, ours: bool) -> Verdict:
+        """The rule applied.
+
+        Only ours is asked to refuse what cannot be represented; an engine that goes on is measured.
+        """
+        if self.refusal and ours:
+            refused = self.refusal in run.message
+            return Verdict(0.0 if refused else nan, refused, "refused" if refused else "not refused")
+        if not complete(run):
+            return Verdict(nan, False, f"failed at {run.time[-1]:.2g} s")
+        value = self.measure(self.mechanism, run)
+        passed = bool(value <= self.bar)
+        return Verdict(value, passed, f"{value:.2g}" + ("" if passed else " x"))
