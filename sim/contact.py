@@ -18,10 +18,10 @@ from solvers.jit import kernel
 
 
 @kernel
-def contact_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gap, slip and arms of every contact at configuration 3."""
+def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int) -> None:
+    """Gap, slip and arms at configuration 3 of the contacts from first up to last."""
     g = 2.0 / h
-    for c in range(model.contact_body.shape[0]):
+    for c in range(first, last):
         i = model.contact_body[c]
         k = work.contact_kin[c]
         f = model.contact_frame[c]

@@ -88,13 +88,14 @@ def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
 def slip_noise(model: Model, work: Work, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0
-    for c in range(model.contact_body.shape[0]):
-        i = model.contact_body[c]
-        k = work.contact_kin[c]
-        length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
-        length += abs(k[3]) + abs(k[4]) + abs(k[5])
-        speed = length / h + abs(k[1]) + abs(k[2])
-        e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, 1] * speed)
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            i = model.contact_body[c]
+            k = work.contact_kin[c]
+            length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
+            length += abs(k[3]) + abs(k[4]) + abs(k[5])
+            speed = length / h + abs(k[1]) + abs(k[2])
+            e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, 1] * speed)
     return e
 
 

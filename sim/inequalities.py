@@ -1,9 +1,13 @@
-"""All contacts and limits of a step at once: what the interior point asks of them, one verb per kernel."""
+"""All near contacts and limits of a step at once: what the interior point asks of them, one verb per kernel.
+
+Those that are far (far.py) have no part in its variables and its matrix.
+"""
 
 from __future__ import annotations
 
 from sim.contact import add_contact_matrix, add_contact_wrench, contact_jacobian, contact_kinematics
 from sim.elimination import subtree_sums
+from sim.far_impulses import add_far_wrenches, far_impulses
 from sim.friction import (
     condense_contact,
     contact_boundary,
@@ -29,8 +33,10 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, i
 
 @kernel
 def inequality_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gaps and slips of contacts and limits at configuration 3."""
-    contact_kinematics(model, work, h)
+    """Gaps and slips of near contacts and of limits, impulses of far contacts, at configuration 3."""
+    for m in range(work.count[0]):
+        contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
+    far_impulses(model, work, h)
     limit_gaps(model, work, h)
 
 
@@ -44,19 +50,23 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     """
     k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
-    for c in range(model.contact_body.shape[0]):
-        d = -work.contact_kin[c, 0]
-        if d > 0.0:
-            k0 = max(k0, growth * 0.3 * model.body_mass[model.contact_body[c]] * d * d / h)
-            floor = max(floor, 0.5 * d)
-    for j in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            d = -work.contact_kin[c, 0]
+            if d > 0.0:
+                k0 = max(k0, growth * 0.3 * model.body_mass[model.contact_body[c]] * d * d / h)
+                floor = max(floor, 0.5 * d)
+    for m in range(work.count[1]):
+        j = work.near_limit[m]
         d = -work.bound_gap[j]
         if d > 0.0:
             k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
-    for c in range(model.contact_body.shape[0]):
-        start_contact(model, work, c, k0, floor)
-    for j in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            start_contact(model, work, c, k0, floor)
+    for m in range(work.count[1]):
+        j = work.near_limit[m]
         s = max(work.bound_gap[j], floor)
         work.bound[j, 0] = s
         work.bound[j, 1] = k0 / s
@@ -67,18 +77,21 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
 def apply_inequalities(model: Model, work: Work) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
-    for c in range(model.contact_body.shape[0]):
-        fn, f1, f2 = contact_impulse(model, work, c)
-        add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
-        r = max(r, contact_error(model, work, c))
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            fn, f1, f2 = contact_impulse(model, work, c)
+            add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
+            r = max(r, contact_error(model, work, c))
+    add_far_wrenches(model, work)
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
     return r
 
 
 @kernel
 def apply_limits(model: Model, work: Work) -> None:
-    """residual -= sign gamma, and p gamma of a cone."""
+    """residual -= sign gamma, of near and far limits, and p gamma of a cone."""
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, work, k, -work.bound[k, 1], work.residual)
 
@@ -93,18 +106,20 @@ def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> N
 @kernel
 def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)"""
-    for c in range(model.contact_body.shape[0]):
-        contact_jacobian(model, work, h, c)
-        condense_contact(model, work, c, kappa)
-        fn, f1, f2 = contact_impulse(model, work, c)
-        add_contact_matrix(model, work, h, c, fn, f1, f2, out)
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_jacobian(model, work, h, c)
+            condense_contact(model, work, c, kappa)
+            fn, f1, f2 = contact_impulse(model, work, c)
+            add_contact_matrix(model, work, h, c, fn, f1, f2, out)
 
 
 @kernel
 def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
     """A2 -= contacts: slips depend on pose 2."""
-    for c in range(model.contact_body.shape[0]):
-        add_slip_jacobian(model, work, h, c)
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            add_slip_jacobian(model, work, h, c)
 
 
 @kernel
@@ -113,10 +128,11 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
-    for c in range(model.contact_body.shape[0]):
-        contact_constant(model, work, c, goal)
-        w = work.contact_w[c]
-        add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_constant(model, work, c, goal)
+            w = work.contact_w[c]
+            add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     for d in range(work.dnu.shape[0]):
         a = work.S2[d]
@@ -128,63 +144,71 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
 @kernel
 def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
-    for c in range(model.contact_body.shape[0]):
-        recover_contact(model, work, h, c, share)
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            recover_contact(model, work, h, c, share)
     recover_limits(model, work, h, share)
 
 
 @kernel
 def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
-    """Mean of all complementarity products, and their largest distance from kappa."""
+    """Mean of all complementarity products, kappa where there is none, and their largest distance from kappa."""
     total = 0.0
     count = 0.0
     violation = 0.0
-    for c in range(model.contact_body.shape[0]):
-        t, n, low, high = contact_products(model, work, c)
-        total += t
-        count += n
-        violation = max(violation, high - kappa, kappa - low)
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            t, n, low, high = contact_products(model, work, c)
+            total += t
+            count += n
+            violation = max(violation, high - kappa, kappa - low)
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         t = work.bound[k, 0] * work.bound[k, 1]
         total += t
         count += 1.0
         violation = max(violation, abs(t - kappa))
-    return total / count, violation
+    return total / count if count > 0.0 else kappa, violation
 
 
 @kernel
 def slip_error(model: Model, work: Work, kappa: float) -> float:
     """Largest violation of the friction law of the central path of kappa, in units of kappa."""
     e = 0.0
-    for c in range(model.contact_body.shape[0]):
-        e = max(e, slip_violation(model, work, c, kappa))
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            e = max(e, slip_violation(model, work, c, kappa))
     return e
 
 
 @kernel
 def products_ahead(model: Model, work: Work, alpha: float) -> float:
-    """Mean of the complementarity products after a step of length alpha."""
+    """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
     total = 0.0
     count = 0.0
-    for c in range(model.contact_body.shape[0]):
-        t, n = contact_products_ahead(model, work, c, alpha)
-        total += t
-        count += n
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            t, n = contact_products_ahead(model, work, c, alpha)
+            total += t
+            count += n
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         b = work.bound[k]
         d = work.bound_step[k]
         total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
         count += 1.0
-    return total / count
+    return total / count if count > 0.0 else work.far_law[0]
 
 
 @kernel
 def boundary_step(model: Model, work: Work) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
     a = 1e30
-    for c in range(model.contact_body.shape[0]):
-        a = min(a, contact_boundary(model, work, c))
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            a = min(a, contact_boundary(model, work, c))
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         b = work.bound[k]
         d = work.bound_step[k]
         a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
@@ -194,10 +218,12 @@ def boundary_step(model: Model, work: Work) -> float:
 @kernel
 def keep_inequalities(model: Model, work: Work) -> None:
     """Remember the cone variables from which the line search starts."""
-    for c in range(model.contact_body.shape[0]):
-        for k in range(12):
-            work.cone_trial[c, k] = work.cone[c, k]
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            for k in range(12):
+                work.cone_trial[c, k] = work.cone[c, k]
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         work.bound_trial[k, 0] = work.bound[k, 0]
         work.bound_trial[k, 1] = work.bound[k, 1]
 
@@ -205,40 +231,12 @@ def keep_inequalities(model: Model, work: Work) -> None:
 @kernel
 def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     """cone = kept + alpha step."""
-    for c in range(model.contact_body.shape[0]):
-        for k in range(12):
-            work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
-        keep_in_cone(model, work, c)
-    for k in range(model.limit_dof.shape[0]):
+    for m in range(work.count[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            for k in range(12):
+                work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
+            keep_in_cone(model, work, c)
+    for m in range(work.count[1]):
+        k = work.near_limit[m]
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
-
-
-@kernel
-def worst_contact(model: Model, work: Work, kappa: float) -> float:
-    """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
-    worst = -1.0
-    error = 0.0
-    for k in range(model.limit_dof.shape[0]):
-        error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
-    for c in range(model.contact_body.shape[0]):
-        e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
-        if e > error:
-            error = e
-            worst = float(c)
-    return worst
-
-
-@kernel
-def report_contacts(model: Model, work: Work, out: Matrix) -> None:
-    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, after a step.  (ncontact, 8)"""
-    for c in range(model.contact_body.shape[0]):
-        i = model.contact_body[c]
-        k = work.contact_kin[c]
-        F = model.contact_frame[c]
-        fn, f1, f2 = contact_impulse(model, work, c)
-        for e in range(3):
-            out[c, e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-            out[c, 3 + e] = work.pos3[i, e] + k[3 + e]
-        out[c, 6] = k[0]
-        out[c, 7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from sim.central_path import first_attempt, residuals, start
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, solve
+from sim.far import came_near, choose_far
 from sim.friction import slip_noise
 from sim.inequalities import (
     boundary_step,
@@ -35,6 +36,7 @@ from sim.inequalities import (
 )
 from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
+from sim.limits import choose_far_limits, limits_came_near
 from sim.model import Goal, Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale
 from solvers.jit import inlined, kernel
@@ -235,10 +237,13 @@ def interior_point(
 
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
-    first = first_attempt(model, work, options, (q, v, u), guess)
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
-    for attempt in range(first, _ATTEMPTS):
-        out = try_from(model, work, options, (q, v, u), attempt, out.iterations)
-        if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
-            break
-    return out
+    choose_far(model, work, options)
+    choose_far_limits(model, work, options, q, v)
+    while True:
+        for attempt in range(first_attempt(model, work, options, (q, v, u), guess), _ATTEMPTS):
+            out = try_from(model, work, options, (q, v, u), attempt, out.iterations)
+            if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
+                break
+        if not (came_near(model, work) or limits_came_near(model, work)):
+            return out

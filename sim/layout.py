@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sim.model import Model, Work
 from solvers.record import Field, record, table
 
-__all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "Shape", "Sizes", "allocate_model", "allocate_work",
-           "model_view", "sizes_of", "table", "work_view"]  # fmt: skip
+__all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
+           "allocate_work", "model_view", "sizes_of", "table", "work_view"]  # fmt: skip
 
 Shape = tuple[int | str, ...]
 
@@ -25,8 +25,8 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, late 5, limit_dof nlimit, limit_cone nlimit,
-    input_kind nu, input_index nu
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end ncontact, late 5,
+    limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
     """
 )
 
@@ -36,11 +36,14 @@ MODEL_FLOATS = _shapes(
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_swing_axes nbody 6, dof_spring nv,
     dof_damper nv, dof_armature nv, dof_rest nv,
     contact_point ncontact 3, contact_radius ncontact, contact_friction ncontact, contact_frame ncontact 9,
-    contact_height ncontact, limit_sign nlimit, limit_bound nlimit, input_wrench nu 6, gravity 3
+    contact_height ncontact, cluster ncontact 8, limit_sign nlimit, limit_bound nlimit, limit_mobility nlimit,
+    input_wrench nu 6, gravity 3
     """
 )
 
-WORK_FIELDS = _shapes(
+WORK_INTS = _shapes("count 3, near ncontact 2, near_limit nlimit, far_first ncontact")
+
+WORK_FLOATS = _shapes(
     """
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
@@ -50,11 +53,13 @@ WORK_FIELDS = _shapes(
     contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5
+    panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
+    far ncontact 24, far_limit nlimit, far_law 2
     """
 )
 
 MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
+WORK_FIELDS = {**WORK_INTS, **WORK_FLOATS}
 
 
 class Sizes(NamedTuple):
@@ -101,7 +106,7 @@ def allocate_model(sizes: Sizes) -> Model:
 
 def allocate_work(sizes: Sizes) -> Work:
     """The scratch of one thread."""
-    return Work(**_carve(WORK_FIELDS, sizes, np.float64))
+    return Work(**_carve(WORK_INTS, sizes, np.int64), **_carve(WORK_FLOATS, sizes, np.float64))
 
 
 def sizes_of(model: Model) -> Sizes:
@@ -117,7 +122,7 @@ def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
     return [
         Field(
             name,
-            name in MODEL_INTS,
+            name in MODEL_INTS or name in WORK_INTS,
             None if len(shapes[name]) == 1 else int(shapes[name][1]) if isinstance(shapes[name][1], int) else 0,
         )
         for name in cls._fields

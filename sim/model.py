@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Ranges = NDArray[np.int64]  # (n, 2) first, and one past the last
 
 
 class Law(IntEnum):
@@ -66,6 +67,7 @@ class Model(NamedTuple):
     contact_body: Integers  # (ncontact,)
     contact_law: Integers  # (ncontact,) Law
     late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
+    cluster_end: Integers  # (ncontact,) of the cluster whose first contact this is, one past its last; see far.py
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
@@ -88,8 +90,10 @@ class Model(NamedTuple):
     contact_friction: Vector  # (ncontact,) coefficient
     contact_frame: Matrix  # (ncontact, 9) rows: normal and two tangents of the half-space, world axes
     contact_height: Vector  # (ncontact,) the half-space is normal . x >= height [m]
+    cluster: Matrix  # (ncontact, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
+    limit_mobility: Vector  # (nlimit,) bound of d(velocity)/d(impulse) of its degree of freedom [1/kg, 1/(kg m^2)]
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
     gravity: Vector  # (3,) [m/s^2]
 
@@ -135,6 +139,14 @@ class Work(NamedTuple):
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
+    # near and far
+    count: Integers  # (3,) runs of near contacts, near limits, far clusters
+    near: Ranges  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
+    near_limit: Integers  # (nlimit,) the near limits
+    far_first: Integers  # (ncontact,) first contacts of the far clusters
+    far: Matrix  # (ncontact, 24) see far.py
+    far_limit: Vector  # (nlimit,) gap below which a far limit is near, 0 for a near one
+    far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables, see contact.py
     cone_step: Matrix  # (ncontact, 12)

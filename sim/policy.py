@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from sim.layout import model_view, work_view
 from sim.model import Guess, Matrix, Vector
-from sim.rollout import Cube, options_of
+from sim.rollout import Cube, begin
 from sim.state import integrate_state, state_difference
 from sim.step import step
 from solvers.dense import copy, dot
@@ -82,7 +82,7 @@ def closed_loop(
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = options_of(settings)
+    options = begin(work, settings)
     nq = work.theta1.shape[0]
     low, high = limits
     ndx = policy.gaps.shape[1]

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.contact_report import report_contacts
+from sim.far import forget_far
 from sim.gradients import gradient
-from sim.inequalities import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Guess, Integers, Matrix, Options, Vector, Work
 from sim.step import step
@@ -39,8 +40,9 @@ class Linearized(NamedTuple):
 
 
 @kernel
-def options_of(settings: Vector) -> Options:
-    """Options of a step."""
+def begin(work: Work, settings: Vector) -> Options:
+    """Settings of a motion that begins here."""
+    forget_far(work)
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 
@@ -63,7 +65,7 @@ def roll(
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = options_of(settings)
+    options = begin(work, settings)
     nq = work.theta1.shape[0]
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
@@ -74,7 +76,7 @@ def roll(
         ):
             return t
         if hard is not None:
-            report_contacts(model, work, contacts[t])
+            report_contacts(model, work, options.h, contacts[t])
     return us.shape[0]
 
 
@@ -120,7 +122,7 @@ def linearize(
     """Derivatives of the knots from knots[0] up to knots[1]: products of the derivatives of their steps."""
     model = model_view(model_at)
     work = work_view(work_at)
-    options = options_of(settings)
+    options = begin(work, settings)
     nq = work.theta1.shape[0]
     x = work.step_x[0]
     for t in range(knots[0], knots[1]):
@@ -180,7 +182,7 @@ def _roll_one(
     """A rollout that keeps its states only: (status, number of solved steps)."""
     model = model_view(model_at)
     work = work_view(work_at)
-    options = options_of(settings)
+    options = begin(work, settings)
     nq = work.theta1.shape[0]
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]

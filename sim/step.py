@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from sim.contact_report import worst_contact
 from sim.dynamics import begin_step
-from sim.inequalities import worst_contact
 from sim.interior_point import interior_point
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import newton

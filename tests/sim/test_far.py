@@ -1,0 +1,202 @@
+"""Far contacts and limits: the same step as when everything is near, and only what is far is left out.
+
+The reference is the same simulator at a tolerance so small that no contact is far: the rule looks at the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from naive import rotation as rot
+from naive.maximal import solve
+from naive.scene import from_mechanism
+from scenes import LAWS, ball, block, chain, gaps, pendulum, slider
+
+import dojo_opt as dojo
+from sim.layout import work_view
+
+TOLERANCE = 1e-8
+EXACT = 1e-12
+
+
+def far(sim):
+    """(contacts, limits) that the last step of this thread left out of the interior point."""
+    work = work_view(sim._calls._work())
+    near = sum(int(last - first) for first, last in work.near[: work.count[0]])
+    return sim.ncontact - near, len(work.far_limit) - int(work.count[1])
+
+
+def pair(mech, time_step=0.02, kappa=1e-6):
+    """The simulator, and the same with everything near."""
+    sim = dojo.Simulator(mech, time_step=time_step, kappa=kappa, tolerance=TOLERANCE)
+    return sim, sim.replace(tolerance=EXACT)
+
+
+def compare(mech, x, u, kappa=1e-6, time_step=0.02, left_out=None):
+    """Step and Jacobians of both; an error of the balance moves a body by at most its mobility, here below 1e3."""
+    sim, exact = pair(mech, time_step, kappa)
+    result, expected = sim.step(x, u), exact.step(x, u)
+    assert expected.success and far(exact) == (0, far(exact)[1])
+    assert result.success, result.message
+    sim.step(x, u)
+    if left_out is not None:
+        assert far(sim)[0] == left_out
+    np.testing.assert_allclose(result.x, expected.x, rtol=0, atol=1e3 * TOLERANCE)
+    np.testing.assert_allclose(result.contacts.gap, expected.contacts.gap, rtol=0, atol=1e3 * TOLERANCE)
+    np.testing.assert_allclose(result.contacts.impulse, expected.contacts.impulse, rtol=0, atol=1e3 * TOLERANCE)
+    for mine, theirs in zip(sim.linearize(x, u), exact.linearize(x, u), strict=True):
+        np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-6 * max(1.0, np.abs(theirs).max(initial=0.0)))
+    return result
+
+
+def flying(mech, height):
+    """A turned, turning block or ball with its centre at this height."""
+    return np.r_[0.0, 0.0, height, rot.exp(np.array([0.4, -0.3, 0.2])), 1.0, -2.0, -1.5, 3.0, 1.0, -4.0]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("kappa", "height"), [(1e-8, 3.0), (1e-6, 20.0), (1e-4, 300.0)])
+def test_a_far_block_moves_as_if_all_its_corners_were_solved_for(law, kappa, height):
+    compare(block(law=law), flying(None, height), np.zeros(0), kappa, left_out=8)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.8])
+def test_a_far_ball_feels_its_radius_and_a_slope(friction):
+    mech = ball(radius=0.3, friction=friction)
+    slope = dataclasses.replace(mech.contacts[0], normal=(0.3, -0.2, 0.9), height=-20.0)
+    compare(dataclasses.replace(mech, contacts=[slope]), flying(None, 1.0), 0.1 * np.ones(6), left_out=1)
+
+
+def test_contacts_of_one_body_are_far_while_those_of_another_are_near():
+    mech = chain("revolute", 1, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)
+    contacts = [dojo.Contact(f"body{i}", (0.1, -0.05, -0.2), 0.05, name=f"{i}", height=-60.0 * i) for i in range(2)]
+    mech = dataclasses.replace(mech, contacts=contacts)
+    x = dojo.Simulator(mech).neutral()
+    x[2] = 0.3
+    compare(mech, x, np.zeros(1), left_out=1)
+
+
+def test_at_a_large_kappa_a_contact_is_felt_from_a_distance():
+    sim = dojo.Simulator(block(), time_step=0.02, kappa=1e-2)
+    x = flying(None, 3.0)
+    A, _ = sim.linearize(x)
+    assert far(sim)[0] == 0
+    free, _ = sim.linearize(x, kappa=1e-10)
+    assert far(sim)[0] == 8
+    assert np.abs(A - free).max() > 1e-5
+
+
+@pytest.mark.parametrize("height", [4.0, 12.0])
+def test_what_comes_near_within_the_step_is_solved_for(height):
+    """Shot at the ground with 2 km/s, far and at rest before: balance and contact law hold at the solution."""
+    push = dojo.Input(body="ball", force=(0.0, 0.0, 1.0))
+    mech = dataclasses.replace(ball(radius=0.1, friction=0.5), inputs=[push])
+    sim, h, kappa = dojo.Simulator(mech, time_step=0.02), 0.02, 1e-6
+    x = np.r_[0.0, 0.0, height, 1.0, np.zeros(9)]
+    assert sim.step(x).success and far(sim)[0] == 1
+    result = sim.step(x, [-1e5])
+    assert result.success and far(sim)[0] == 0
+    gap, impulse = result.contacts.gap[0], result.contacts.impulse[0, 2]
+    np.testing.assert_allclose(gap * impulse, kappa, rtol=1e-2)
+    np.testing.assert_allclose(result.x[9], h * (-9.81 - 1e5) + impulse, atol=2e3 * TOLERANCE)
+
+
+def test_a_fall_from_far_to_near():
+    """Impulses that stand from step to step, contacts that become near: the same path, and gaps as they are."""
+    sim, exact = pair(block(friction=0.3), kappa=1e-8)
+    x = sim.start(flying(None, 2.0)[:7], flying(None, 2.0)[7:])
+    us = np.zeros((60, 0))
+    counts = [far(sim)[0] for t in range(0, 61, 5) if sim.rollout(x, us[: t + 1]).success]
+    assert counts[0] == 8 and counts[-1] == 0
+    path, expected = sim.rollout(x, us), exact.rollout(x, us)
+    flight = int(
+        np.argmax(expected.contacts.gap.min(axis=1) < 1e-2)
+    )  # what follows an impact depends on its last digit
+    assert flight > 10
+    np.testing.assert_allclose(path.x[:flight], expected.x[:flight], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(path.contacts.gap, [gaps(sim, x) for x in path.x[1:]], rtol=0, atol=1e-9)
+    assert np.linalg.norm(path.x[-1, :3] - expected.x[-1, :3]) < 1e-3
+
+
+def test_far_contacts_push_by_the_law_of_the_central_path():
+    """In flight momentum changes by gravity and by kappa/gap of every corner, to the tolerance of every step."""
+    kappa, steps = 1e-6, 50
+    sim = dojo.Simulator(block(friction=0.0, gravity=np.zeros(3)), time_step=0.02, kappa=kappa)
+    x = sim.start(flying(None, 40.0)[:7], flying(None, 40.0)[7:])
+    path = sim.rollout(x, np.zeros((steps, 0)))
+    assert far(sim)[0] == 8
+    push = kappa / path.contacts.gap
+    np.testing.assert_allclose(path.contacts.impulse[..., 2], push, rtol=0, atol=TOLERANCE)
+    linear = np.array([sim.momentum(state)[0] for state in path.x])
+    np.testing.assert_allclose(np.diff(linear[:, 2]), push.sum(axis=1), rtol=0, atol=3 * TOLERANCE)
+    assert push.sum() > 100 * TOLERANCE * steps / 50, "nothing to be seen"
+
+
+def test_a_limit_is_far_in_the_middle_of_its_range_and_near_at_its_end():
+    sim = dojo.Simulator(slider(limits=(-0.5, 0.5)), time_step=0.02)
+    for q, expected in ((0.0, 2), (0.4995, 1)):
+        assert sim.step(np.array([q, 0.0])).success
+        assert far(sim)[1] == expected
+
+
+def test_a_stop_that_is_hit_from_afar_is_solved_for():
+    sim = dojo.Simulator(slider(limits=(-0.5, 0.5)), time_step=0.02)
+    result = sim.step([0.0, 0.0], [1e5])
+    assert result.success and far(sim)[1] == 1
+    gap, impulse = 0.5 - result.x[0], 0.02 * 1e5 - result.x[1]
+    np.testing.assert_allclose(gap * impulse, 1e-6, rtol=1e-2)
+
+
+@pytest.mark.parametrize("kappa", [1e-8, 1e-6, 1e-4])
+def test_far_limits_against_the_slow_reference(kappa, rng):
+    """Their law is exact at every tolerance."""
+    mech = pendulum(2, limits=(-0.5, 0.5), damper=0.1)
+    sim = dojo.Simulator(mech, time_step=0.02, kappa=kappa, tolerance=1e-12)
+    for angle, left_out in ((0.0, 4 if kappa < 1e-5 else None), (0.3, None), (0.49, None)):
+        x, u = np.r_[angle, angle, 0.5, -0.5], rng.normal(size=2)
+        result = sim.step(x, u)
+        expected = solve(from_mechanism(mech), x[:2], x[2:], u, 0.02, kappa)
+        np.testing.assert_allclose(result.x[2:], expected.v, rtol=0, atol=1e-7)
+        if left_out is not None:
+            assert far(sim)[1] == left_out
+
+
+def test_every_contact_is_in_one_cluster(rng):
+    """Balls of the clusters hold their contacts; bodies and directions do not mix."""
+    mech = chain("spherical", 2)
+    contacts = [
+        dojo.Contact(f"body{i}", rng.normal(size=3), 0.1 * k, name=f"{i} {k} {n}", normal=n, height=-9.0)
+        for i in range(3)
+        for n in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+        for k in range(1, 4)
+    ]
+    model = dojo.Simulator(dataclasses.replace(mech, contacts=contacts)).model
+    starts = np.flatnonzero(model.cluster_end)
+    assert starts.tolist() == [0, 3, 6, 9, 12, 15] and model.cluster_end[starts].tolist() == [3, 6, 9, 12, 15, 18]
+    for first, last in pairwise([*starts, 18]):
+        ball_of = model.cluster[first]
+        reach = np.linalg.norm(model.contact_point[first:last] - ball_of[:3], axis=1) + model.contact_radius[first:last]
+        assert reach.max() <= ball_of[3] + 1e-12
+        arms = np.linalg.norm(model.contact_point[first:last], axis=1) + model.contact_radius[first:last]
+        np.testing.assert_allclose(ball_of[4], arms.max())
+
+
+def test_mobility_bounds_the_velocity_per_impulse(rng):
+    """On any direction at any contact, with the body alone, which every joint only makes harder to move."""
+    mech = dataclasses.replace(
+        chain("floating", 0), contacts=[dojo.Contact("body0", p, 0.05, name=str(k)) for k, p in enumerate(np.eye(3))]
+    )
+    model = dojo.Simulator(mech).model
+    J = np.linalg.inv(model.body_inertia[0].reshape(3, 3))
+    largest = 0.0
+    for p in model.contact_point:
+        for n in rng.normal(size=(200, 3)):
+            n /= np.linalg.norm(n)
+            r = p - 0.05 * n
+            for f in rng.normal(size=(20, 3)):
+                t = np.cross(r, f / np.linalg.norm(f))
+                largest = max(largest, 1.0 / model.body_mass[0] + t @ J @ t)
+    assert largest <= model.cluster[0, 5] <= 4.0 * largest
