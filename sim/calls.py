@@ -2,7 +2,7 @@
 
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
-    contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
+    contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Scratch belongs to a thread, so that one Simulator may be used from several.
 """
@@ -23,7 +23,7 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-REPORT, CONTACT = 5, 8
+REPORT, CONTACT = 5, 11
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 _CHUNKS = 4  # per core: evens out knots that take longer
 
@@ -50,7 +50,7 @@ class Calls:
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
         self.hard = 1 if self.sizes.ncontact + self.sizes.nlimit else None  # None: the interior point is not compiled
         self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
-        self._model = table(model)
+        self._model = table(model, rich=self.sizes.ncoupling > 0)
         self._scratch = threading.local()
 
     def __getstate__(self) -> tuple[Model, Settings]:

@@ -21,7 +21,7 @@ from solvers.jit import kernel
 def contact_kinematics(model: Model, work: Work, h: float) -> None:
     """Gap, slip and arms of every contact at configuration 3."""
     g = 2.0 / h
-    for c in range(model.contact_body.shape[0]):
+    for c in range(model.contact_height.shape[0]):
         i = model.contact_body[c]
         k = work.contact_kin[c]
         f = model.contact_frame[c]

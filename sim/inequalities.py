@@ -18,10 +18,14 @@ from sim.friction import (
     start_contact,
 )
 from sim.limits import add_limit_blocks, limit_constants, limit_gaps, recover_limits
-from sim.model import Goal, Matrix, Model, Work
+from sim.loops import keep_loops, move_loops
+from sim.model import Goal, Matrix, Model, Vector, Work
+from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
+from solvers.record import rich
 
 _KAPPA_START = 1e-2  # [N s m]
 _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, in the start only
@@ -31,6 +35,7 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, i
 def inequality_kinematics(model: Model, work: Work, h: float) -> None:
     """Gaps and slips of contacts and limits at configuration 3."""
     contact_kinematics(model, work, h)
+    pair_kinematics(model, work, h)
     limit_gaps(model, work)
 
 
@@ -67,10 +72,11 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
 def apply_inequalities(model: Model, work: Work) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
-    for c in range(model.contact_body.shape[0]):
+    for c in range(model.contact_height.shape[0]):
         fn, f1, f2 = contact_impulse(model, work, c)
         add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
         r = max(r, contact_error(model, work, c))
+    r = max(r, apply_pairs(model, work))
     for k in range(model.limit_dof.shape[0]):
         r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
     return r
@@ -93,17 +99,18 @@ def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> N
 @kernel
 def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)"""
-    for c in range(model.contact_body.shape[0]):
+    for c in range(model.contact_height.shape[0]):
         contact_jacobian(model, work, h, c)
         condense_contact(model, work, c, kappa)
         fn, f1, f2 = contact_impulse(model, work, c)
         add_contact_matrix(model, work, h, c, fn, f1, f2, out)
+    condense_pairs(model, work, h, kappa)
 
 
 @kernel
 def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
     """A2 -= contacts: slips depend on pose 2."""
-    for c in range(model.contact_body.shape[0]):
+    for c in range(model.contact_height.shape[0]):
         add_slip_jacobian(model, work, h, c)
 
 
@@ -113,10 +120,11 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
-    for c in range(model.contact_body.shape[0]):
+    for c in range(model.contact_height.shape[0]):
         contact_constant(model, work, c, goal)
         w = work.contact_w[c]
         add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+    pair_constants(model, work, goal)
     subtree_sums(model, work.wrench, work.subtree)
     for d in range(work.dnu.shape[0]):
         a = work.S2[d]
@@ -200,6 +208,7 @@ def keep_inequalities(model: Model, work: Work) -> None:
     for k in range(model.limit_dof.shape[0]):
         work.bound_trial[k, 0] = work.bound[k, 0]
         work.bound_trial[k, 1] = work.bound[k, 1]
+    keep_loops(model, work)
 
 
 @kernel
@@ -212,6 +221,7 @@ def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     for k in range(model.limit_dof.shape[0]):
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+    move_loops(model, work, alpha)
 
 
 @kernel
@@ -231,14 +241,31 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
 
 @kernel
 def report_contacts(model: Model, work: Work, out: Matrix) -> None:
-    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, after a step.  (ncontact, 8)"""
-    for c in range(model.contact_body.shape[0]):
-        i = model.contact_body[c]
-        k = work.contact_kin[c]
-        F = model.contact_frame[c]
-        fn, f1, f2 = contact_impulse(model, work, c)
-        for e in range(3):
-            out[c, e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-            out[c, 3 + e] = work.pos3[i, e] + k[3 + e]
-        out[c, 6] = k[0]
-        out[c, 7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5
+    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
+
+    (ncontact, 11)
+    """
+    for c in range(model.contact_height.shape[0]):
+        _report_contact(model, work, c, model.contact_frame[c], out[c])
+    report_pairs(model, work, out)
+
+
+@rich()
+def report_pairs(model: Model, work: Work, out: Matrix) -> None:
+    """The rows of the pairs: impulse on the first body."""
+    for j in range(model.pair_kind.shape[0]):
+        c = model.contact_height.shape[0] + j
+        _report_contact(model, work, c, work.pair_frame[j], out[c])
+
+
+@kernel
+def _report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    fn, f1, f2 = contact_impulse(model, work, c)
+    for e in range(3):
+        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+        out[3 + e] = work.pos3[i, e] + k[3 + e]
+        out[8 + e] = F[e]
+    out[6] = k[0]
+    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

@@ -103,6 +103,7 @@ class Joint:
     damper: ArrayLike = 0.0
     rest: ArrayLike = 0.0
     limits: Sequence[Any] | None = None
+    close: bool = False  # closes a loop: child hangs on another joint already
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -117,6 +118,11 @@ class Joint:
         for field in ("spring", "damper", "rest"):
             object.__setattr__(self, field, self._per_dof(call, field))
         object.__setattr__(self, "limits", self._limits(call))
+        limited = any(np.isfinite(b) for pair in self.limits or () for b in pair)
+        if self.close and (any(self.spring) or any(self.damper) or limited):  # type: ignore[arg-type]
+            raise ValueError(
+                f"{call}): a joint that closes a loop has no spring, damper or limits; give them to others"
+            )
 
     @property
     def ntrans(self) -> int:
