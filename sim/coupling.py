@@ -2,12 +2,14 @@
 
 A coupling of the bodies a and b adds B f to the wrench on a and takes it from that on b, about O:
 
-    pairs in contact    f (6,), B = I       f - K_a zeta_a - K_b zeta_b = 0
-    closed loop         f (m,), B = G2^T    -G3 zeta_a + G3 zeta_b = g
+    pairs in contact    (K_a, K_b) = B D R        f/D - R_a zeta_a - R_b zeta_b = 0
+    closed loop         B = G2^T                      - G3 zeta_a + G3 zeta_b = g
 
-With the tree eliminated, twists are zeta = zeta_0 + Z f, where zeta_0 answers the right-hand side and Z the unit forces:
+K are the derivatives of the wrench by the twists of the bodies, of rank six at most; taking them apart keeps the
+stiffness D of contacts, up to 1e16, out of the sums. With the tree eliminated, twists are zeta = zeta_0 + Z f, where
+zeta_0 answers the right-hand side and Z the unit forces:
 
-    (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        R_a = K_a or G3,  R_b = K_b or -G3,  E = I or 0
+    (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
 so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
 new (a planar loop in space) are found by the pivots, and their forces set to zero.
@@ -22,6 +24,10 @@ from solvers.jit import kernel
 from solvers.record import rich
 
 
+_ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
+_DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
+
+
 @kernel
 def is_loop(model: Model, k: int) -> bool:
     """Whether coupling k is a closed loop; they come after the pairs."""
@@ -29,17 +35,45 @@ def is_loop(model: Model, k: int) -> bool:
 
 
 @kernel
-def coupling_rows(model: Model, work: Work) -> None:
-    """couple_B and couple_R of the pairs: unit wrenches, and K. (Those of loops are filled by loops.py.)"""
-    for k in range(model.coupling_body.shape[0]):
-        if is_loop(model, k):
+def take_apart(work: Work, k: int, row: int) -> None:
+    """Rows of couple_B, couple_R and couple_E from row on: (K_a, K_b) = B D R by elimination with full pivoting.
+
+    coupling_K is used up; what is left when the pivots have fallen to rounding is dropped: forces without effect.
+    """
+    first = 0.0
+    for r in range(row, row + 6):
+        best = 0.0
+        i = 0
+        j = 0
+        for side in range(2):
+            K = work.coupling_K[2 * k + side]
+            for e in range(36):
+                if abs(K[e]) > abs(best):
+                    best = K[e]
+                    i = e // 6
+                    j = 6 * side + e % 6
+        if r == row:
+            first = abs(best)
+        B = work.couple_B[r]
+        R = work.couple_R[r]
+        for c in range(6):
+            B[c] = 0.0
+            R[c] = 0.0
+            R[6 + c] = 0.0
+        work.couple_E[r] = 1.0
+        if not abs(best) > _ROUNDING * first:
             continue
-        for r in range(6):
-            row = model.coupling_row[k] + r
+        work.couple_E[r] = 1.0 / best
+        for c in range(6):
+            B[c] = work.coupling_K[2 * k + j // 6, 6 * c + j % 6] / best
+            R[c] = work.coupling_K[2 * k, 6 * i + c] / best
+            R[6 + c] = work.coupling_K[2 * k + 1, 6 * i + c] / best
+        for side in range(2):
+            K = work.coupling_K[2 * k + side]
             for c in range(6):
-                work.couple_B[row, c] = 1.0 if r == c else 0.0
-                work.couple_R[row, c] = work.coupling_K[2 * k, 6 * r + c]
-                work.couple_R[row, 6 + c] = work.coupling_K[2 * k + 1, 6 * r + c]
+                f = best * B[c]
+                for e in range(6):
+                    K[6 * c + e] -= f * R[6 * side + e]
 
 
 @kernel
@@ -78,8 +112,10 @@ def _row_scale(work: Work, row: int) -> float:
 @rich("True")
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
-    coupling_rows(model, work)
     pairs = 0
+    for k in range(model.coupling_body.shape[0]):
+        if not is_loop(model, k):
+            take_apart(work, k, model.coupling_row[k])
     for k in range(model.coupling_body.shape[0]):
         for col in range(model.coupling_row[k], model.coupling_row[k + 1]):
             for d in range(work.rhs.shape[0]):
@@ -91,14 +127,14 @@ def factor_coupling(model: Model, work: Work) -> bool:
                 for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
                     work.couple_T[row, col] = -response(model, work, m, row)
             if not is_loop(model, k):
-                work.couple_T[col, col] += 1.0
+                work.couple_T[col, col] += work.couple_E[col]
                 pairs += 1
-    for k in range(model.coupling_body.shape[0]):
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            work.couple_scale[row] = _row_scale(work, row) if is_loop(model, k) else 1.0
-            for col in range(work.couple_T.shape[1]):
-                work.couple_T[row, col] *= work.couple_scale[row]
-    rank = full_lu_factor(work.couple_T, work.couple_pivots)
+    for row in range(work.couple_T.shape[0]):
+        work.couple_scale[row] = _row_scale(work, row)
+        for col in range(work.couple_T.shape[1]):
+            work.couple_T[row, col] *= work.couple_scale[row]
+    least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
+    rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
     work.couple_rank[0] = rank
     return rank >= pairs
 

@@ -179,7 +179,6 @@ def loop_stiffness(model: Model, work: Work, m: int, K2: Matrix) -> Vec3:
     b = model.coupling_body[k, 1]
     row = model.coupling_row[k]
     loop_frame(model, work, m, b, work.pos2, work.rot2)
-    Q = work.loop_frame[m]
     A = child_point(model, m, a, work.pos2, work.rot2)
     o = work.origin
     P = (A[0] - o[0], A[1] - o[1], A[2] - o[2])

@@ -159,7 +159,8 @@ class Work(NamedTuple):
     coupling_K2: Matrix  # (2 ncoupling, 36) the same by twists of configuration 2
     couple_B: Matrix  # (nrow, 6) wrench on a of a unit force
     couple_G: Matrix  # (nrow, 6) constraint directions of loops at configuration 3
-    couple_R: Matrix  # (nrow, 12) answer of a force to the twists of a and b
+    couple_R: Matrix  # (nrow, 12) what a force resists, of the twists of a and b
+    couple_E: Vector  # (nrow,) how much it gives, 0 for loops
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)

@@ -10,22 +10,19 @@ from solvers.jit import kernel
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_RANK = 1e-10  # pivots of dependent rows, which were scaled to one, are rounding: below this,
-_ROUNDING = 1e-14  # or below this share of the first pivot
-
 
 @kernel
-def full_lu_factor(A: Matrix, pivots: Matrix) -> int:
+def full_lu_factor(A: Matrix, pivots: Matrix, least: float) -> int:
     """A := the LU factors of P A Q; returns the rank, or -1 if an entry is not finite.
 
-    pivots: (n, 2) row and column exchanged at each elimination. Rows that may depend on others should be scaled to one.
+    pivots: (n, 2) row and column exchanged at each elimination; least: a smaller pivot counts as zero, so rows should
+    be scaled to one.
     """
     n = A.shape[0]
     for r in range(n):
         for c in range(n):
             if not abs(A[r, c]) < 1e300:
                 return -1
-    least = _RANK
     for k in range(n):
         best = 0.0
         row = k
@@ -37,8 +34,6 @@ def full_lu_factor(A: Matrix, pivots: Matrix) -> int:
                     best = abs(a[c])
                     row = r
                     col = c
-        if k == 0:
-            least = max(_RANK, _ROUNDING * best)
         if best < least:
             return k
         pivots[k, 0] = row
@@ -59,7 +54,7 @@ def full_lu_factor(A: Matrix, pivots: Matrix) -> int:
 
 @kernel
 def full_lu_solve(A: Matrix, pivots: Matrix, rank: int, B: Matrix) -> None:
-    """B := a solution of A X = B, (n, m), with the unknowns beyond the rank at zero: their equations depend on others."""
+    """B := a solution of A X = B, (n, m), with the unknowns beyond the rank at zero."""
     n = A.shape[0]
     m = B.shape[1]
     for k in range(rank):

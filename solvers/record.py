@@ -144,7 +144,7 @@ _OPTIONS = {"_nrt": False, "error_model": "numpy"}
 
 
 def rich(otherwise: str = "None") -> Callable[[F], F]:
-    """A kernel that exists only where its first argument is a rich record; elsewhere a call is the constant `otherwise`.
+    """A kernel that exists only where its first argument is a rich record; elsewhere its call is `otherwise`.
 
     The choice is one of types, made while a caller is compiled.
     """
