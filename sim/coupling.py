@@ -23,7 +23,6 @@ from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
 from solvers.record import rich
 
-
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
 
