@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.collisions import couples, pack_collisions
 from sim.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Late, Law, Model
-from sim.parts import Contact, Joint
+from sim.parts import WORLD, Contact, Joint
+from sim.shapes import rotation_matrix
 from sim.swing import swing_curvature, swing_pose
 
 Floats = NDArray[np.float64]
@@ -22,7 +24,19 @@ _CONE = 0.0  # instead of the sign of a bound
 def mechanism_sizes(mech: Mechanism) -> Sizes:
     """Counts of a mechanism; a limit is one bound of one degree of freedom."""
     nlimit = sum(len(_bounds(j)) for j in mech.joints)
-    return Sizes(mech.nbody, mech.nq, mech.nv, len(mech.contacts), nlimit, len(mech.inputs or ()))
+    npair, npairs = len(mech.touches), len(couples(mech.touches))
+    return Sizes(
+        nbody=mech.nbody,
+        nq=mech.nq,
+        nv=mech.nv,
+        ncontact=len(mech.contacts) + npair,
+        nlimit=nlimit,
+        nu=len(mech.inputs or ()),
+        npair=npair,
+        ncoupling=npairs + len(mech.loops),
+        nrow=6 * npairs + sum(6 - j.nv for j in mech.loops),
+        nloop=len(mech.loops),
+    )
 
 
 def pack(mech: Mechanism) -> Model:
@@ -31,6 +45,8 @@ def pack(mech: Mechanism) -> Model:
     _pack_tree(mech, model)
     _pack_joints(mech.joints, model)
     _pack_contacts(mech, model)
+    pack_collisions(mech, model)
+    _pack_loops(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
     bind(model)
@@ -147,9 +163,9 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
 
 def _pack_clusters(model: Model) -> None:
     """Contacts that follow one another on one body, against one direction: the ball around them (far.py)."""
-    first, count = 0, len(model.contact_body)
+    first, count = 0, len(model.contact_height)
     while first < count:
-        same = (model.contact_body == model.contact_body[first]) & np.all(
+        same = (model.contact_body[:count] == model.contact_body[first]) & np.all(
             model.contact_frame == model.contact_frame[first], axis=1
         )
         end = first + int(np.argmin(np.append(same[first:], False)))
@@ -180,6 +196,23 @@ def _mobility(model: Model, body: int) -> tuple[float, float]:
     least = float(np.linalg.eigvalsh(model.body_inertia[body].reshape(3, 3))[0])
     mass = float(model.body_mass[body])
     return (1.0 / mass, 1.0 / least) if mass > 0.0 else (np.inf, np.inf)
+
+
+def _pack_loops(mech: Mechanism, model: Model) -> None:
+    first = len(model.coupling_body) - len(mech.loops)
+    for m, joint in enumerate(mech.loops):
+        k = first + m
+        ends = (joint.child, joint.parent)
+        model.coupling_body[k] = [-1 if name == WORLD else mech.body_names.index(name or "") for name in ends]
+        model.coupling_row[k + 1] = model.coupling_row[k] + 6 - joint.nv
+        model.loop_ntrans[m], model.loop_nrot[m] = joint.ntrans, joint.nrot
+        model.loop_point[m] = np.concatenate([np.asarray(joint.parent_point), np.asarray(joint.child_point)])
+        model.loop_offset[m] = rotation_matrix(joint.orientation).ravel()
+        free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
+        fixed = np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
+        model.loop_axes[m, : fixed.size] = fixed.ravel()
+        axis, first_across, second_across = contact_frame(joint.axis)
+        model.loop_axis[m] = np.concatenate([first_across, second_across, axis])
 
 
 def _pack_inputs(mech: Mechanism, model: Model) -> None:

@@ -2,7 +2,7 @@
 
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
-    contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
+    contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Scratch belongs to a thread, so that one Simulator may be used from several.
 """
@@ -25,7 +25,7 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-REPORT, CONTACT, CONE, BOUND = 5, 8, 12, 2  # numbers of a step, or of one of its contacts or limits
+REPORT, CONTACT, CONE, BOUND = 5, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 _CHUNKS = 4  # per core: evens out knots that take longer
 
@@ -54,7 +54,7 @@ class Calls:
         self.hard = 1 if self.sizes.ncontact + self.sizes.nlimit else None  # None: the interior point is not compiled
         self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
         bind(model)  # addresses are those of this process
-        self._model = table(model)
+        self._model = table(model, rich=self.sizes.ncoupling > 0)
         # what a policy need not know: derivatives and cone variables of its steps
         self.unknown = tuple(
             np.empty((0, *shape))

@@ -13,6 +13,7 @@ from sim.inequalities import (
     start_inequalities,
 )
 from sim.joints import joint_impulses
+from sim.loops import apply_loops
 from sim.model import Guess, Model, Options, Vector, Work
 from sim.newton import norm
 from solvers.jit import inlined, kernel
@@ -29,7 +30,7 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
     for i in range(work.balance.shape[0]):
         for k in range(6):
             work.wrench[i, k] = work.balance[i, k]
-    e = apply_inequalities(model, work)
+    e = max(apply_inequalities(model, work), apply_loops(model, work))
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)
     joint_impulses(model, work, h, q, v, u)
@@ -62,7 +63,7 @@ def first_attempt(
     Leaves the iterate at the start of attempt 0.
     """
     q, v, u = inputs
-    if work.count[0] + work.count[1] == 0:  # nothing to be on the central path of
+    if work.count[3] + work.count[1] == 0:  # nothing to be on the central path of
         return 0 if place(model, work, options.h, q, guess.velocity, 1.0) else 1
     keep_inequalities(model, work)
     if not place(model, work, options.h, q, v, 1.0):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from sim.contact import contact_kinematics
 from sim.friction import contact_error, contact_impulse, slip_violation
-from sim.model import Matrix, Model, Work
+from sim.model import Matrix, Model, Vector, Work
 from solvers.jit import kernel
+from solvers.record import rich
 
 
 @kernel
@@ -16,7 +17,7 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     for m in range(work.count[1]):
         k = work.near_limit[m]
         error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
             if e > error:
@@ -27,17 +28,35 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
 
 @kernel
 def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
-    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, after a step.  (ncontact, 8)"""
+    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
+
+    (ncontact, 11)
+    """
     for m in range(work.count[2]):
         first = work.far_first[m]
         contact_kinematics(model, work, h, first, model.cluster_end[first])
-    for c in range(model.contact_body.shape[0]):
-        i = model.contact_body[c]
-        k = work.contact_kin[c]
-        F = model.contact_frame[c]
-        fn, f1, f2 = contact_impulse(model, work, c)
-        for e in range(3):
-            out[c, e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-            out[c, 3 + e] = work.pos3[i, e] + k[3 + e]
-        out[c, 6] = k[0]
-        out[c, 7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5
+    for c in range(model.contact_height.shape[0]):
+        _report_contact(model, work, c, model.contact_frame[c], out[c])
+    report_pairs(model, work, out)
+
+
+@rich()
+def report_pairs(model: Model, work: Work, out: Matrix) -> None:
+    """The rows of the pairs: impulse on the first body."""
+    for j in range(model.pair_kind.shape[0]):
+        c = model.contact_height.shape[0] + j
+        _report_contact(model, work, c, work.pair_frame[j], out[c])
+
+
+@kernel
+def _report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+    """One row, with the frame F of its normal and tangents."""
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    fn, f1, f2 = contact_impulse(model, work, c)
+    for e in range(3):
+        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+        out[3 + e] = work.pos3[i, e] + k[3 + e]
+        out[8 + e] = F[e]
+    out[6] = k[0]
+    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

@@ -54,7 +54,7 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
     """
     known = work.far_law[0] == options.kappa
     work.far_law[0] = options.kappa
-    count = model.contact_body.shape[0]
+    count = model.contact_height.shape[0]
     c = 0
     while c < count:
         a = _half_gap_ahead(model, work, c)
@@ -82,7 +82,7 @@ def _sort(model: Model, work: Work) -> None:
     runs = 0
     far = 0
     c = 0
-    while c < model.contact_body.shape[0]:
+    while c < model.contact_height.shape[0]:
         end = model.cluster_end[c]
         if work.far[c, 0] > 0.0:
             work.far_first[far] = c
@@ -96,6 +96,11 @@ def _sort(model: Model, work: Work) -> None:
         c = end
     work.count[0] = runs
     work.count[2] = far
+    if model.contact_body.shape[0] > c:  # pairs of bodies
+        work.near[runs, 0] = c
+        work.near[runs, 1] = model.contact_body.shape[0]
+        runs += 1
+    work.count[3] = runs
 
 
 @kernel

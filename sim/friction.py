@@ -10,6 +10,7 @@ from __future__ import annotations
 from sim.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
 from sim.contact import contact_rate
 from sim.model import Goal, Law, Model, Work
+from sim.pairs import pair_rate
 from sim.pyramid import (
     condense_pyramid,
     pyramid_boundary,
@@ -88,7 +89,7 @@ def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
 def slip_noise(model: Model, work: Work, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             i = model.contact_body[c]
             k = work.contact_kin[c]
@@ -170,7 +171,10 @@ def recover_contact(model: Model, work: Work, h: float, c: int, share: float) ->
     """cone_step of contact c from the body twists of the last solve."""
     z = work.cone[c]
     d = work.cone_step[c]
-    a, x, y = contact_rate(model, work, h, c)
+    if c < model.contact_height.shape[0]:
+        a, x, y = contact_rate(model, work, h, c)
+    else:
+        a, x, y = pair_rate(model, work, c)
     d[0] = a + share * (work.contact_kin[c, 0] - z[0])
     d[1] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
     law = law_of(model, c)

@@ -6,6 +6,8 @@ central path the condensed contact matrices W are the exact derivatives of the i
 
 from __future__ import annotations
 
+from sim.coupling import factor_coupling, solve_coupling_panel
+from sim.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
 from sim.inequalities import add_slip_jacobians, condense_into
@@ -42,13 +44,18 @@ def gradient(
             work.A[i, k] = work.A3[i, k]
     if not factor(model, work):
         return False
+    add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    add_coupling_derivatives(model, work)
+    if not factor_coupling(model, work):
+        return False
     add_swing_curvature(model, work, q)
     add_spring_derivatives(model, work, h, q, v)
     _joint_columns(model, work, h, v, hard)
     _input_columns(model, work, h)
     solve_panel(model, work)
+    solve_coupling_panel(model, work)
     _next_state(model, work, h, A, B)
     return True
 

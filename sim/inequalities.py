@@ -22,7 +22,10 @@ from sim.friction import (
     start_contact,
 )
 from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
+from sim.loops import keep_loops, move_loops
 from sim.model import Goal, Matrix, Model, Work
+from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
@@ -37,6 +40,7 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
     for m in range(work.count[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
+    pair_kinematics(model, work, h)
     limit_gaps(model, work, h)
 
 
@@ -50,7 +54,7 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     """
     k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             d = -work.contact_kin[c, 0]
             if d > 0.0:
@@ -62,7 +66,7 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
         if d > 0.0:
             k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             start_contact(model, work, c, k0, floor)
     for m in range(work.count[1]):
@@ -83,6 +87,7 @@ def apply_inequalities(model: Model, work: Work) -> float:
             add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
             r = max(r, contact_error(model, work, c))
     add_far_wrenches(model, work)
+    r = max(r, apply_pairs(model, work))
     for m in range(work.count[1]):
         k = work.near_limit[m]
         r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
@@ -112,6 +117,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix)
             condense_contact(model, work, c, kappa)
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_matrix(model, work, h, c, fn, f1, f2, out)
+    condense_pairs(model, work, h, kappa)
 
 
 @kernel
@@ -133,6 +139,7 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
             contact_constant(model, work, c, goal)
             w = work.contact_w[c]
             add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+    pair_constants(model, work, goal)
     subtree_sums(model, work.wrench, work.subtree)
     for d in range(work.dnu.shape[0]):
         a = work.S2[d]
@@ -144,7 +151,7 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
 @kernel
 def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             recover_contact(model, work, h, c, share)
     recover_limits(model, work, h, share)
@@ -156,7 +163,7 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
     total = 0.0
     count = 0.0
     violation = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             t, n, low, high = contact_products(model, work, c)
             total += t
@@ -175,7 +182,7 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
 def slip_error(model: Model, work: Work, kappa: float) -> float:
     """Largest violation of the friction law of the central path of kappa, in units of kappa."""
     e = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             e = max(e, slip_violation(model, work, c, kappa))
     return e
@@ -186,7 +193,7 @@ def products_ahead(model: Model, work: Work, alpha: float) -> float:
     """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
     total = 0.0
     count = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             t, n = contact_products_ahead(model, work, c, alpha)
             total += t
@@ -204,7 +211,7 @@ def products_ahead(model: Model, work: Work, alpha: float) -> float:
 def boundary_step(model: Model, work: Work) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
     a = 1e30
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             a = min(a, contact_boundary(model, work, c))
     for m in range(work.count[1]):
@@ -218,7 +225,7 @@ def boundary_step(model: Model, work: Work) -> float:
 @kernel
 def keep_inequalities(model: Model, work: Work) -> None:
     """Remember the cone variables from which the line search starts."""
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             for k in range(12):
                 work.cone_trial[c, k] = work.cone[c, k]
@@ -226,12 +233,13 @@ def keep_inequalities(model: Model, work: Work) -> None:
         k = work.near_limit[m]
         work.bound_trial[k, 0] = work.bound[k, 0]
         work.bound_trial[k, 1] = work.bound[k, 1]
+    keep_loops(model, work)
 
 
 @kernel
 def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     """cone = kept + alpha step."""
-    for m in range(work.count[0]):
+    for m in range(work.count[3]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             for k in range(12):
                 work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
@@ -240,3 +248,4 @@ def move_inequalities(model: Model, work: Work, alpha: float) -> None:
         k = work.near_limit[m]
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+    move_loops(model, work, alpha)

@@ -18,6 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.central_path import first_attempt, residuals, start
+from sim.coupling import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, solve
 from sim.far import came_near, choose_far
@@ -71,7 +72,7 @@ def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smo
     momentum_balance_jacobian(model, work, h, work.A)
     joint_blocks(model, work, h, q, v)
     condense_inequalities(model, work, h, smoothing)
-    return factor(model, work)
+    return factor(model, work) and factor_coupling(model, work)
 
 
 @inlined
@@ -97,6 +98,7 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
             work.dnu[d] = -share * work.residual[d]
         inequality_rhs(model, work, goal)
         solve(model, work, work.dnu, work.dnu)
+        solve_coupling(model, work, share, work.dnu)
         recover_inequalities(model, work, h, share)
         alpha = boundary_step(model, work)
         if phase == 0:

@@ -25,8 +25,9 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end ncontact, late 5,
-    limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late 5,
+    pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
+    loop_ntrans nloop, loop_nrot nloop, limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
     """
 )
 
@@ -35,13 +36,14 @@ MODEL_FLOATS = _shapes(
     body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_swing_axes nbody 6, dof_spring nv,
     dof_damper nv, dof_armature nv, dof_rest nv,
-    contact_point ncontact 3, contact_radius ncontact, contact_friction ncontact, contact_frame ncontact 9,
-    contact_height ncontact, cluster ncontact 8, limit_sign nlimit, limit_bound nlimit, limit_mobility nlimit,
-    input_wrench nu 6, gravity 3
+    contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_frame nground 9,
+    contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, loop_point nloop 6,
+    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9, limit_sign nlimit, limit_bound nlimit,
+    limit_mobility nlimit, input_wrench nu 6, gravity 3
     """
 )
 
-WORK_INTS = _shapes("count 3, near ncontact 2, near_limit nlimit, far_first ncontact")
+WORK_INTS = _shapes("count 4, near ncontact 2, near_limit nlimit, far_first nground")
 
 WORK_FLOATS = _shapes(
     """
@@ -52,9 +54,15 @@ WORK_FLOATS = _shapes(
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
+    shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43, pair_frame npair 12,
+    pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
+    coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 1,
+    couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
+    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
-    far ncontact 24, far_limit nlimit, far_law 2
+    far nground 24, far_limit nlimit, far_law 2
     """
 )
 
@@ -71,6 +79,10 @@ class Sizes(NamedTuple):
     ncontact: int
     nlimit: int
     nu: int
+    npair: int = 0  # contacts between two bodies, or of one with an obstacle
+    ncoupling: int = 0  # two bodies with pairs, and closed loops
+    nrow: int = 0  # unknown forces of the couplings
+    nloop: int = 0
 
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
@@ -82,6 +94,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "2nv+nu": 2 * sizes.nv + sizes.nu,
         "2nv": 2 * sizes.nv,
         "nx": sizes.nq + sizes.nv,
+        "nground": sizes.ncontact - sizes.npair,
+        "2npair": 2 * sizes.npair,
+        "ncoupling+1": sizes.ncoupling + 1,
+        "2ncoupling": 2 * sizes.ncoupling,
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols
@@ -111,9 +127,17 @@ def allocate_work(sizes: Sizes) -> Work:
 
 def sizes_of(model: Model) -> Sizes:
     """Counts of a packed mechanism."""
-    nbody, nv = len(model.body_parent), len(model.dof_body)
     return Sizes(
-        nbody, int(model.body_qadr[-1]), nv, len(model.contact_body), len(model.limit_dof), len(model.input_kind)
+        nbody=len(model.body_parent),
+        nq=int(model.body_qadr[-1]),
+        nv=len(model.dof_body),
+        ncontact=len(model.contact_body),
+        nlimit=len(model.limit_dof),
+        nu=len(model.input_kind),
+        npair=len(model.pair_kind),
+        ncoupling=len(model.coupling_body),
+        nrow=int(model.coupling_row[-1]),
+        nloop=len(model.loop_ntrans),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.collisions import Collision, Touch, touches
 from sim.parts import WORLD, Body, Contact, Input, Joint
 
 
@@ -30,19 +31,28 @@ class Mechanism:
     gravity: ArrayLike = (0.0, 0.0, -9.81)  # [m/s^2]
     name: str = "mechanism"
     neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
+    collisions: Sequence[Collision] = ()
+    loops: Sequence[Joint] = ()  # joints with close=True are moved here
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
         call = f"Mechanism({self.name!r}"
-        for field, kind in (("bodies", Body), ("joints", Joint), ("contacts", Contact), ("inputs", Input)):
+        for field, kind in _KINDS.items():
             if field != "inputs" or self.inputs is not None:
                 object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
+        loops = (*self.loops, *(j for j in self.joints if j.close))
+        object.__setattr__(self, "joints", tuple(j for j in self.joints if not j.close))
+        object.__setattr__(self, "loops", _check_loops(f"{call})", loops, self.bodies, self.joints))
         bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
         _check_masses(f"{call})", bodies, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
+        for c in self.collisions:
+            for name in (c.a, c.b):
+                checks.one_of(f"{call}): body of collision {c.name!r}", name, [*self.body_names, WORLD])
+        checks.distinct(f"{call}): collisions", (c.name for c in self.collisions))
         object.__setattr__(self, "contacts", _name_contacts(f"{call})", self.contacts, self.body_names))
         object.__setattr__(self, "inputs", self._name_inputs(call))
         object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
@@ -75,8 +85,13 @@ class Mechanism:
 
     @property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of the contacts."""
-        return tuple(c.name for c in self.contacts)
+        """Names of the contacts: those with the ground, then the contact points of the collisions."""
+        return (*(c.name for c in self.contacts), *(touch.name for touch in self.touches))
+
+    @cached_property
+    def touches(self) -> tuple[Touch, ...]:
+        """The contact points that the collisions may have."""
+        return tuple(touches(self))
 
     @cached_property
     def contact_normals(self) -> NDArray[np.float64]:
@@ -146,6 +161,32 @@ class Mechanism:
         return tuple(float(x) for x in q)
 
 
+_KINDS = {
+    "bodies": Body,
+    "joints": Joint,
+    "contacts": Contact,
+    "inputs": Input,
+    "collisions": Collision,
+    "loops": Joint,
+}
+
+
+def _check_loops(
+    call: str, loops: Sequence[Joint], bodies: Sequence[Body], joints: Sequence[Joint]
+) -> tuple[Joint, ...]:
+    """Joints that close a loop, after a look at their bodies and names."""
+    names = [b.name for b in bodies]
+    for j in loops:
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *names])
+        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, names)
+        if j.nv == 6:
+            raise ValueError(f"{call}: joint {j.name!r} closes a loop, but constrains nothing")
+        if j.parent == j.child:
+            raise ValueError(f"{call}: joint {j.name!r} closes a loop from {j.child!r} to itself")
+    checks.distinct(f"{call}: joints", (j.name for j in (*joints, *loops)))
+    return tuple(loops)
+
+
 def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
     """The parts as a tuple, each of the expected kind."""
     parts = tuple(given) if isinstance(given, Iterable) else (given,)
@@ -173,7 +214,7 @@ def _sort_tree(
         if j.child in hangs_on:
             raise ValueError(
                 f"{call}: body {j.child!r} is the child of two joints, {hangs_on[j.child]!r} and {j.name!r}; "
-                "closed loops are not supported yet"
+                "a joint that closes a loop needs close=True"
             )
         hangs_on[j.child] = j.name
     for name in by_name:

@@ -64,10 +64,17 @@ class Model(NamedTuple):
     joint_nrot: Integers  # (nbody,) free rotations: 0, 1 (about joint_axis), 2 (swing, across it) or 3 (quaternion)
     dof_body: Integers  # (nv,) body of each degree of freedom
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
-    contact_body: Integers  # (ncontact,)
+    contact_body: Integers  # (ncontact,) contacts with the ground come first, then the pairs
     contact_law: Integers  # (ncontact,) Law
     late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
-    cluster_end: Integers  # (ncontact,) of the cluster whose first contact this is, one past its last; see far.py
+    cluster_end: Integers  # (nground,) of the cluster whose first contact this is, one past its last; see far.py
+    pair_coupling: Integers  # (npair,) the coupling of its two bodies
+    pair_kind: Integers  # (npair,) of shapes
+    pair_feature: Integers  # (npair,) which point of a pair of shapes with several
+    coupling_body: Integers  # (ncoupling, 2) bodies a and b, -1 for the world; couplings of pairs first, then loops
+    coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
+    loop_ntrans: Integers  # (nloop,) free translations
+    loop_nrot: Integers  # (nloop,) free rotations
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
@@ -85,12 +92,18 @@ class Model(NamedTuple):
     dof_damper: Vector  # (nv,) [N s/m, N m s/rad]
     dof_armature: Vector  # (nv,) inertia that moves with a scalar dof alone, a rotor's [kg, kg m^2]
     dof_rest: Vector  # (nv,) spring rest of a scalar dof; of a quaternion dof, component of its rotation vector
-    contact_point: Matrix  # (ncontact, 3) sphere centre in the body, from its centre of mass [m]
-    contact_radius: Vector  # (ncontact,) [m], 0 for a point
+    contact_point: Matrix  # (nground, 3) sphere centre in the body, from its centre of mass [m]
+    contact_radius: Vector  # (nground,) [m], 0 for a point
     contact_friction: Vector  # (ncontact,) coefficient
-    contact_frame: Matrix  # (ncontact, 9) rows: normal and two tangents of the half-space, world axes
-    contact_height: Vector  # (ncontact,) the half-space is normal . x >= height [m]
-    cluster: Matrix  # (ncontact, 8) bounding balls and mobilities, in the row of the first contact; see far.py
+    contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
+    contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]
+    cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
+    pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
+    pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
+    loop_point: Matrix  # (nloop, 6) joint frame on b, joint point on a, from their centres of mass [m]
+    loop_offset: Matrix  # (nloop, 9) orientation of the joint frame on b, rotation matrix
+    loop_axes: Matrix  # (nloop, 9) translations that are not free, one per row, joint frame
+    loop_axis: Matrix  # (nloop, 9) two directions across the free axis, and the axis, joint frame
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     limit_mobility: Vector  # (nlimit,) bound of d(velocity)/d(impulse) of its degree of freedom [1/kg, 1/(kg m^2)]
@@ -155,6 +168,39 @@ class Work(NamedTuple):
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same
     contact_scale: Matrix  # (ncontact, 16) scaling of the cone
+    # pairs
+    shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
+    shape_rot: Matrix  # (2 npair, 9)
+    pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
+    pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
+    pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
+    pair_shift: Matrix  # (npair, 18) displacement of the contact point by the relative twist
+    pair_Ca: Matrix  # (npair, 18) d(gap, slip)/d(twist of a)
+    pair_Cb: Matrix  # (npair, 18)
+    pair_rows: Matrix  # (2, 6) scratch
+    pair_scratch: Vector  # (18,)
+    # couplings
+    coupling_K: Matrix  # (2 ncoupling, 36) d(wrench on a)/d(twist of a), then of b
+    coupling_K2: Matrix  # (2 ncoupling, 36) the same by twists of configuration 2
+    couple_B: Matrix  # (nrow, 6) wrench on a of a unit force
+    couple_G: Matrix  # (nrow, 6) constraint directions of loops at configuration 3
+    couple_R: Matrix  # (nrow, 12) what a force resists, of the twists of a and b
+    couple_E: Vector  # (nrow,) how much it gives, 0 for loops
+    couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
+    couple_T: Matrix  # (nrow, nrow) the dense system
+    couple_pivots: Matrix  # (nrow, 2)
+    couple_rank: Vector  # (1,)
+    couple_scale: Vector  # (nrow,)
+    couple_x: Matrix  # (nrow, 1)
+    couple_gap: Vector  # (nrow,) of loops
+    couple_force: Vector  # (nrow,) impulses of loops
+    couple_step: Vector  # (nrow,)
+    couple_trial: Vector  # (nrow,)
+    couple_panel: Matrix  # (nrow, 2 nv + nu)
+    couple_wrench: Vector  # (6,) scratch
+    loop_frame: Matrix  # (nloop, 12)
+    loop_turn: Matrix  # (nloop, 9)
     # limits
     bound: Matrix  # (nlimit, 2) slack, impulse
     bound_step: Matrix  # (nlimit, 2)

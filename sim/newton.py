@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from sim.coupling import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints import joint_blocks, joint_impulses
 from sim.kinematics import velocity_columns
+from sim.loops import apply_loops, keep_loops, move_loops
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from solvers.jit import kernel
 from solvers.status import Status
@@ -53,6 +55,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     """
     h = options.h
     scale = residual_scale(model, work, options)
+    keep_loops(model, work)
     for d in range(v.shape[0]):
         work.nu_trial[d] = guess.velocity[d]
         work.dnu[d] = 0.0
@@ -69,10 +72,12 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         for i in range(work.balance.shape[0]):
             for k in range(6):
                 work.wrench[i, k] = work.balance[i, k]
+        move_loops(model, work, alpha)
+        gap = apply_loops(model, work)
         subtree_sums(model, work.wrench, work.subtree)
         project(model, work.S2, work.subtree, work.residual)
         joint_impulses(model, work, h, q, v, u)
-        r = norm(work.residual) / scale
+        r = max(norm(work.residual) / scale, gap)
         if not (inside and r < max(last, options.tolerance)):
             if halvings > 40:
                 status = _NO_PROGRESS
@@ -95,11 +100,13 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         velocity_columns(model, work.S3, work.nu, h, work.S3nu)
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        if not factor(model, work):
+        if not (factor(model, work) and factor_coupling(model, work)):
             status = _SINGULAR
             break
         for d in range(v.shape[0]):
             work.nu_trial[d] = work.nu[d]
             work.rhs[d] = -work.residual[d]
         solve(model, work, work.rhs, work.dnu)
+        solve_coupling(model, work, 1.0, work.dnu)
+        keep_loops(model, work)
     return Outcome(status, iterations, r, 0.0)

@@ -31,7 +31,7 @@ class Contacts:
     """Contacts over one step, (ncontact, ...), or over the steps of a trajectory, (T, ncontact, ...). World axes."""
 
     names: tuple[str, ...]
-    normals: Floats  # (ncontact, 3)
+    normals: Floats  # (..., ncontact, 3) into the body; of a collision, from its second body to its first
     time_step: float  # [s]
     impulse: Floats  # (..., ncontact, 3) impulse on the body [N s]
     point: Floats  # (..., ncontact, 3) where it acts, at the end of the step [m]
@@ -46,7 +46,7 @@ class Contacts:
     @property
     def normal_force(self) -> Floats:
         """(..., ncontact) mean normal force [N]."""
-        return np.einsum("...cj,cj->...c", self.force, self.normals)
+        return np.einsum("...cj,...cj->...c", self.force, self.normals)
 
     @property
     def friction_force(self) -> Floats:
@@ -129,9 +129,9 @@ class Batch:
 
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
-    """Contacts from the rows (..., ncontact, 8) of a kernel."""
-    parts = (rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
-    return Contacts(mech.contact_names, mech.contact_normals, time_step, *parts)
+    """Contacts from the rows (..., ncontact, 11) of a kernel."""
+    parts = (rows[..., 8:11], time_step, rows[..., :3], rows[..., 3:6], rows[..., 6], rows[..., 7])
+    return Contacts(mech.contact_names, *parts)
 
 
 def error_of(mech: Mechanism, where: str, report: Floats, tolerance: float) -> SimulationError:

@@ -2,7 +2,7 @@
 
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
-    contacts   (ncontact, 8) impulse in world axes (3), point where it acts (3), gap, slip speed
+    contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
     hard       None for scenes without contacts and limits: their code is then not compiled; otherwise `smooth` is None
 
 Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
@@ -61,7 +61,7 @@ def roll(
 ) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
 
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 8).
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 11).
     """
     model = model_view(model_at)
     work = work_view(work_at)

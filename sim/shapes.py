@@ -126,4 +126,28 @@ class Capsule(Solid):
         return across, across, rod * r**2 / 2 + 0.4 * ball * r**2
 
 
+@dataclass(frozen=True)
+class HalfSpace(Solid):
+    """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, no body."""
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """None: it has no end."""
+        raise ValueError("HalfSpace: a body cannot have this shape")
+
+
+@dataclass(frozen=True)
+class String(Solid):
+    """One end, at its centre, of a string of the given length [m] between two bodies; no body."""
+
+    length: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._positive("length")
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """None: it has no mass."""
+        raise ValueError("String: a body cannot have this shape")
+
+
 Shape = Sphere | Box | Cylinder | Capsule

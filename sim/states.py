@@ -11,6 +11,7 @@ from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls, Settings
+from sim.closure import Closure
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.results import SimulationError
@@ -36,7 +37,8 @@ class States:
         self.mechanism = mechanism
         self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order = settings
         self.model = pack(mechanism)
-        self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
+        sizes = mechanism_sizes(mechanism)
+        self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
         self._calls = Calls(self.model, settings) if self.order == 2 else _composed(self.model, mechanism, settings)
         self._border = Border(mechanism, self._calls)
@@ -47,8 +49,21 @@ class States:
         super().__setattr__(name, value)
 
     def neutral(self) -> Floats:
-        """The standing or hanging state of the mechanism, at rest."""
-        return np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
+        """The standing or hanging state of the mechanism, at rest, its loops closed."""
+        x = np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
+        return self.close(x) if self.mechanism.loops else x
+
+    def close(self, x: ArrayLike) -> Floats:
+        """The state near x that closes the loops of the mechanism, at both ends of its interval.
+
+        Trees: x itself. ValueError: no such state is near.
+        """
+        state = self._border.state("close", x)
+        return Closure(self.mechanism, self._calls).close(state) if self.mechanism.loops else state
+
+    def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
+        """By loop joint, how far it is open: distances [m], then sines of angles."""
+        return Closure(self.mechanism, self._calls).gaps(self._border.state("loop_gaps", x))
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).

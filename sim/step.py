@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.contact_report import worst_contact
 from sim.dynamics import begin_step
 from sim.interior_point import interior_point
+from sim.loops import start_loops
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import newton
 from solvers.jit import inlined
@@ -41,6 +42,7 @@ def step(
     v = x[nq:]
     r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
     if begin_step(model, work, options.h, q, v, u):
+        start_loops(model, work, guess.impulses)
         if smooth is not None:
             r = newton(model, work, options, q, v, u, guess)
         if hard is not None:

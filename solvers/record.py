@@ -9,14 +9,18 @@ and its field k an array read from there. Tables do not change while compiled co
 `invariant.load`), so a field costs no more in a loop than a local array does.
 
 A table holds addresses: whoever makes one keeps the arrays alive.
+
+A record may come in two variants, told apart by the type of their tables (int64, and uint64 for the rich one): compiled
+code specialises on the variant, and what is marked `rich` is compiled for, and costs, the rich one only.
 """
 
 from __future__ import annotations
 
 import ctypes
+import inspect
 import zlib
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
@@ -27,8 +31,11 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
+from solvers.jit import kernel
+
 Table = NDArray[np.int64]
 R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Field(NamedTuple):
@@ -42,10 +49,11 @@ class Field(NamedTuple):
 class RecordType(types.Type):
     """Numba's type of a record."""
 
-    def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
+    def __init__(self, name: str, fields: tuple[Field, ...], rich: bool) -> None:
+        self.rich = rich
         self.fields = {field.name: (k, field) for k, field in enumerate(fields)}
         digest = zlib.crc32(repr(fields).encode())  # the name stands in every symbol: short, and one per list of fields
-        super().__init__(name=f"{name}_{digest:08x}")
+        super().__init__(name=f"{'Rich' if rich else ''}{name}_{digest:08x}")
 
     def array(self, name: str) -> types.Array:
         """Type of one field."""
@@ -96,7 +104,7 @@ def _load(builder: Any, table: Any, kind: Any, k: int) -> Any:
 
 def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
     """A function, for compiled code and for Python, from a table to the record `cls` with these fields."""
-    kind = RecordType(cls.__name__, tuple(fields))
+    plain, rich = (RecordType(cls.__name__, tuple(fields), rich) for rich in (False, True))
 
     @intrinsic
     def at(typing: Any, table: Any) -> Any:
@@ -106,6 +114,7 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
             return builder.bitcast(array.data, cgutils.voidptr_t)
 
+        kind = rich if getattr(table, "dtype", None) == types.uint64 else plain
         return kind(table), lower
 
     def view(table: Table) -> R:
@@ -161,7 +170,35 @@ def _array(field: Field, words: Table) -> NDArray[Any]:
     return flat if field.columns is None else flat.reshape(rows, columns)
 
 
-def table(arrays: Sequence[NDArray[Any]]) -> Table:
-    """Addresses and shapes of the arrays of a record, in the order of its fields."""
+def table(arrays: Sequence[NDArray[Any]], rich: bool = False) -> Table:
+    """Addresses and shapes of the arrays of a record, in the order of its fields; `rich` for that variant."""
     rows = [(a.ctypes.data, a.shape[0], a.shape[1] if a.ndim == 2 else 1) for a in arrays]
-    return np.array(rows, dtype=np.int64).ravel()
+    words = np.array(rows, dtype=np.int64).ravel()
+    return words.view(np.uint64) if rich else words
+
+
+# Not inline="always": inside kernels that are inlined themselves, Numba 0.68 then runs calls around it twice.
+_OPTIONS = {"_nrt": False, "error_model": "numpy"}
+
+
+def rich(otherwise: str = "None") -> Callable[[F], F]:
+    """A kernel that exists only where its first argument is a rich record; elsewhere its call is `otherwise`.
+
+    The choice is one of types, made while a caller is compiled.
+    """
+
+    def decorate(func: F) -> F:
+        arguments = ", ".join(inspect.signature(func).parameters)
+        there = eval(f"lambda {arguments}: compiled({arguments})", {"compiled": kernel(func)})
+        absent = eval(f"lambda {arguments}: {otherwise}")
+
+        def choice(*args: Any) -> Any:
+            raise TypeError(f"{func.__name__} is called from kernels only")
+
+        @overload(choice, strict=False, jit_options=_OPTIONS)
+        def choose(*args: Any) -> Any:
+            return there if args[0].rich else absent
+
+        return cast(F, choice)
+
+    return decorate

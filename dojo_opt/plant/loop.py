@@ -124,10 +124,9 @@ def closed_loop(
 
 def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:
     """The contacts of single steps, one after the other."""
-    shapes = {"impulse": (3,), "point": (3,), "gap": (), "slip": ()}
+    shapes = {"normals": (3,), "impulse": (3,), "point": (3,), "gap": (), "slip": ()}
     arrays = {
         name: np.array([getattr(c, name) for c in steps], dtype=np.float64).reshape(len(steps), sim.ncontact, *shape)
         for name, shape in shapes.items()
     }
-    mech = sim.mechanism
-    return Contacts(mech.contact_names, mech.contact_normals, sim.time_step, **arrays)
+    return Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **arrays)

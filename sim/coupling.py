@@ -1,0 +1,218 @@
+"""What couples branches of the tree: pairs of bodies in contact, and closed loops, as a small dense system.
+
+A coupling of the bodies a and b adds B f to the wrench on a and takes it from that on b, about O:
+
+    pairs in contact    (K_a, K_b) = B D R        f/D - R_a zeta_a - R_b zeta_b = 0
+    closed loop         B = G2^T                      - G3 zeta_a + G3 zeta_b = g
+
+K are the derivatives of the wrench by the twists of the bodies, of rank six at most; taking them apart keeps the
+stiffness D of contacts, up to 1e16, out of the sums. With the tree eliminated, twists are zeta = zeta_0 + Z f, where
+zeta_0 answers the right-hand side and Z the unit forces:
+
+    (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
+
+so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
+new (a planar loop in space) are found by the pivots, and their forces set to zero.
+"""
+
+from __future__ import annotations
+
+from sim.elimination import solve
+from sim.model import Matrix, Model, Vector, Work
+from solvers.full_lu import full_lu_factor, full_lu_solve
+from solvers.jit import kernel
+from solvers.record import rich
+
+_ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
+_DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
+
+
+@kernel
+def is_loop(model: Model, k: int) -> bool:
+    """Whether coupling k is a closed loop; they come after the pairs."""
+    return k >= model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
+
+
+@kernel
+def take_apart(work: Work, k: int, row: int) -> None:
+    """Rows of couple_B, couple_R and couple_E from row on: (K_a, K_b) = B D R by elimination with full pivoting.
+
+    coupling_K is used up; what is left when the pivots have fallen to rounding is dropped: forces without effect.
+    """
+    first = 0.0
+    for r in range(row, row + 6):
+        best = 0.0
+        i = 0
+        j = 0
+        for side in range(2):
+            K = work.coupling_K[2 * k + side]
+            for e in range(36):
+                if abs(K[e]) > abs(best):
+                    best = K[e]
+                    i = e // 6
+                    j = 6 * side + e % 6
+        if r == row:
+            first = abs(best)
+        B = work.couple_B[r]
+        R = work.couple_R[r]
+        for c in range(6):
+            B[c] = 0.0
+            R[c] = 0.0
+            R[6 + c] = 0.0
+        work.couple_E[r] = 1.0
+        if not abs(best) > _ROUNDING * first:
+            continue
+        work.couple_E[r] = 1.0 / best
+        for c in range(6):
+            B[c] = work.coupling_K[2 * k + j // 6, 6 * c + j % 6] / best
+            R[c] = work.coupling_K[2 * k, 6 * i + c] / best
+            R[6 + c] = work.coupling_K[2 * k + 1, 6 * i + c] / best
+        for side in range(2):
+            K = work.coupling_K[2 * k + side]
+            for c in range(6):
+                f = best * B[c]
+                for e in range(6):
+                    K[6 * c + e] -= f * R[6 * side + e]
+
+
+@kernel
+def add_along_path(model: Model, work: Work, i: int, sign: float, w: Vector, out: Vector) -> None:
+    """out[d] += sign S2[d].w for the joints between body i and the root."""
+    while i >= 0:
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            s = work.S2[d]
+            out[d] += sign * (s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5])
+        i = model.body_parent[i]
+
+
+@kernel
+def response(model: Model, work: Work, k: int, row: int) -> float:
+    """R_a zeta_a + R_b zeta_b of a row of coupling k, with the twists of the last solve."""
+    R = work.couple_R[row]
+    t = 0.0
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i >= 0:
+            z = work.twist[i]
+            for c in range(6):
+                t += R[6 * side + c] * z[c]
+    return t
+
+
+@kernel
+def _row_scale(work: Work, row: int) -> float:
+    """1 over the largest entry of a row of the dense system."""
+    largest = 0.0
+    for col in range(work.couple_T.shape[1]):
+        largest = max(largest, abs(work.couple_T[row, col]))
+    return 1.0 / largest if largest > 0.0 else 1.0
+
+
+@rich("True")
+def factor_coupling(model: Model, work: Work) -> bool:
+    """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
+    pairs = 0
+    for k in range(model.coupling_body.shape[0]):
+        if not is_loop(model, k):
+            take_apart(work, k, model.coupling_row[k])
+    for k in range(model.coupling_body.shape[0]):
+        for col in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            for d in range(work.rhs.shape[0]):
+                work.rhs[d] = 0.0
+            add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
+            add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
+            solve(model, work, work.rhs, work.couple_Y[col])
+            for m in range(model.coupling_body.shape[0]):
+                for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
+                    work.couple_T[row, col] = -response(model, work, m, row)
+            if not is_loop(model, k):
+                work.couple_T[col, col] += work.couple_E[col]
+                pairs += 1
+    for row in range(work.couple_T.shape[0]):
+        work.couple_scale[row] = _row_scale(work, row)
+        for col in range(work.couple_T.shape[1]):
+            work.couple_T[row, col] *= work.couple_scale[row]
+    least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
+    rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
+    work.couple_rank[0] = rank
+    return rank >= pairs
+
+
+@rich()
+def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
+    """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
+
+    share: part of the loop gaps to close.
+    """
+    x = work.couple_x
+    for k in range(model.coupling_body.shape[0]):
+        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + response(model, work, k, row))
+    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), x)
+    for row in range(x.shape[0]):
+        f = x[row, 0]
+        work.couple_step[row] = f
+        Y = work.couple_Y[row]
+        for d in range(out.shape[0]):
+            out[d] += f * Y[d]
+    body_twists(model, work, out)
+
+
+@kernel
+def body_twists(model: Model, work: Work, y: Vector) -> None:
+    """twist[i] = twist[parent] + S3nu y."""
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        V = work.twist[i]
+        for k in range(6):
+            V[k] = work.twist[p, k] if p >= 0 else 0.0
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            for k in range(6):
+                V[k] += work.S3nu[d, k] * y[d]
+
+
+@rich()
+def solve_coupling_panel(model: Model, work: Work) -> None:
+    """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
+    X = work.couple_panel
+    for k in range(model.coupling_body.shape[0]):
+        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            for side in range(2):
+                i = model.coupling_body[k, side]
+                if i < 0:
+                    continue
+                for c in range(6):
+                    f = work.couple_R[row, 6 * side + c]
+                    z = work.panel[6 * i + c]
+                    for m in range(X.shape[1]):
+                        X[row, m] += f * z[m]
+            for m in range(X.shape[1]):
+                X[row, m] *= work.couple_scale[row]
+    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), X)
+    for row in range(X.shape[0]):
+        for d in range(work.columns.shape[0]):
+            f = work.couple_Y[row, d]
+            for m in range(X.shape[1]):
+                work.columns[d, m] += f * X[row, m]
+
+
+@kernel
+def cross_block(model: Model, work: Work, rows: int, cols: int, sign: float, K: Vector, S: Matrix) -> None:
+    """dR_dq[j, k] += sign S2[j].K S[k], j from body `rows` up to the root, k from body `cols`."""
+    k = cols
+    while k >= 0:
+        for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
+            w = work.couple_wrench
+            for r in range(6):
+                t = 0.0
+                for c in range(6):
+                    t += K[6 * r + c] * S[e, c]
+                w[r] = t
+            j = rows
+            while j >= 0:
+                for d in range(model.body_vadr[j], model.body_vadr[j + 1]):
+                    s = work.S2[d]
+                    t = s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5]
+                    work.dR_dq[d, e] += sign * t
+                j = model.body_parent[j]
+        k = model.body_parent[k]

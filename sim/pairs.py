@@ -1,0 +1,313 @@
+"""Contacts between two bodies a and b, or of a with fixed obstacles: geometry at configuration 3, wrench, derivatives.
+
+    gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/collision
+    slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
+    force  f = n gamma + T^T beta on a, -f on b, both at P = p - mean of (x_a3 - x_a2, x_b3 - x_b2)
+
+Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
+to configuration 2, where the balance of momenta is taken; of a fixed obstacle, a alone carries it.
+
+Derivatives are by the twists of a and b about O at configuration 3. Everything moves with b, plus what the motion of a
+relative to b does:  dn = phi_b x n + N zeta,  dp = v_b + phi_b x (p - O) + M zeta,  zeta = zeta_a - zeta_b.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.collision.collide import collide
+from sim.model import Model, Vector, Work
+from sim.rotation import Vec3, cross, rotate
+from solvers.jit import kernel
+from solvers.record import rich
+
+_NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
+
+
+@kernel
+def place_shape(model: Model, work: Work, row: int, i: int) -> None:
+    """World pose at configuration 3 of shape `row` on body i, -1 for the world."""
+    c = model.pair_place[row]
+    p = work.shape_pos[row]
+    R = work.shape_rot[row]
+    if i < 0:
+        for k in range(3):
+            p[k] = c[k]
+        for k in range(9):
+            R[k] = c[3 + k]
+        return
+    x, y, z = rotate(work.rot3, i, c[0], c[1], c[2])
+    p[0] = work.pos3[i, 0] + x
+    p[1] = work.pos3[i, 1] + y
+    p[2] = work.pos3[i, 2] + z
+    for k in range(3):
+        x, y, z = rotate(work.rot3, i, c[3 + k], c[6 + k], c[9 + k])
+        R[k] = x
+        R[3 + k] = y
+        R[6 + k] = z
+
+
+@kernel
+def relative_pose(work: Work, j: int) -> None:
+    """pair_relative[j] = (R_b^T R_a, R_b^T (o_a - o_b)): shape a in the frame of shape b."""
+    A = work.shape_rot[2 * j]
+    B = work.shape_rot[2 * j + 1]
+    out = work.pair_relative[j]
+    x = work.shape_pos[2 * j, 0] - work.shape_pos[2 * j + 1, 0]
+    y = work.shape_pos[2 * j, 1] - work.shape_pos[2 * j + 1, 1]
+    z = work.shape_pos[2 * j, 2] - work.shape_pos[2 * j + 1, 2]
+    for r in range(3):
+        for c in range(3):
+            out[3 * r + c] = B[r] * A[c] + B[3 + r] * A[3 + c] + B[6 + r] * A[6 + c]
+        out[9 + r] = B[r] * x + B[3 + r] * y + B[6 + r] * z
+
+
+@kernel
+def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3, Vec3]:
+    """t1, t2 and the axis e that t1 is nearest to: t1 = (e - n (n.e)) / |...|, t2 = n x t1."""
+    e = (1.0, 0.0, 0.0) if abs(nx) < 0.9 else (0.0, 1.0, 0.0)
+    d = nx * e[0] + ny * e[1]
+    i = 1.0 / sqrt(1.0 - d * d)
+    t = (i * (e[0] - nx * d), i * (e[1] - ny * d), -i * nz * d)
+    return t, cross(nx, ny, nz, t[0], t[1], t[2]), e
+
+
+@kernel
+def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity over the interval of the point (x, y, z), world axes, that moves with body i; 0 for the world."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    a = work.pos3[i]
+    b = work.pos2[i]
+    w = work.turn[i]
+    vx, vy, vz = cross(w[1], w[2], w[3], x - a[0], y - a[1], z - a[2])
+    return (a[0] - b[0] + 2.0 * vx) / h, (a[1] - b[1] + 2.0 * vy) / h, (a[2] - b[2] + 2.0 * vz) / h
+
+
+@rich()
+def pair_kinematics(model: Model, work: Work, h: float) -> None:
+    """Gap, slip, frame and point of every pair at configuration 3.
+
+    A point that the present configuration does not have (a corner cut off) repeats the one before it.
+    """
+    ground = model.contact_height.shape[0]
+    for j in range(model.pair_kind.shape[0]):
+        a = model.coupling_body[model.pair_coupling[j], 0]
+        b = model.coupling_body[model.pair_coupling[j], 1]
+        place_shape(model, work, 2 * j, a)
+        place_shape(model, work, 2 * j + 1, b)
+        relative_pose(work, j)
+        g = work.pair_out[j]
+        pose = work.pair_relative[j]
+        collide(model.pair_kind[j], model.pair_feature[j], model.pair_sizes[j], pose[:9], pose[9:], g)
+        if g[0] > _NO_POINT and model.pair_feature[j] > 0:
+            for k in range(g.shape[0]):
+                g[k] = work.pair_out[j - 1, k]
+        F = work.pair_frame[j]
+        s = 2 * j + 1
+        t1, t2, _ = tangents(g[1], g[2], g[3])
+        F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
+        F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
+        F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
+        F[9], F[10], F[11] = rotate(work.shape_rot, s, g[4], g[5], g[6])
+        for k in range(3):
+            F[9 + k] += work.shape_pos[s, k]
+        ax, ay, az = point_velocity(work, h, a, F[9], F[10], F[11])
+        bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
+        x, y, z = ax - bx, ay - by, az - bz
+        kin = work.contact_kin[ground + j]
+        kin[0] = g[0]
+        kin[1] = F[3] * x + F[4] * y + F[5] * z
+        kin[2] = F[6] * x + F[7] * y + F[8] * z
+        kin[3] = F[9] - work.pos3[a, 0]
+        kin[4] = F[10] - work.pos3[a, 1]
+        kin[5] = F[11] - work.pos3[a, 2]
+
+
+@kernel
+def shares(b: int) -> tuple[float, float]:
+    """Parts of a and b in carrying the contact point back to configuration 2."""
+    return (1.0, 0.0) if b < 0 else (0.5, 0.5)
+
+
+@kernel
+def pair_arm(model: Model, work: Work, j: int) -> Vec3:
+    """P - O."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    wa, wb = shares(b)
+    F = work.pair_frame[j]
+    x = F[9] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
+    y = F[10] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])
+    z = F[11] - work.origin[2] - wa * (work.pos3[a, 2] - work.pos2[a, 2])
+    if b >= 0:
+        x -= wb * (work.pos3[b, 0] - work.pos2[b, 0])
+        y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])
+        z -= wb * (work.pos3[b, 2] - work.pos2[b, 2])
+    return x, y, z
+
+
+@kernel
+def pair_force(work: Work, j: int, fn: float, f1: float, f2: float) -> Vec3:
+    """n fn + t1 f1 + t2 f2."""
+    F = work.pair_frame[j]
+    return F[0] * fn + F[3] * f1 + F[6] * f2, F[1] * fn + F[4] * f1 + F[7] * f2, F[2] * fn + F[5] * f1 + F[8] * f2
+
+
+@kernel
+def add_pair_wrench(model: Model, work: Work, j: int, fn: float, f1: float, f2: float) -> None:
+    """wrench[a] -= (f, (P - O) x f), wrench[b] += the same."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    f = pair_force(work, j, fn, f1, f2)
+    x, y, z = pair_arm(model, work, j)
+    m = cross(x, y, z, f[0], f[1], f[2])
+    for k in range(3):
+        work.wrench[a, k] -= f[k]
+        work.wrench[a, 3 + k] -= m[k]
+        if b >= 0:
+            work.wrench[b, k] += f[k]
+            work.wrench[b, 3 + k] += m[k]
+
+
+@kernel
+def shape_to_world(X: Vector, first: int, work: Work, s: int, x: float, y: float, z: float, out: Vector) -> None:
+    """out (3 x 6) = R X diag(R^T, R^T) shifted from the origin of shape s to O: rotation columns -= translation [c]."""
+    R = work.shape_rot[s]
+    for r in range(3):
+        for k in range(6):
+            q = 3 * (k // 3)
+            c = k - q
+            t = 0.0
+            for i in range(3):
+                row = X[first + 6 * i + q] * R[3 * c] + X[first + 6 * i + q + 1] * R[3 * c + 1]
+                t += R[3 * r + i] * (row + X[first + 6 * i + q + 2] * R[3 * c + 2])
+            out[6 * r + k] = t
+        a, b, c3 = out[6 * r], out[6 * r + 1], out[6 * r + 2]
+        out[6 * r + 3] -= b * z - c3 * y
+        out[6 * r + 4] -= c3 * x - a * z
+        out[6 * r + 5] -= a * y - b * x
+
+
+@kernel
+def frame_turn(g: Vector, out: Vector) -> None:
+    """out (3 x 6): rotation of the contact frame, n x dn + n (spin of t1), both in the frame of shape b.
+
+    t2.dt1 = -(n.e)/|e - n (n.e)| t2.dn
+    """
+    nx, ny, nz = g[1], g[2], g[3]
+    _, t, e = tangents(nx, ny, nz)
+    d = nx * e[0] + ny * e[1]
+    spin = -d / sqrt(1.0 - d * d)
+    for k in range(6):
+        x, y, z = g[7 + k], g[13 + k], g[19 + k]
+        a, b, c = cross(nx, ny, nz, x, y, z)
+        s = spin * (t[0] * x + t[1] * y + t[2] * z)
+        out[k] = a + nx * s
+        out[6 + k] = b + ny * s
+        out[12 + k] = c + nz * s
+
+
+@kernel
+def _slip_rows(work: Work, h: float, i: int, sign: float, r: Vec3, t: Vec3, row: Vector) -> None:
+    """row (6,) = sign d(t.u_i)/d(twist of body i) at a fixed point p = x_i3 + r and direction t.
+
+    u_i = (x3 - x2)/h + omega x (p - x3)    ->    t/h - t x omega on dx3,   (c y + s x y)/h on dphi,   y = r x t
+    """
+    w = work.turn[i]
+    g = 2.0 / h
+    ox, oy, oz = cross(t[0], t[1], t[2], g * w[1], g * w[2], g * w[3])
+    vx, vy, vz = sign * (t[0] / h - ox), sign * (t[1] / h - oy), sign * (t[2] / h - oz)
+    yx, yy, yz = cross(r[0], r[1], r[2], t[0], t[1], t[2])
+    sx, sy, sz = cross(w[1], w[2], w[3], yx, yy, yz)
+    dx, dy, dz = (
+        work.pos3[i, 0] - work.origin[0],
+        work.pos3[i, 1] - work.origin[1],
+        work.pos3[i, 2] - work.origin[2],
+    )
+    mx, my, mz = cross(dx, dy, dz, vx, vy, vz)
+    row[0] = vx
+    row[1] = vy
+    row[2] = vz
+    row[3] = mx + sign * (w[0] * yx + sx) / h
+    row[4] = my + sign * (w[0] * yy + sy) / h
+    row[5] = mz + sign * (w[0] * yz + sz) / h
+
+
+@kernel
+def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
+    """pair_turn, pair_shift: Omega and M about O;  pair_C: d(gap, slip) by the twists of a, then of b."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    s = 2 * j + 1
+    o = work.origin
+    x, y, z = work.shape_pos[s, 0] - o[0], work.shape_pos[s, 1] - o[1], work.shape_pos[s, 2] - o[2]
+    g = work.pair_out[j]
+    frame_turn(g, work.pair_scratch)
+    shape_to_world(work.pair_scratch, 0, work, s, x, y, z, work.pair_turn[j])
+    shape_to_world(g, 25, work, s, x, y, z, work.pair_shift[j])
+    Omega = work.pair_turn[j]
+    M = work.pair_shift[j]
+    F = work.pair_frame[j]
+    px, py, pz = F[9] - o[0], F[10] - o[1], F[11] - o[2]
+    Ca = work.pair_Ca[j]
+    Cb = work.pair_Cb[j]
+    m = cross(px, py, pz, F[0], F[1], F[2])
+    for k in range(3):
+        Ca[k] = F[k]
+        Ca[3 + k] = m[k]
+        Cb[k] = -F[k]
+        Cb[3 + k] = -m[k]
+    va = point_velocity(work, h, a, F[9], F[10], F[11])
+    vb = point_velocity(work, h, b, F[9], F[10], F[11])
+    q = 2.0 / h
+    wx, wy, wz = q * work.turn[a, 1], q * work.turn[a, 2], q * work.turn[a, 3]
+    if b >= 0:
+        wx -= q * work.turn[b, 1]
+        wy -= q * work.turn[b, 2]
+        wz -= q * work.turn[b, 3]
+    ra = (F[9] - work.pos3[a, 0], F[10] - work.pos3[a, 1], F[11] - work.pos3[a, 2])
+    for e in range(1, 3):
+        t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
+        rows = work.pair_rows
+        _slip_rows(work, h, a, 1.0, ra, t, rows[0])
+        for k in range(6):
+            rows[1, k] = 0.0
+        if b >= 0:
+            rb = (F[9] - work.pos3[b, 0], F[10] - work.pos3[b, 1], F[11] - work.pos3[b, 2])
+            _slip_rows(work, h, b, -1.0, rb, t, rows[1])
+        gp = cross(t[0], t[1], t[2], wx, wy, wz)
+        gm = cross(px, py, pz, gp[0], gp[1], gp[2])
+        ge = cross(t[0], t[1], t[2], va[0] - vb[0], va[1] - vb[1], va[2] - vb[2])
+        for k in range(6):
+            rel = 0.0
+            for r in range(3):
+                rel += M[6 * r + k] * gp[r] + Omega[6 * r + k] * ge[r]
+            Ca[6 * e + k] = rows[0, k] + rel
+            Cb[6 * e + k] = rows[1, k] - rel
+        for k in range(3):
+            Cb[6 * e + k] += gp[k]
+            Cb[6 * e + 3 + k] += gm[k] + ge[k]
+
+
+@rich("(0.0, 0.0, 0.0)")
+def pair_rate(model: Model, work: Work, c: int) -> Vec3:
+    """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
+    j = c - model.contact_height.shape[0]
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    x, y, z = _row_product(work.pair_Ca[j], work.twist[a])
+    if b >= 0:
+        d = _row_product(work.pair_Cb[j], work.twist[b])
+        return x + d[0], y + d[1], z + d[2]
+    return x, y, z
+
+
+@kernel
+def _row_product(C: Vector, t: Vector) -> Vec3:
+    """C t, C (3 x 6)."""
+    return (
+        C[0] * t[0] + C[1] * t[1] + C[2] * t[2] + C[3] * t[3] + C[4] * t[4] + C[5] * t[5],
+        C[6] * t[0] + C[7] * t[1] + C[8] * t[2] + C[9] * t[3] + C[10] * t[4] + C[11] * t[5],
+        C[12] * t[0] + C[13] * t[1] + C[14] * t[2] + C[15] * t[3] + C[16] * t[4] + C[17] * t[5],
+    )
