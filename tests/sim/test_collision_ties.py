@@ -183,7 +183,6 @@ def test_a_capsule_across_the_edge_of_a_box_touches_it_at_one_point() -> None:
 )
 def test_a_sphere_at_the_centre_has_a_stated_way_out(kind: Pair, b: list[float], normal: Array, depth: float) -> None:
     (out,) = contacts(kind, [0.1], b, EYE, [0.0, 0.0, 0.0])
-    assert np.isfinite(out).all()
     np.testing.assert_allclose(out[0], -depth, atol=1e-15)
     np.testing.assert_array_equal(out[1:4], normal)
 
@@ -215,6 +214,18 @@ def test_a_wheel_rolls_on_the_lowest_points_of_its_rims() -> None:
         np.testing.assert_allclose(sorted_points(outs)[:, :2], [[1.0, 1.9], [1.0, 2.1]], atol=1e-9)
         # rolling about the axle (y) moves no contact point beyond the translation of the wheel
         np.testing.assert_allclose(outs[:, 7:25], 0.0, atol=0.0)
+
+
+@pytest.mark.parametrize("kind", Pair)
+def test_aligned_shapes_on_a_grid_have_a_point_and_finite_numbers(kind: Pair) -> None:
+    """Every tie at once: centres on a grid of half sizes, axes along axes."""
+    for turn in list(Rotation.create_group("O"))[::5]:
+        for i in range(0, 125, 3):
+            r = 0.2 * (np.array([i % 5, i // 5 % 5, i // 25]) - 2.0)
+            outs = contacts(kind, [0.2] * 3, [0.2] * 3, turn.as_matrix(), r)
+            assert len(outs) >= 1
+            assert np.isfinite(outs).all()
+            np.testing.assert_allclose(np.linalg.norm(outs[:, 1:4], axis=1), 1.0, atol=1e-14)
 
 
 # -- exchange of a and b -----------------------------------------------------------------------------------------------
