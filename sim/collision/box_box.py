@@ -150,28 +150,26 @@ def clipped_has(
 @inner_kernel
 def put_vertex(ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
     """The nearest corner of one box against an edge or corner of the other; False where those are not the nearest."""
-    best, d2 = 0, 1e300
+    near, of_a, d2 = NOWHERE, True, 1e300
     for k in range(8):
         x = to_b(R, corner(k, ha))
-        e2 = distance_squared((x[0] + r[0], x[1] + r[1], x[2] + r[2]), hb)
+        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+        e2 = distance_squared(x, hb)
         if e2 < d2 * (1.0 - TIE):
-            best, d2 = k, e2
+            near, d2 = x, e2
     for k in range(8):
         y = corner(k, hb)
         e2 = distance_squared(to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])), ha)
         if e2 < d2 * (1.0 - TIE):
-            best, d2 = 8 + k, e2
-    if best < 8:
-        x = to_b(R, corner(best, ha))
-        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
-        if nearest(x, hb)[3] == 1:
+            near, of_a, d2 = y, False, e2
+    if of_a:
+        if nearest(near, hb)[3] == 1:
             return False
-        vertex_on_box(x, hb, 0.0, out)
+        vertex_on_box(near, hb, 0.0, out)
     else:
-        y = corner(best - 8, hb)
-        if nearest(to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])), ha)[3] == 1:
+        if nearest(to_a(R, (near[0] - r[0], near[1] - r[1], near[2] - r[2])), ha)[3] == 1:
             return False
-        vertex_under_box(y, ha, R, r, out)
+        vertex_under_box(near, ha, R, r, out)
     n = (out[1], out[2], out[3])
     w = to_a(R, n)
     reach = abs(w[0]) * ha[0] + abs(w[1]) * ha[1] + abs(w[2]) * ha[2]

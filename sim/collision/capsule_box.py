@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.collision.axes import PARALLEL, Arrangement, deepest, edge_must_exceed, side_of, support
-from sim.collision.box import axis, column, corner, distance_squared, nearest, vertex_on_box
+from sim.collision.box import axis, corner, distance_squared, nearest, vertex_on_box
 from sim.collision.clip import clip, common_normal, crossing, on_edges
 from sim.collision.witness import (
     FACE,
@@ -37,7 +37,7 @@ from solvers.jit import inner_kernel
 @inner_kernel
 def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact point `feature` of a capsule along the z axis of its frame against a box."""
-    c, u = (r[0], r[1], r[2]), column(R, 2)
+    c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
     radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
     face, edge, s = arrangement
     top = 1.0 if c[face] >= 0.0 else -1.0
@@ -107,7 +107,7 @@ def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vecto
     e2 = distance_squared(y, h)
     if e2 < d2:
         x, d2 = y, e2
-    best, at = -1, 0.0
+    near, at, at_end = x, 0.0, True
     for k in range(8):
         y = corner(k, h)
         t = dot(u, y) - dot(u, c)
@@ -116,15 +116,14 @@ def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vecto
             e = (z[0] - y[0], z[1] - y[1], z[2] - y[2])
             e2 = dot(e, e)
             if e2 < d2 * (1.0 - TIE):
-                best, at, d2 = k, t, e2
-    if best < 0:
+                near, at, at_end, d2 = y, t, False, e2
+    if at_end:
         if nearest(x, h)[3] == 1:
             return False
         vertex_on_box(x, h, radius, out)
     else:
-        y = corner(best, h)
-        n, d = direction(along(c, at, u), y, u)
-        vertex_b(y, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
+        n, d = direction(along(c, at, u), near, u)
+        vertex_b(near, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
     n = (out[1], out[2], out[3])
     reach = half * abs(dot(n, u)) + abs(n[0]) * h[0] + abs(n[1]) * h[1] + abs(n[2]) * h[2]
     return dot(n, c) - reach >= out[0] + radius - TIE * (half + h[0] + h[1] + h[2])

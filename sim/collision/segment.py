@@ -32,6 +32,8 @@ from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
+Vec2 = tuple[float, float]
+
 _PARALLEL = 1e-6  # squared sine of the angle below which two segments are parallel
 
 
@@ -40,7 +42,7 @@ def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vect
     """Contact point `feature` of two capsules, both along the z axes of their frames."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
     la, lb = sizes[1], sizes[5]
-    low, high = beside(-1, c, u, la, lb), beside(1, c, u, la, lb)
+    low, high = beside(-1.0, c, u, la, lb), beside(1.0, c, u, la, lb)
     code = high
     if feature == 0:
         code = low
@@ -60,22 +62,22 @@ def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vect
 
 
 @inner_kernel
-def beside(e: int, c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
+def beside(e: float, c: Vec3, u: Vec3, la: float, lb: float) -> Vec2:
     """(s, t) at end e of segment a: this end beside b, or the end of b on this side beside a."""
     b = e if u[2] >= 0.0 else -e
     z = b * (c[2] + e * la * u[2])
     if z < -lb * (1.0 + TIE):
         return e, -b
     if z <= lb * (1.0 + TIE):
-        return e, 0
+        return e, 0.0
     s = dot(u, (-c[0], -c[1], b * lb - c[2]))
     if abs(s) <= la * (1.0 + TIE):
-        return 0, b
-    return (1 if s > 0.0 else -1), b
+        return 0.0, b
+    return (1.0 if s > 0.0 else -1.0), b
 
 
 @inner_kernel
-def closest(c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
+def closest(c: Vec3, u: Vec3, la: float, lb: float) -> Vec2:
     """(s, t) of the closest points of two segments that are not parallel.   Ericson 2005, section 5.1.9."""
     cu = dot(c, u)
     s = min(max((u[2] * c[2] - cu) / (1.0 - u[2] * u[2]), -la), la)
@@ -87,33 +89,31 @@ def closest(c: Vec3, u: Vec3, la: float, lb: float) -> tuple[int, int]:
 
 
 @inner_kernel
-def sign_at(s: float, half: float) -> int:
+def sign_at(s: float, half: float) -> float:
     """-1, 0, 1 for a point at the - end, inside, at the + end of |s| <= half."""
     if abs(s) < half:
-        return 0
-    return 1 if s > 0.0 else -1
+        return 0.0
+    return 1.0 if s > 0.0 else -1.0
 
 
 @inner_kernel
-def put_pair(
-    code: tuple[int, int], c: Vec3, u: Vec3, half: tuple[float, float], radii: tuple[float, float], out: Vector
-) -> None:
+def put_pair(code: Vec2, c: Vec3, u: Vec3, half: Vec2, radii: Vec2, out: Vector) -> None:
     """Contact of the points (s, t)."""
     s, t = code
-    if s == 0 and t == 0:
+    if s == 0.0 and t == 0.0:
         k = sqrt(1.0 - u[2] * u[2])
         n = (u[1] / k, -u[0] / k, 0.0)
         if dot(n, c) < 0.0:
             n = (-n[0], -n[1], 0.0)
         edges(c, u, NOWHERE, Z, n, radii, out)
-    elif s == 0:
+    elif s == 0.0:
         y = (0.0, 0.0, t * half[1])
         x = along(c, dot(u, (-c[0], -c[1], y[2] - c[2])), u)
         n, d = direction(x, y, u)
         vertex_b(y, n, u, d, radii, bend_line(d), LINE, out)
     else:
         x = along(c, s * half[0], u)
-        if t == 0:
+        if t == 0.0:
             n, d = direction(x, (0.0, 0.0, x[2]), Z)
             vertex_a(x, n, Z, d, radii, bend_line(d), LINE, out)
         else:

@@ -105,6 +105,33 @@ def direction(x: Vec3, y: Vec3, u: Vec3) -> tuple[Vec3, float]:
 
 
 @inner_kernel
+def put_rows(i: int, K: Vec3, Kw: Vec3, G: Vec3, Gw: Vec3, out: Vector) -> None:
+    """Row i of dn = K v + Kw w and of dp = G v + Gw w."""
+    k = 7 + 6 * i
+    out[k], out[k + 1], out[k + 2] = K
+    out[k + 3], out[k + 4], out[k + 5] = Kw
+    out[k + 18], out[k + 19], out[k + 20] = G
+    out[k + 21], out[k + 22], out[k + 23] = Gw
+
+
+@inner_kernel
+def row(i: int, c: Vec3, n: Vec3, u: Vec3) -> Vec3:
+    """Row i of c0 I + c1 n n^T + c2 u u^T."""
+    a, b = c[1] * n[i], c[2] * u[i]
+    return (
+        (c[0] if i == 0 else 0.0) + a * n[0] + b * u[0],
+        (c[0] if i == 1 else 0.0) + a * n[1] + b * u[1],
+        (c[0] if i == 2 else 0.0) + a * n[2] + b * u[2],
+    )
+
+
+@inner_kernel
+def moment(x: Vec3, f: Vec3) -> Vec3:
+    """x x f: f.(w x x) = (x x f).w"""
+    return cross(x[0], x[1], x[2], f[0], f[1], f[2])
+
+
+@inner_kernel
 def vertex_a(
     x: Vec3, n: Vec3, u: Vec3, d: float, radii: tuple[float, float], bend: Vec3, slip: Vec3, out: Vector
 ) -> None:
@@ -112,17 +139,14 @@ def vertex_a(
 
     dn = K delta,   K = bend0 I + bend1 n n^T + bend2 u u^T
     dy = T delta,   T = slip0 I + slip1 n n^T + slip2 u u^T
+    dp = (I + T + rho K) delta/2,   rho = rb - ra
     """
     rho = radii[1] - radii[0]
-    h = 0.5 * (rho - d)
-    put(d - radii[0] - radii[1], n, along(x, h, n), out)
-    for j in range(6):
-        e = velocity(j, x)
-        en, eu = dot(n, e), dot(u, e)
-        dn = along(along((bend[0] * e[0], bend[0] * e[1], bend[0] * e[2]), bend[1] * en, n), bend[2] * eu, u)
-        c = 0.5 * (1.0 + slip[0])
-        dp = along(along((c * e[0], c * e[1], c * e[2]), 0.5 * slip[1] * en, n), 0.5 * slip[2] * eu, u)
-        put_column(j, dn, along(dp, 0.5 * rho, dn), out)
+    put(d - radii[0] - radii[1], n, along(x, 0.5 * (rho - d), n), out)
+    g = (0.5 * (1.0 + slip[0] + rho * bend[0]), 0.5 * (slip[1] + rho * bend[1]), 0.5 * (slip[2] + rho * bend[2]))
+    for i in range(3):
+        K, G = row(i, bend, n, u), row(i, g, n, u)
+        put_rows(i, K, moment(x, K), G, moment(x, G), out)
 
 
 @inner_kernel
@@ -132,17 +156,15 @@ def vertex_b(
     """Vertex y of b against an element of a: `vertex_a` seen from a, with delta = v + w x y
 
     dn = w x n + K delta,   dx = delta + d w x n - T delta
+    dp = (I - T + rho K) delta/2 + (d + rho) (w x n)/2
     """
     rho = radii[1] - radii[0]
     put(d - radii[0] - radii[1], n, along(y, 0.5 * (d + rho), n), out)
-    for j in range(6):
-        e = velocity(j, y)
-        en, eu = dot(n, e), dot(u, e)
-        t = turning(j, n)
-        dn = along(along(along(t, bend[0], e), bend[1] * en, n), bend[2] * eu, u)
-        c = 0.5 * (1.0 - slip[0])
-        dp = along(along((c * e[0], c * e[1], c * e[2]), -0.5 * slip[1] * en, n), -0.5 * slip[2] * eu, u)
-        put_column(j, dn, along(along(dp, 0.5 * d, t), 0.5 * rho, dn), out)
+    g = (0.5 * (1.0 - slip[0] + rho * bend[0]), 0.5 * (rho * bend[1] - slip[1]), 0.5 * (rho * bend[2] - slip[2]))
+    for i in range(3):
+        K, G = row(i, bend, n, u), row(i, g, n, u)
+        turn = moment(n, row(i, (1.0, 0.0, 0.0), n, n))  # (w x n)_i = (n x e_i).w
+        put_rows(i, K, along(moment(y, K), 1.0, turn), G, along(moment(y, G), 0.5 * (d + rho), turn), out)
 
 
 @inner_kernel
@@ -165,7 +187,8 @@ def edges(x: Vec3, ua: Vec3, y: Vec3, ub: Vec3, n: Vec3, radii: tuple[float, flo
 
     With c = ua.ub, s^2 = 1 - c^2, g = (ua - c ub)/s^2, f = (ub - c ua)/s^2, delta = v + w x (closest point of a):
 
-    dn = -g (ua x n).w,   dx = delta + ua (d g.dn - g.delta),   dy = ub (f.delta - d f.dn)
+    dn = -g q.w,   q = ua x n,   dx = delta + ua (d g.dn - g.delta),   dy = ub (f.delta - d f.dn)
+    dp = (I - ua g^T + ub f^T) delta/2 - (rho g + d (ua + c ub)/s^2) q.w/2
     """
     rho = radii[1] - radii[0]
     c = dot(ua, ub)
@@ -176,12 +199,10 @@ def edges(x: Vec3, ua: Vec3, y: Vec3, ub: Vec3, n: Vec3, radii: tuple[float, flo
     e = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
     d = dot(n, e)
     near = along(x, -dot(g, e), ua)
-    q = cross(ua[0], ua[1], ua[2], n[0], n[1], n[2])
+    q = moment(ua, n)
     put(d - radii[0] - radii[1], n, along(near, 0.5 * (rho - d), n), out)
-    for j in range(6):
-        delta = velocity(j, near)
-        turn = q[j - 3] if j > 2 else 0.0
-        dn = (-turn * g[0], -turn * g[1], -turn * g[2])
-        dp = along(delta, d * dot(g, dn) - dot(g, delta), ua)
-        dp = along(along(dp, dot(f, delta) - d * dot(f, dn), ub), rho, dn)
-        put_column(j, dn, (0.5 * dp[0], 0.5 * dp[1], 0.5 * dp[2]), out)
+    for i in range(3):
+        G = along(along(row(i, (0.5, 0.0, 0.0), n, n), -0.5 * ua[i], g), 0.5 * ub[i], f)
+        turn = -0.5 * (rho * g[i] + d * (ua[i] + c * ub[i]) / s2)
+        Kw = (-g[i] * q[0], -g[i] * q[1], -g[i] * q[2])
+        put_rows(i, NOWHERE, Kw, G, along(moment(near, G), turn, q), out)
