@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from sim.collision.witness import FACE, LINE, NOWHERE, TIE, bend_line, bend_point, direction, vertex_a, vertex_b
+from sim.collision.witness import FACE, LINE, NOWHERE, TIE, axis, bend_line, bend_point, direction, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
-
-
-@inner_kernel
-def axis(i: int, s: float) -> Vec3:
-    """s e_i"""
-    return (s if i == 0 else 0.0), (s if i == 1 else 0.0), (s if i == 2 else 0.0)
 
 
 @inner_kernel

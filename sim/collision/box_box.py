@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from sim.collision.axes import Arrangement, deepest, side_of, support
 from sim.collision.box import (
-    axis,
     column,
     corner,
     distance_squared,
@@ -30,7 +29,7 @@ from sim.collision.box import (
 )
 from sim.collision.box_axes import facing
 from sim.collision.clip import BORDER, clip, common_normal, crossing, on_edges
-from sim.collision.witness import FACE, NOWHERE, TIE, absent, along, dot, edges, vertex_a, vertex_b
+from sim.collision.witness import FACE, NOWHERE, TIE, absent, along, axis, dot, edges, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel

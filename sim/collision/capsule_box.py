@@ -13,7 +13,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.collision.axes import PARALLEL, Arrangement, deepest, edge_must_exceed, side_of, support
-from sim.collision.box import axis, corner, distance_squared, nearest, vertex_on_box
+from sim.collision.box import corner, distance_squared, nearest, vertex_on_box
 from sim.collision.clip import clip, common_normal, crossing, on_edges
 from sim.collision.witness import (
     FACE,
@@ -22,6 +22,7 @@ from sim.collision.witness import (
     TIE,
     absent,
     along,
+    axis,
     bend_line,
     direction,
     dot,

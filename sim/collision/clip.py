@@ -10,8 +10,7 @@ lines cross at a small angle, the normal that they share turns fast.
 
 from __future__ import annotations
 
-from sim.collision.box import axis
-from sim.collision.witness import along, dot, edges
+from sim.collision.witness import along, axis, dot, edges
 from sim.model import Vector
 from sim.rotation import Vec3, cross
 from solvers.jit import inner_kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.collision.box import corner, to_b
-from sim.collision.witness import FACE, NOWHERE, Z, absent, along, put, put_column, turning, velocity, vertex_a
+from sim.collision.witness import FACE, NOWHERE, Z, absent, along, axis, moment, put, put_rows, vertex_a
 from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
@@ -77,9 +77,11 @@ def lowest(half: float, radius: float, R: Vector, r: Vector, out: Vector) -> Non
     phi = c[2] - radius * (sigma - _LEVEL)
     k = radius * u[2] / sigma
     put(phi, Z, (c[0] + k * u[0], c[1] + k * u[1], 0.5 * phi), out)
-    for j in range(6):
-        dc, du = velocity(j, c), turning(j, u)
-        dsigma = -u[2] * du[2] / sigma
-        dk = radius * du[2] / sigma - k * dsigma / sigma
-        dp = (dc[0] + dk * u[0] + k * du[0], dc[1] + dk * u[1] + k * du[1], 0.5 * (dc[2] - radius * dsigma))
-        put_column(j, NOWHERE, dp, out)
+    # dk = radius (1/sigma + u_z^2/sigma^3) du_z,   du_z = (u x z).w;   p_z = phi/2
+    turn = moment(u, Z)
+    rate = radius * (1.0 + u[2] * u[2] / (sigma * sigma)) / sigma
+    for i in range(3):
+        s = 0.5 if i == 2 else 1.0
+        e = axis(i, s)
+        Gw = along(moment(c, e), k, moment(u, e))
+        put_rows(i, NOWHERE, NOWHERE, e, along(Gw, 0.0 if i == 2 else rate * u[i], turn), out)

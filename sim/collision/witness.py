@@ -41,27 +41,9 @@ def along(x: Vec3, t: float, u: Vec3) -> Vec3:
 
 
 @inner_kernel
-def velocity(j: int, x: Vec3) -> Vec3:
-    """v + w x x for the unit twist j."""
-    if j == 0:
-        return 1.0, 0.0, 0.0
-    if j == 1:
-        return 0.0, 1.0, 0.0
-    if j == 2:
-        return 0.0, 0.0, 1.0
-    return turning(j, x)
-
-
-@inner_kernel
-def turning(j: int, u: Vec3) -> Vec3:
-    """w x u for the unit twist j."""
-    if j == 3:
-        return 0.0, -u[2], u[1]
-    if j == 4:
-        return u[2], 0.0, -u[0]
-    if j == 5:
-        return -u[1], u[0], 0.0
-    return 0.0, 0.0, 0.0
+def axis(i: int, s: float) -> Vec3:
+    """s e_i"""
+    return (s if i == 0 else 0.0), (s if i == 1 else 0.0), (s if i == 2 else 0.0)
 
 
 @inner_kernel
@@ -79,13 +61,6 @@ def put(phi: float, n: Vec3, p: Vec3, out: Vector) -> None:
     out[0] = phi
     out[1], out[2], out[3] = n
     out[4], out[5], out[6] = p
-
-
-@inner_kernel
-def put_column(j: int, dn: Vec3, dp: Vec3, out: Vector) -> None:
-    """Column j of dn and dp."""
-    out[7 + j], out[13 + j], out[19 + j] = dn
-    out[25 + j], out[31 + j], out[37 + j] = dp
 
 
 @inner_kernel
@@ -117,12 +92,7 @@ def put_rows(i: int, K: Vec3, Kw: Vec3, G: Vec3, Gw: Vec3, out: Vector) -> None:
 @inner_kernel
 def row(i: int, c: Vec3, n: Vec3, u: Vec3) -> Vec3:
     """Row i of c0 I + c1 n n^T + c2 u u^T."""
-    a, b = c[1] * n[i], c[2] * u[i]
-    return (
-        (c[0] if i == 0 else 0.0) + a * n[0] + b * u[0],
-        (c[0] if i == 1 else 0.0) + a * n[1] + b * u[1],
-        (c[0] if i == 2 else 0.0) + a * n[2] + b * u[2],
-    )
+    return along(along(axis(i, c[0]), c[1] * n[i], n), c[2] * u[i], u)
 
 
 @inner_kernel
@@ -163,7 +133,7 @@ def vertex_b(
     g = (0.5 * (1.0 - slip[0] + rho * bend[0]), 0.5 * (rho * bend[1] - slip[1]), 0.5 * (rho * bend[2] - slip[2]))
     for i in range(3):
         K, G = row(i, bend, n, u), row(i, g, n, u)
-        turn = moment(n, row(i, (1.0, 0.0, 0.0), n, n))  # (w x n)_i = (n x e_i).w
+        turn = moment(n, axis(i, 1.0))  # (w x n)_i = (n x e_i).w
         put_rows(i, K, along(moment(y, K), 1.0, turn), G, along(moment(y, G), 0.5 * (d + rho), turn), out)
 
 
@@ -202,7 +172,7 @@ def edges(x: Vec3, ua: Vec3, y: Vec3, ub: Vec3, n: Vec3, radii: tuple[float, flo
     q = moment(ua, n)
     put(d - radii[0] - radii[1], n, along(near, 0.5 * (rho - d), n), out)
     for i in range(3):
-        G = along(along(row(i, (0.5, 0.0, 0.0), n, n), -0.5 * ua[i], g), 0.5 * ub[i], f)
+        G = along(along(axis(i, 0.5), -0.5 * ua[i], g), 0.5 * ub[i], f)
         turn = -0.5 * (rho * g[i] + d * (ua[i] + c * ub[i]) / s2)
         Kw = (-g[i] * q[0], -g[i] * q[1], -g[i] * q[2])
         put_rows(i, NOWHERE, Kw, G, along(moment(near, G), turn, q), out)
