@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.contact import contact_kinematics
 from sim.friction import contact_error, contact_impulse, slip_violation
 from sim.model import Matrix, Model, Vector, Work
+from sim.pairs import is_absent
 from solvers.jit import kernel
 from solvers.record import rich
 
@@ -46,6 +47,10 @@ def report_pairs(model: Model, work: Work, out: Matrix) -> None:
     for j in range(model.pair_kind.shape[0]):
         c = model.contact_height.shape[0] + j
         _report_contact(model, work, c, work.pair_frame[j], out[c])
+        if is_absent(work, j):
+            out[c, 6] = work.pair_out[j, 0]
+            for e in range(3):
+                out[c, e] = 0.0
 
 
 @kernel

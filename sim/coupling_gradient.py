@@ -13,7 +13,7 @@ from sim.friction import contact_impulse
 from sim.loops import loop_stiffness
 from sim.model import Model, Work
 from sim.pair_stiffness import add_earlier_slip, centre_shift
-from sim.pairs import pair_force
+from sim.pairs import is_absent, pair_force
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
 from solvers.record import rich
@@ -32,6 +32,8 @@ def add_coupling_composites(model: Model, work: Work, h: float) -> None:
     first = model.coupling_body.shape[0] - nloop
     for j in range(model.pair_kind.shape[0]):
         k = model.pair_coupling[j]
+        if is_absent(work, j):
+            continue
         add_earlier_slip(model, work, h, j, work.coupling_K2[2 * k : 2 * k + 2])
         n, t1, t2 = contact_impulse(model, work, model.contact_height.shape[0] + j)
         _take_back(model, work, k, pair_force(work, j, n, t1, t2))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Ranges = NDArray[np.int64]  # (n, 2) first, and one past the last
+IntegerMatrix = NDArray[np.int64]
 
 
 class Law(IntEnum):
@@ -71,7 +71,9 @@ class Model(NamedTuple):
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
     pair_feature: Integers  # (npair,) which point of a pair of shapes with several
-    coupling_body: Integers  # (ncoupling, 2) bodies a and b, -1 for the world; couplings of pairs first, then loops
+    coupling_body: (
+        IntegerMatrix  # (ncoupling, 2) bodies a and b, -1 for the world; couplings of pairs first, then loops
+    )
     coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
     loop_ntrans: Integers  # (nloop,) free translations
     loop_nrot: Integers  # (nloop,) free rotations
@@ -153,11 +155,11 @@ class Work(NamedTuple):
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
     # near and far
-    count: Integers  # (3,) runs of near contacts, near limits, far clusters
-    near: Ranges  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
+    count: Integers  # (4,) runs of near contacts, near limits, far clusters
+    near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     near_limit: Integers  # (nlimit,) the near limits
-    far_first: Integers  # (ncontact,) first contacts of the far clusters
-    far: Matrix  # (ncontact, 24) see far.py
+    far_first: Integers  # (nground,) first contacts of the far clusters
+    far: Matrix  # (nground, 24) see far.py
     far_limit: Vector  # (nlimit,) gap below which a far limit is near, 0 for a near one
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

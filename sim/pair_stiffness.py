@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim.friction import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.model import Goal, Matrix, Model, Vector, Work
-from sim.pairs import add_pair_wrench, pair_arm, pair_force, pair_jacobian, shares
+from sim.pairs import add_pair_wrench, is_absent, pair_arm, pair_force, pair_jacobian, shares
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
 from solvers.record import rich
@@ -107,7 +107,8 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float) -> None:
     for j in range(model.pair_kind.shape[0]):
         pair_jacobian(model, work, h, j)
         condense_contact(model, work, model.contact_height.shape[0] + j, kappa)
-        add_pair_stiffness(model, work, j)
+        if not is_absent(work, j):
+            add_pair_stiffness(model, work, j)
 
 
 @rich("0.0")
@@ -117,7 +118,8 @@ def apply_pairs(model: Model, work: Work) -> float:
     for j in range(model.pair_kind.shape[0]):
         c = model.contact_height.shape[0] + j
         n, t1, t2 = contact_impulse(model, work, c)
-        add_pair_wrench(model, work, j, n, t1, t2)
+        if not is_absent(work, j):
+            add_pair_wrench(model, work, j, n, t1, t2)
         r = max(r, contact_error(model, work, c))
     return r
 
@@ -129,7 +131,8 @@ def pair_constants(model: Model, work: Work, goal: Goal) -> None:
         c = model.contact_height.shape[0] + j
         contact_constant(model, work, c, goal)
         w = work.contact_w[c]
-        add_pair_wrench(model, work, j, w[0], w[1], w[2])
+        if not is_absent(work, j):
+            add_pair_wrench(model, work, j, w[0], w[1], w[2])
 
 
 @kernel

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.collide import collide
+from sim.collision.collide import arrange, collide_arranged
 from sim.model import Model, Vector, Work
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
@@ -84,27 +84,43 @@ def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -
     return (a[0] - b[0] + 2.0 * vx) / h, (a[1] - b[1] + 2.0 * vy) / h, (a[2] - b[2] + 2.0 * vz) / h
 
 
+@kernel
+def collide_shapes(model: Model, work: Work, first: int) -> int:
+    """pair_out of all points of the collision whose first pair this is; returns one past the last."""
+    k = model.pair_coupling[first]
+    place_shape(model, work, 2 * first, model.coupling_body[k, 0])
+    place_shape(model, work, 2 * first + 1, model.coupling_body[k, 1])
+    relative_pose(work, first)
+    kind = model.pair_kind[first]
+    sizes = model.pair_sizes[first]
+    pose = work.pair_relative[first]
+    faces = arrange(kind, sizes, pose[:9], pose[9:])
+    end = first
+    while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
+        collide_arranged(kind, end - first, faces, sizes, pose[:9], pose[9:], work.pair_out[end])
+        end += 1
+    return end
+
+
+@kernel
+def is_absent(work: Work, j: int) -> bool:
+    """Whether the shapes have no such point now (a corner cut off): it has a gap of 1 m then, and no wrench."""
+    return work.pair_out[j, 0] > _NO_POINT
+
+
 @rich()
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gap, slip, frame and point of every pair at configuration 3.
-
-    A point that the present configuration does not have (a corner cut off) repeats the one before it.
-    """
+    """Gap, slip, frame and point of every pair at configuration 3."""
     ground = model.contact_height.shape[0]
+    end = 0
     for j in range(model.pair_kind.shape[0]):
+        if j == end:
+            end = collide_shapes(model, work, j)
         a = model.coupling_body[model.pair_coupling[j], 0]
         b = model.coupling_body[model.pair_coupling[j], 1]
-        place_shape(model, work, 2 * j, a)
-        place_shape(model, work, 2 * j + 1, b)
-        relative_pose(work, j)
         g = work.pair_out[j]
-        pose = work.pair_relative[j]
-        collide(model.pair_kind[j], model.pair_feature[j], model.pair_sizes[j], pose[:9], pose[9:], g)
-        if g[0] > _NO_POINT and model.pair_feature[j] > 0:
-            for k in range(g.shape[0]):
-                g[k] = work.pair_out[j - 1, k]
         F = work.pair_frame[j]
-        s = 2 * j + 1
+        s = shape_b(model, j)
         t1, t2, _ = tangents(g[1], g[2], g[3])
         F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
         F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
@@ -116,12 +132,18 @@ def pair_kinematics(model: Model, work: Work, h: float) -> None:
         bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
         x, y, z = ax - bx, ay - by, az - bz
         kin = work.contact_kin[ground + j]
-        kin[0] = g[0]
+        kin[0] = 1.0 if is_absent(work, j) else g[0]
         kin[1] = F[3] * x + F[4] * y + F[5] * z
         kin[2] = F[6] * x + F[7] * y + F[8] * z
         kin[3] = F[9] - work.pos3[a, 0]
         kin[4] = F[10] - work.pos3[a, 1]
         kin[5] = F[11] - work.pos3[a, 2]
+
+
+@kernel
+def shape_b(model: Model, j: int) -> int:
+    """Row of shape b of pair j: all points of a collision share their shapes."""
+    return 2 * (j - model.pair_feature[j]) + 1
 
 
 @kernel
@@ -239,7 +261,7 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
     """pair_turn, pair_shift: Omega and M about O;  pair_C: d(gap, slip) by the twists of a, then of b."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    s = 2 * j + 1
+    s = shape_b(model, j)
     o = work.origin
     x, y, z = work.shape_pos[s, 0] - o[0], work.shape_pos[s, 1] - o[1], work.shape_pos[s, 2] - o[2]
     g = work.pair_out[j]

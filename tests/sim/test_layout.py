@@ -51,7 +51,7 @@ def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, 
 
 @pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
 def test_kind_matches_annotation(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
-    kinds = {(True, 1): "Integers", (True, 2): "Ranges", (False, 1): "Vector", (False, 2): "Matrix"}
+    kinds = {(True, 1): "Integers", (True, 2): "IntegerMatrix", (False, 1): "Vector", (False, 2): "Matrix"}
     for name, shape in table.items():
         integer = name in MODEL_INTS or name in WORK_INTS
         assert cls.__annotations__[name].__forward_arg__ == kinds[integer, len(shape)], name

@@ -1,0 +1,163 @@
+"""Contacts between bodies: momentum, Newton's third law, no overlap, derivatives; stacks and mass ratios."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from sim.collisions import Collision
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Joint
+from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
+
+SHAPES: dict[str, Solid] = {
+    "sphere": Sphere(0.2),
+    "capsule": Capsule(0.15, 0.4),
+    "box": Box(0.4, 0.3, 0.5),
+}
+
+
+def two(a: Solid, b: Solid, friction: float = 0.5, law: str = "nonlinear") -> Mechanism:
+    """Two free bodies without gravity."""
+    bodies = [Body("a", 1.0, (0.02, 0.03, 0.04), shape=a), Body("b", 2.0, (0.05, 0.06, 0.07), shape=b)]
+    joints = [Joint("floating", None, "a"), Joint("floating", None, "b")]
+    return Mechanism(bodies, joints, collisions=[Collision("a", "b", friction=friction, law=law)], gravity=(0, 0, 0))
+
+
+def approaching(sim: dojo.Simulator, seed: int, distance: float) -> np.ndarray:
+    """Random poses about so far apart, moving towards one another and spinning."""
+    rng = np.random.default_rng(seed)
+    n = rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    turns = [q / np.linalg.norm(q) for q in rng.normal(size=(2, 4))]
+    v = rng.normal(size=12)
+    v[:3] -= 2.0 * n
+    v[6:9] += 2.0 * n
+    return np.concatenate([distance * n, turns[0], np.zeros(3), turns[1], v])
+
+
+def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:
+    """The state of a motion towards one another when they are about to touch."""
+    x = approaching(sim, seed, 1.0)
+    for _ in range(60):
+        r = sim.step(x)
+        assert r.success, r.message
+        if r.contacts.gap.min() < 0.01:
+            return x
+        x = r.x
+    return x
+
+
+@pytest.mark.parametrize("b", SHAPES)
+@pytest.mark.parametrize("a", SHAPES)
+def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None:
+    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
+    hit = 0
+    for seed in range(4):
+        x = approaching(sim, seed, 1.0)
+        p0, L0 = sim.momentum(x)
+        t = sim.rollout(x, np.zeros((60, sim.nu)))
+        assert t.success, t.message
+        p, L = sim.momentum(t.x)
+        np.testing.assert_allclose(p, np.tile(p0, (len(p), 1)), atol=1e-8)
+        np.testing.assert_allclose(L, np.tile(L0, (len(L), 1)), atol=1e-8)
+        assert t.contacts.gap.min() > -1e-6
+        energy = sim.energy(t.x)
+        assert energy[-1] < energy[0] + 2e-3  # kappa pushes from afar
+        hit += bool(np.abs(t.contacts.impulse).max() > 0.1)
+    assert hit > 0
+
+
+@pytest.mark.parametrize("kappa", [1e-2, 1e-4])
+@pytest.mark.parametrize(("law", "friction"), [("nonlinear", 0.5), ("linear", 0.5), ("impact", 0.0)])
+@pytest.mark.parametrize("pair", [("sphere", "sphere"), ("sphere", "box"), ("capsule", "capsule"), ("box", "box")])
+def test_derivatives_of_a_step_with_a_collision(pair: tuple[str, str], law: str, friction: float, kappa: float) -> None:
+    sim = dojo.Simulator(
+        two(SHAPES[pair[0]], SHAPES[pair[1]], friction, law), time_step=0.01, kappa=kappa, tolerance=1e-12
+    )
+    x = touching(sim, 3)
+    A, _ = sim.linearize(x)
+    best = np.inf
+    for e in (1e-5, 1e-6):  # the curvature of a contact and rounding each want another step
+        F = np.empty_like(A)
+        for k, d in enumerate(e * np.eye(sim.ndx)):
+            p, m = (sim.step(sim.integrate(x, s * d)).x for s in (1, -1))
+            p2, m2 = (sim.step(sim.integrate(x, 2 * s * d)).x for s in (1, -1))
+            F[:, k] = (8 * sim.difference(p, m) - sim.difference(p2, m2)) / (12 * e)
+        best = min(best, float(np.abs(A - F).max() / np.abs(A).max()))
+    assert best < 1e-6
+
+
+def tower(count: int, shape: Solid, masses: list[float], kind: str = "floating") -> Mechanism:
+    """Bodies of height 0.2 on top of one another, the lowest on the ground."""
+    names = [f"b{k}" for k in range(count)]
+    bodies = [Body(n, m, shape=shape) for n, m in zip(names, masses, strict=True)]
+    heights = [0.1 + 0.2 * k + 1e-4 * (k + 1) for k in range(count)]
+    neutral = {n: [0, 0, z, 1, 0, 0, 0] if kind == "floating" else [z] for n, z in zip(names, heights, strict=True)}
+    pairs = [Collision(a, b) for a, b in zip(names[1:], names[:-1], strict=True)]
+    ground = Collision(names[0], shape_b=HalfSpace())
+    return Mechanism(bodies, [Joint(kind, None, n) for n in names], collisions=[ground, *pairs], neutral=neutral)
+
+
+@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
+def test_heavy_balls_rest_on_light_ones(ratio: float) -> None:
+    sim = dojo.Simulator(tower(2, Sphere(0.1), [1.0, ratio], "prismatic"), time_step=0.01)
+    t = sim.rollout(sim.neutral(), np.zeros((200, sim.nu)))
+    assert t.success, t.message
+    assert t.contacts.gap.min() > 0.0 and t.x[-1, 1] == pytest.approx(0.3, abs=1e-6)
+
+
+def test_a_stack_of_boxes_stands() -> None:
+    sim = dojo.Simulator(tower(4, Box(0.2, 0.2, 0.2), [1.0] * 4), time_step=0.01)
+    t = sim.rollout(sim.neutral(), np.zeros((100, sim.nu)))
+    assert t.success, t.message
+    centres = sim.maximal(t.x[-1])[:, :3]
+    np.testing.assert_allclose(centres, [[0, 0, 0.1 + 0.2 * k] for k in range(4)], atol=1e-3)
+    load = t.contacts.force[-1, :, 2]
+    names = sim.mechanism.contact_names
+    for k in range(4):
+        below = sum(f for f, name in zip(load, names, strict=True) if name.startswith(f"b{k}-"))
+        assert abs(below) == pytest.approx(9.81 * (4 - k), rel=1e-3)  # Newton's third law, whoever comes first
+
+
+def test_the_ground_as_a_collision_is_the_ground_as_a_contact() -> None:
+    ball = Body("ball", 1.0, shape=Sphere(0.1))
+    start = {"ball": [0, 0, 0.2, 1, 0, 0, 0]}
+    joint = Joint("floating", None, "ball")
+    a = Mechanism([ball], [joint], [Contact("ball", radius=0.1, friction=0.4)], neutral=start)
+    b = Mechanism([ball], [joint], collisions=[Collision("ball", shape_b=HalfSpace(), friction=0.4)], neutral=start)
+    x = dojo.Simulator(a, time_step=0.01).neutral()
+    x[7:] = [1.0, 0.5, -1.0, 3.0, -2.0, 1.0]
+    runs = [dojo.Simulator(m, time_step=0.01, kappa=1e-8).rollout(x, np.zeros((60, 0))) for m in (a, b)]
+    np.testing.assert_allclose(runs[0].x, runs[1].x, atol=1e-5)
+    np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-5)
+
+
+def test_a_string_holds_and_does_not_push() -> None:
+    bodies = [Body(n, 1.0, (0.1, 0.1, 0.1)) for n in "ab"]
+    joints = [Joint("floating", None, n) for n in "ab"]
+    rope = Collision("a", "b", String(1.0), String(1.0), friction=0.0)
+    sim = dojo.Simulator(Mechanism(bodies, joints, collisions=[rope], gravity=(0, 0, 0)), time_step=0.01)
+    x = np.concatenate([[0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 1, 0, 0, 0], [-1, 0.2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0]])
+    t = sim.rollout(x, np.zeros((200, sim.nu)))
+    assert t.success, t.message
+    apart = np.linalg.norm(t.x[:, :3] - t.x[:, 7:10], axis=1)
+    assert 0.9 < apart.max() <= 1.0
+
+
+def test_collisions_are_checked() -> None:
+    bodies = [Body("a", 1.0, (1, 1, 1)), Body("b", 1.0, shape=Cylinder(0.1, 0.2)), Body("c", 1.0, shape=Box(1, 1, 1))]
+    joints = [Joint("floating", None, b.name) for b in bodies]
+    cases = {
+        "body 'a' has no shape": Collision("a", "b"),
+        "no collision of Cylinder and Box": Collision("b", "c"),
+        "'nobody' is not one of": Collision("nobody", "c"),
+    }
+    for message, collision in cases.items():
+        with pytest.raises(ValueError, match=message):
+            dojo.Simulator(Mechanism(bodies, joints, collisions=[collision]), time_step=0.01)
+    with pytest.raises(ValueError, match="collide with itself"):
+        Collision("a", "a")
+    with pytest.raises(ValueError, match="give shape_b=..., the shape of the obstacle"):
+        Collision("a")
