@@ -13,7 +13,7 @@ import dojo_opt as dojo
 
 SPEED, NUDGE = 6.0, 1e-3  # [rad/s]
 DURATION = 10.0 if QUICK else 30.0
-sim = dojo.Simulator(dojo.models.dzhanibekov(), time_step=0.01, tolerance=1e-12)
+sim = dojo.Simulator(dojo.models.dzhanibekov(), time_step=0.01, tolerance=1e-13)
 time = np.arange(round(DURATION / sim.time_step) + 1) * sim.time_step
 
 figure = Figure(figsize=(9, 6), layout="constrained")
@@ -33,7 +33,7 @@ for ax, (name, k) in zip(axes, (("smallest (y)", 1), ("middle (x)", 0), ("larges
     ax.set_title(f"spun about the axis of the {name} moment of inertia: {flips[name]} flips", fontsize=10)
     ax.set_ylabel("$\\omega$ [rad/s]")
     print(f"{name}: {flips[name]} flips, momentum {drift:.1e} N m s off, energy {np.ptp(energy) / energy[0]:.1e}")
-    assert drift < 1e-10, drift
+    assert drift < 1e-9, drift
     assert np.ptp(energy) < 1e-3 * energy[0]
 axes[0].legend(loc="upper right", ncols=3)
 axes[2].set_xlabel("time [s]")
