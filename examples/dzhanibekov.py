@@ -13,7 +13,7 @@ import dojo_opt as dojo
 
 SPEED, NUDGE = 6.0, 1e-3  # [rad/s]
 DURATION = 10.0 if QUICK else 30.0
-sim = dojo.Simulator(dojo.models.dzhanibekov(), time_step=0.01, tolerance=1e-13)
+sim = dojo.Simulator(dojo.models.dzhanibekov(), time_step=0.01, tolerance=1e-12)
 time = np.arange(round(DURATION / sim.time_step) + 1) * sim.time_step
 
 figure = Figure(figsize=(9, 6), layout="constrained")

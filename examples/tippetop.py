@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 import dojo_opt as dojo
 
-SPIN, TILT, RADIUS = 120.0, 0.1, 0.02  # [rad/s], [rad], [m]
-DURATION = 6.0
+SPIN, TILT, RADIUS = 200.0, 0.1, 0.02  # [rad/s], [rad], [m]
+DURATION = 4.0  # [s]
 inertia = 0.4 * 0.015 * RADIUS**2 * np.array([1.0, 1.0, 1.0])
-top = dojo.models.tippetop(mass=0.015, radius=RADIUS, inertia=inertia, scale=0.3, offset=0.004, friction=0.3)
+top = dojo.models.tippetop(mass=0.015, radius=RADIUS, inertia=inertia, scale=0.2, offset=0.004, friction=0.3)
 sim = dojo.Simulator(top, time_step=5e-4, kappa=1e-9)
 
 x = sim.neutral()
@@ -39,7 +39,7 @@ axes[2].plot(t.time, 1e3 * energy)
 axes[2].set_ylabel("energy [mJ]")
 axes[2].set_xlabel("time [s]")
 
-assert tilt[-1] > 140.0, tilt[-1]
+assert tilt.max() > 160.0 and tilt[-1] > 150.0, tilt
 assert t.x[-1, 2] > t.x[0, 2]
-assert gap > -1e-9 and np.all(np.diff(energy) < 1e-6 * energy[0])
+assert gap > -1e-9 and np.all(np.diff(energy) < 1e-5 * energy[0])
 finish(figure, __file__)
