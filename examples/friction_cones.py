@@ -21,9 +21,8 @@ for ax, law in zip(figure.subplots(1, 2), ("linear", "nonlinear"), strict=True):
     ends = []
     for angle in angles:
         way = np.array([np.cos(angle), np.sin(angle)])
-        start = sim.neutral()
-        start[7:9] = SPEED * way
-        t = sim.rollout(start, np.zeros((round(0.8 / H), sim.nu)), throw=True)
+        velocity = np.concatenate([SPEED * way, np.zeros(4)])
+        t = sim.rollout(sim.start(sim.neutral()[:7], velocity), np.zeros((round(0.8 / H), sim.nu)), throw=True)
         ends.append(t.x[-1, :2])
         ax.plot(*t.x[:, :2].T, color="C0")
         ax.plot(*(1.4 * EXPECTED * way), ".", color="0.7")
@@ -33,9 +32,8 @@ for ax, law in zip(figure.subplots(1, 2), ("linear", "nonlinear"), strict=True):
         np.degrees(np.arccos(e @ (np.cos(a), np.sin(a)) / d)) for e, d, a in zip(ends, distance, angles, strict=True)
     ]
     errors[law] = (np.abs(distance / EXPECTED - 1.0).max(), max(turned))
-    print(
-        f"{law}: {distance.min():.4f} to {distance.max():.4f} m, Coulomb {EXPECTED:.4f} m; turned {max(turned):.3f} degrees"
-    )
+    print(f"{law}: {distance.min():.4f} to {distance.max():.4f} m, Coulomb {EXPECTED:.4f} m; ", end="")
+    print(f"turned by up to {max(turned):.3f} degrees")
     circle = np.linspace(0.0, 2.0 * np.pi, 100)
     ax.plot(EXPECTED * np.cos(circle), EXPECTED * np.sin(circle), "k--", linewidth=0.8)
     ax.plot(*np.array(ends).T, "o", color="C3")

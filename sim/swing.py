@@ -85,7 +85,8 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
 def swing_curvature(model_at: Any, work_at: Any, i: int, p1: float, p2: float) -> int:
     """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 
-    All in the child's axes. A test direction turns with its joint, which `residual_derivatives` knows, and in the child's axes it also changes.
+    All in the child's axes, in which a test direction changes; that it turns with its joint, `residual_derivatives`
+    knows.
     """
     model = model_view(model_at)
     work = work_view(work_at)

@@ -96,6 +96,14 @@ def chain(kind: str, links: int = 1, gravity=(0.0, 0.0, 0.0), base="floating", *
     return dojo.Mechanism(bodies, joints, inputs=inputs, gravity=gravity)
 
 
+def limited(kind: str) -> dojo.Mechanism:
+    """Two joints of a kind, each plain coordinate between -0.3 and 0.3 and each quaternion within a cone of 0.6."""
+    ntrans, nrot = dojo.Joint(kind, None, "b").ntrans, dojo.Joint(kind, None, "b").nrot
+    plain = ntrans + (nrot if nrot < 3 else 0)
+    limits = [(-0.3, 0.3)] * plain + [None] * (ntrans + nrot - plain)
+    return chain(kind, 1, base=None, damper=0.1, limits=limits or None, cone=0.6 if nrot == 3 else None)
+
+
 def pendulum(links: int = 1, length=1.0, mass=1.0, **joint) -> dojo.Mechanism:
     """Rods that turn about x, hanging at zero."""
     inertia = mass * length**2 / 12.0 * np.array([1.0, 1.0, 0.01])

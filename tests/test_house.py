@@ -129,8 +129,9 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
         file.write_text(file.read_text() + "\n# edited\n")
         seen.append(digest())
     assert len(set(seen)) == 3
-    loader = copy / "sim" / "urdf" / "load.py"  # a file that no kernel reads
-    loader.write_text(loader.read_text() + "\n# edited\n")
+    for folder in ("urdf", "mjcf"):  # files that no kernel reads
+        loader = copy / "sim" / folder / "load.py"
+        loader.write_text(loader.read_text() + "\n# edited\n")
     assert digest() == seen[-1]
 
 
@@ -184,6 +185,25 @@ print(json.dumps(compiled_signatures()))
     assert any(name.startswith("sim.") for name in kernels)
     foreign = ("sim.contact", "sim.friction", "sim.interior_point", "sim.inequalities", "sim.limits", "solvers.cones")
     assert [name for name in kernels if name.startswith(foreign)] == []
+
+
+def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
+    program = """
+import numpy as np, dojo_opt as dojo
+from sim.cone_limit import cone_block, cone_derivative, cone_gap
+from sim.swing import swing_curvature, swing_pose
+late = (cone_gap, cone_block, cone_derivative, swing_pose, swing_curvature)
+body = dojo.Body("b", 1.0, (1, 1, 1))
+scenes = (
+    dojo.models.hopper(),
+    dojo.Mechanism([body], [dojo.Joint("spherical", None, "b", cone=0.5)]),
+    dojo.models.orbital(),
+)
+for mech in scenes:
+    sim = dojo.Simulator(mech, time_step=0.01)
+    print("".join("." if kernel._compiled is None else "x" for kernel in late))
+"""
+    assert python(program).split() == [".....", "xxx..", "xxxxx"]
 
 
 @pytest.mark.slow

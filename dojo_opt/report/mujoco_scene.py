@@ -4,8 +4,8 @@ MuJoCo's body frames are put at our centres of mass with the axes of the joint f
 have the same layout and, but for the convention of v (mean over the last interval, not at the node), the same meaning.
 Contacts become spheres paired with the plane of their half-space, and with nothing else.
 
-What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones. What it says otherwise:
-contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
+What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones.
+What it says otherwise: contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
 """
 
 from __future__ import annotations

@@ -59,8 +59,9 @@ def load_urdf(
         rim_points    points per rim of a cylinder
 
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
-    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation as in Dojo). A body's frame has the
-    axes of its first link and its origin at the centre of mass; `mechanism.report.links` has the pose of every link in
+    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in
+    Dojo). A body's frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links`
+    has the pose of every link in
     its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented
     (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a UrdfWarning.
 

@@ -32,6 +32,7 @@ KINDS = {
     "cylindrical": "cylindrical",
     "cylindricalfree": "cylindrical_free",
     "fixedorientation": "fixed_orientation",
+    "orbital": "orbital",
 }
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 # elements that say nothing about the motion of bodies, or nothing that a step could use

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from jacobians import check_jacobian
 from naive import rotation as rot
-from scenes import KINDS, LAWS, ball, block, chain, gaps, pendulum, random_state, slider
+from scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 import dojo_opt as dojo
 
@@ -168,6 +168,20 @@ def test_limits(push, fast, rng):
         x = np.r_[np.full(nv, 0.5 - H * speed * (1.0 - 0.3 * push)), np.full(nv, speed)]
         for kappa in KAPPAS:
             check(mech, x, push * rng.normal(size=nv), kappa)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fixed"])
+def test_limits_of_every_kind(kind, rng):
+    """Every plain coordinate arrives at its bound in this very step."""
+    mech = limited(kind)
+    sim = simulator(mech, 1e-6)
+    q, v = np.array(mech.neutral), rng.normal(size=sim.nv)
+    for joint in mech.joints:
+        for d in range(joint.nv - 3 * (joint.nrot == 3)):
+            q[mech.q_slice(joint.name).start + d] = 0.28
+            v[mech.v_slice(joint.name).start + d] = 1.0 + 0.2 * d
+    for kappa in KAPPAS:
+        check(mech, np.concatenate([q, v]), rng.normal(size=sim.nu), kappa)
 
 
 def test_fast_spin():

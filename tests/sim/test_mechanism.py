@@ -80,7 +80,10 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: hip(limits=(INF, None)), r"Joint\('hip', limits=\.\.\.\): expected lo < hi"),
     (lambda: hip(limits=[(0, 1), (0, 1)]), r"Joint\('hip', limits=\.\.\.\): expected 1 pairs .* got 2"),
     (lambda: hip(limits=["ab"]), r"Joint\('hip', limits=\.\.\.\): expected a pair \(lo, hi\), got 'ab'"),
-    (lambda: Joint("spherical", None, "leg", limits=[(0, 1), None, None]), r"Joint\('leg', limits=.*cannot be limited"),
+    (
+        lambda: Joint("spherical", None, "leg", limits=[(0, 1), None, None]),
+        r"Joint\('leg', limits=.*have no bounds; cone=",
+    ),
     (lambda: Joint("spherical", None, "leg", rest=1.0), r"Joint\('leg', rest=\.\.\.\): expected 3 numbers"),
     (
         lambda: Joint("spherical", None, "leg", spring=(1, 1, 2)),

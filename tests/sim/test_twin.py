@@ -6,7 +6,7 @@ from naive import lagrangian as lag
 from naive import rotation as rot
 from naive.maximal import solve
 from naive.scene import from_mechanism, poses
-from scenes import KINDS, LAWS, block, chain, free_body, gaps, pendulum, random_state
+from scenes import KINDS, LAWS, block, chain, free_body, gaps, limited, pendulum, random_state
 
 import dojo_opt as dojo
 
@@ -201,3 +201,25 @@ def test_armature(kind, base, rng):
         q, v = x[: sim.nq], x[sim.nq :]
         np.testing.assert_allclose(np.sum(sim.energy(x)), lag.energy(scene, q, v, sim.time_step), rtol=1e-9)
         np.testing.assert_allclose(sim.start(q, v)[sim.nq :], lag.start(scene, q, v, sim.time_step), atol=1e-8)
+
+
+def plain_coordinates(mech, joint):
+    """Indices in q of the coordinates of a joint that belong to no quaternion."""
+    start = mech.q_slice(joint.name).start
+    return range(start, start + joint.nv - 3 * (joint.nrot == 3))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fixed"])
+def test_limits_of_every_kind(kind, rng):
+    """Every coordinate that is a plain number arrives at a bound in this very step; a quaternion is far from its cone."""
+    sim = make(limited(kind), 0.02)
+    q = np.array(sim.mechanism.neutral)
+    v = rng.normal(size=sim.nv)
+    for joint in sim.mechanism.joints:
+        for d in range(joint.nv - 3 * (joint.nrot == 3)):
+            q[sim.mechanism.q_slice(joint.name).start + d] = 0.28
+            v[sim.mechanism.v_slice(joint.name).start + d] = 2.0 + d
+    result = compare(sim, np.concatenate([q, v]), rng.normal(size=sim.nu))
+    plain = [result.x[i] for j in sim.mechanism.joints for i in plain_coordinates(sim.mechanism, j)]
+    assert np.all(np.array(plain) < 0.3 + 1e-9)
+    assert not plain or max(plain) > 0.2999

@@ -32,6 +32,7 @@ KINDS = {  # type in the file: (kind, nq, nv)
     "cylindrical": ("cylindrical", 2, 2),
     "cylindricalfree": ("cylindrical_free", 5, 4),
     "fixedorientation": ("fixed_orientation", 3, 3),
+    "orbital": ("orbital", 2, 2),
 }
 
 
