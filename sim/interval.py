@@ -78,7 +78,7 @@ def _matrix(model: Model, work: Work, h: float, q: Vector) -> bool:
 def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vector, impulse: Vector) -> Outcome:
     """Solve -D1 L_d(q, q (+) h nu) = p2 for nu by Newton's method from the guess in work.nu, with one step at least."""
     scale = residual_scale(work)
-    tolerance = options.tolerance + rounding(model, work, h) / scale
+    floor = rounding(model, work, h) / scale
     last = 0.0
     r = 1e300
     alpha = 1.0
@@ -90,7 +90,9 @@ def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vect
     while True:
         inside = _balance(model, work, h, q, impulse)
         r = norm(work.residual) / scale
-        if not (inside and (r < max(last, tolerance) or iterations == 0)):
+        if not (inside and (r < max(last, options.tolerance) or iterations == 0)):
+            if inside and iterations > 0 and r < floor:
+                return Outcome(_SOLVED, iterations, r, 0.0)
             if halvings > 40:
                 return Outcome(_NO_PROGRESS, iterations, r, 0.0)
             halvings += 1
@@ -98,7 +100,7 @@ def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vect
                 for d in range(work.nu.shape[0]):
                     work.nu_trial[d] *= 0.7
             alpha *= 0.5
-        elif iterations > 0 and r < tolerance:
+        elif iterations > 0 and r < options.tolerance:
             return Outcome(_SOLVED, iterations, r, 0.0)
         elif iterations == options.max_iterations:
             return Outcome(_MAX_ITERATIONS, iterations, r, 0.0)

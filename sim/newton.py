@@ -28,12 +28,13 @@ def residual_scale(work: Work) -> float:
 
 @kernel
 def rounding(model: Model, work: Work, h: float) -> float:
-    """Residual that cannot be told from zero: momenta are differences of rounded positions, divided by h."""
+    """Residual that cannot be told from zero: momenta are differences of rounded poses, divided by h."""
     total = 0.0
     o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
     for i in range(model.body_parent.shape[0]):
         x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
-        total += model.body_mass[i] * x * (1.0 + x + o)
+        J = model.body_inertia[i]
+        total += model.body_mass[i] * x * (1.0 + x + o) + J[0] + J[4] + J[8]
     return 1e-15 * total / abs(h)
 
 
@@ -56,7 +57,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     """
     h = options.h
     scale = residual_scale(work)
-    tolerance = options.tolerance + rounding(model, work, h) / scale
+    floor = rounding(model, work, h) / scale
     for d in range(v.shape[0]):
         work.nu_trial[d] = guess.velocity[d]
         work.dnu[d] = 0.0
@@ -77,7 +78,10 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         project(model, work.S2, work.subtree, work.residual)
         joint_impulses(model, work, h, q, v, u)
         r = norm(work.residual) / scale
-        if not (inside and r < max(last, tolerance)):
+        if not (inside and r < max(last, options.tolerance)):
+            if inside and iterations > 0 and r < floor:
+                status = _SOLVED
+                break
             if halvings > 40:
                 status = _NO_PROGRESS
                 break
@@ -87,7 +91,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
                     work.nu_trial[d] *= 0.7
             alpha *= 0.5
             continue
-        if r < tolerance:
+        if r < options.tolerance:
             status = _SOLVED
             break
         if iterations == options.max_iterations:

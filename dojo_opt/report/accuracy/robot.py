@@ -1,0 +1,252 @@
+"""Which time step, kappa and tolerance a robot needs: errors of its own motion, with contacts, and without."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.report.accuracy import curves, drawing, scenes
+from dojo_opt.report.engines import Engine, Ours, installed
+from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.report.study import Progress
+from sim.mechanism import Mechanism
+from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+_PIECE, _PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
+_DURATION = _PIECE * _PIECES
+_TARGET = 1e-3  # [m] error that is asked for after a piece
+_STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
+_KAPPAS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
+_SHARP = 1e-9  # kappa of the converged motion
+_TOLERANCES = (1e-4, 1e-6, 1e-8)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One setting and what came of it."""
+
+    time_step: float
+    kappa: float
+    tolerance: float
+    error: float  # [m] largest distance of a body from the converged motion after a piece, mean over the pieces
+    seconds: float  # processor time
+    message: str
+
+    @property
+    def realtime(self) -> float:
+        """How many times faster than the motion itself."""
+        return _DURATION / self.seconds if self.seconds > 0.0 else 0.0
+
+    def __str__(self) -> str:
+        size = f"{1e3 * self.error:.2g} mm" if np.isfinite(self.error) else "lost"
+        return (
+            f"h = {1e3 * self.time_step:g} ms, kappa {self.kappa:g}, tolerance {self.tolerance:g}: {size} after "
+            f"{_PIECE:g} s, {self.realtime:.3g} times real time"
+        )
+
+
+def recommend(mechanism: Mechanism, quick: bool, progress: Progress) -> Report:
+    """The report of one mechanism.  ValueError: it cannot be simulated even with small steps."""
+    report = Report(
+        f"Accuracy of {mechanism.name}", "dojo-opt report accuracy ROBOT.urdf" + (" --quick" if quick else "")
+    )
+    report.summary = (
+        f"{_DURATION:g} s of motion from a random start that is always the same, joints without torques, with contacts "
+        f"and limits, cut into {_PIECES} pieces that each start on the converged motion (Erez, Tassa, Todorov, 2015). "
+        "Errors are the largest distance of a body's centre of mass from it at the end of a piece, means over the "
+        "pieces. The converged motion is the same simulator with a much smaller step and kappa; for the motion without "
+        "contacts and limits, uncut, it is an independent ODE."
+    )
+    q, v = start(mechanism)
+    hard = bool(mechanism.contacts) or scenes.without_contact(mechanism).joints != mechanism.joints
+    parts: list[tuple[str, Any]] = [("smooth motion", lambda: _smooth(report, mechanism, q, v, quick))]
+    if hard:
+        parts.insert(0, ("time steps, kappas", lambda: _hard(report, mechanism, q, v, quick)))
+    for part in progress(parts, "accuracy"):
+        part()
+    return report
+
+
+def start(mechanism: Mechanism) -> tuple[Floats, Floats]:
+    """(q, v): the neutral pose, joints turned by about 0.2 rad within their limits and moving at 1 rad/s, a floating
+    base at 0.3 m/s and 0.5 rad/s, its lowest contact 2 cm above its ground. The same for everybody.
+    """
+    sim = Simulator(mechanism, time_step=1e-3)
+    rng = np.random.default_rng(0)
+    dx, neutral = np.zeros(sim.ndx), np.asarray(mechanism.neutral, dtype=np.float64)
+    v = np.zeros(sim.nv)
+    for joint in mechanism.joints:
+        at, floats = mechanism.v_slice(joint.name), joint.kind == "floating"
+        n = at.stop - at.start
+        dx[at] = rng.normal(size=n) * (np.repeat([0.0, 0.1], 3) if floats else 0.2)
+        v[at] = rng.normal(size=n) * (np.repeat([0.3, 0.5], 3) if floats else 1.0)
+    q = np.array(neutral)
+    for share in (1.0, 0.5, 0.25, 0.1, 0.0):
+        q = _inside(sim, sim.integrate(np.concatenate([neutral, np.zeros(sim.nv)]), share * dx)[: sim.nq])
+        lowest = min(_gaps(sim, q), default=0.02)
+        if mechanism.joints[0].kind == "floating":
+            q[2] += 0.02 - lowest
+            return q, v
+        if lowest >= 0.0:
+            break
+    return q, v
+
+
+def _inside(sim: Simulator, q: Floats) -> Floats:
+    """Coordinates moved into their limits, a twentieth of the range from either end."""
+    model, out = sim.model, np.array(q)
+    for dof in np.unique(model.limit_dof):
+        low, high = -np.inf, np.inf
+        for k in np.flatnonzero(model.limit_dof == dof):
+            bound = model.limit_bound[k]
+            low, high = (bound, high) if model.limit_sign[k] > 0 else (low, bound)
+        margin = 0.05 * (high - low) if np.isfinite(high - low) else 0.05
+        a = model.dof_qadr[dof]
+        out[a] = np.clip(out[a], low + margin, high - margin)
+    return out
+
+
+def _gaps(sim: Simulator, q: Floats) -> list[float]:
+    """Distance of every contact from its ground [m]."""
+    z, model = sim.bodies(q, np.zeros(sim.nv)), sim.model
+    gaps = []
+    for c, body in enumerate(model.contact_body):
+        centre = z[body, :3] + scenes.rotated(z[body, 6:10], model.contact_point[c])
+        gaps.append(float(centre @ model.contact_frame[c, :3] - model.contact_radius[c] - model.contact_height[c]))
+    return gaps
+
+
+class Converged(NamedTuple):
+    """The motion with a very small step, where pieces start and end."""
+
+    q: Floats  # (_PIECES + 1, nq)
+    v: Floats  # (_PIECES + 1, nv) at the node
+    position: Floats  # (_PIECES + 1, nbody, 3) [m]
+    time_step: float
+
+
+def _converged(mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> Converged:
+    """With the smallest time step whose steps are all solved.  ValueError: none is."""
+    message = ""
+    for fine in (2e-4, 5e-4, 1e-3) if quick else (5e-5, 1e-4, 2e-4, 5e-4, 1e-3):
+        sim = Simulator(mechanism, time_step=fine, kappa=_SHARP)
+        every = round(_PIECE / fine)
+        motion = sim.rollout(sim.start(q, v), np.zeros((_PIECES * every, sim.nu)))
+        if motion.success:
+            x = motion.x[::every]
+            return Converged(x[:, : sim.nq], sim.velocity(x), sim.maximal(x)[..., :3], fine)
+        message = motion.message
+    raise ValueError(f"report accuracy: {mechanism.name} cannot be simulated with 1 ms either: {message}")
+
+
+def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float, float], rounds: int) -> Trial:
+    """The pieces with one setting."""
+    h, kappa, tolerance = settings
+    engine = Ours(kappa=kappa, tolerance=tolerance, rounds=rounds)
+    errors, seconds = [], 0.0
+    for k in range(_PIECES):
+        q, v = exact.q[k], exact.v[k]
+        run = engine.simulate(mechanism, time_step=h, q=q, v=v, duration=_PIECE, samples=1)
+        if run.message:
+            return Trial(h, kappa, tolerance, np.inf, 0.0, run.message)
+        errors.append(float(np.linalg.norm(run.position[-1] - exact.position[k + 1], axis=-1).max()))
+        seconds += run.seconds
+    return Trial(h, kappa, tolerance, float(np.mean(errors)), seconds, "")
+
+
+def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
+    """Trials with contacts and limits, and the recommendation."""
+    exact = _converged(mechanism, q, v, quick)
+    own = _trial(mechanism, exact, (2.0 * exact.time_step, _SHARP, 1e-8), 0).error
+    rounds = 1 if quick else 3
+    steps = _STEPS[1::2] if quick else _STEPS
+    kappas = (1e-4, 1e-6) if quick else _KAPPAS
+    trials = [_trial(mechanism, exact, (h, kappa, 1e-8), rounds) for h in steps for kappa in kappas]
+    best = choose(trials)
+    tolerances = [
+        _trial(mechanism, exact, (best.time_step, best.kappa, tolerance), rounds) for tolerance in _TOLERANCES
+    ]
+    report.rows += [
+        Row("recommended time step", 1e3 * best.time_step, "ms", note=str(best)),
+        Row("recommended kappa", best.kappa, "N s m"),
+        Row(f"its error after {_PIECE:g} s", 1e3 * best.error, "mm", 1e3 * _TARGET),
+        Row("its speed", best.realtime, "times real time"),
+        Row("the converged motion, against twice its step", 1e3 * own, "mm", note=f"h = {1e3 * exact.time_step:g} ms"),
+    ]
+    rows: list[list[Cell]] = [
+        [1e3 * t.time_step, t.kappa, t.tolerance, 1e3 * t.error, t.realtime, t.message] for t in (*trials, *tolerances)
+    ]
+    header = ["step, ms", "kappa", "tolerance", "error, mm", "times real time", "ended early"]
+    report.tables.append(Table("With contacts and limits", header, rows, note="the last rows vary the tolerance"))
+    report.details["trials"] = [{**vars(t), "realtime": t.realtime} for t in (*trials, *tolerances)]
+    report.figure = _figure(mechanism.name, trials, own)
+
+
+def choose(trials: Sequence[Trial]) -> Trial:
+    """The largest time step, then the largest kappa, that meets the target; the most exact trial when none does.
+
+    A larger kappa makes smoother derivatives.
+    """
+    good = [t for t in trials if t.error <= _TARGET]
+    if good:
+        return max(good, key=lambda t: (t.time_step, t.kappa))
+    return min(trials, key=lambda t: t.error)
+
+
+def _smooth(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
+    """The same start without contacts and limits, against the ODE, for all orders and peers."""
+    scene = replace(scenes.smooth(mechanism, q, v, _DURATION), name="without contact")
+    everyone: list[Engine] = []
+    for order in (2, 4, 6, 8):
+        try:
+            Simulator(scene.mechanism, time_step=0.01, order=order)
+        except ValueError as error:
+            report.notes.append(str(error))
+            continue
+        everyone.append(curves.ours(order, 1 if quick else 3))
+    everyone += installed()
+    steps = (0.05, 0.01, 0.002) if quick else (0.05, 0.025, 0.01, 0.005, 0.0025, 0.001)
+    measured = curves.measure(scene, everyone, steps, 0.05 if quick else 0.3)
+    rows: list[list[Cell]] = [
+        [name, 1e3 * p.time_step, 1e3 * p.errors["position"], _DURATION / max(p.seconds, 1e-9), p.errors["energy"]]
+        for name, points in measured.items()
+        for p in points
+    ]
+    header = ["engine", "step, ms", "error, mm", "times real time", "energy error, relative"]
+    report.tables.append(Table("Without contacts and limits, against the ODE", header, rows))
+    report.details["smooth"] = {name: [p._asdict() for p in points] for name, points in measured.items()}
+    ours = [(p, name) for name, points in measured.items() if name.startswith("dojo-opt") for p in points]
+    good = [(p, name) for p, name in ours if p.errors["position"] <= _TARGET]
+    if good:
+        p, name = min(good, key=lambda pair: pair[0].seconds)
+        note = f"{name}, h = {1e3 * p.time_step:g} ms, {_DURATION / p.seconds:.3g} times real time"
+        report.rows.append(Row("smooth motion: cheapest to the target", 1e3 * p.errors["position"], "mm", note=note))
+    if report.figure is None:
+        report.figure = drawing.figure({"tree of 13 bodies": measured})
+
+
+def _figure(name: str, trials: Sequence[Trial], own: float) -> Any:
+    """Error against processor time, one line per kappa."""
+    from matplotlib.figure import Figure
+
+    out = Figure(figsize=(6.4, 4.4), layout="constrained")
+    axis = out.subplots()
+    for kappa in dict.fromkeys(t.kappa for t in trials):
+        line = [t for t in trials if t.kappa == kappa and np.isfinite(t.error)]
+        axis.loglog([1e3 * t.seconds for t in line], [1e3 * t.error for t in line], "o-", label=f"kappa {kappa:g}")
+        for t in line:
+            axis.annotate(f"{1e3 * t.time_step:g}", (1e3 * t.seconds, 1e3 * t.error), fontsize=7, alpha=0.6)
+    axis.axhline(1e3 * _TARGET, color="k", lw=0.8, ls=":", label="asked for")
+    if np.isfinite(own) and own > 0.0:
+        axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="reference")
+    axis.set(xlabel=f"processor time of {_DURATION:g} s [ms]", ylabel="position error [mm]")
+    axis.set_title(f"{name}: error against run time (numbers: time step in ms)", fontsize=10)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+    return out
