@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.scenes import SAMPLES, Scene
 from dojo_opt.report.engines import Engine, Ours, Run, installed
 from dojo_opt.report.engines.run import observe
 from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
 
 STEPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
 FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse
@@ -71,35 +74,55 @@ def at_time(points: Sequence[Point], what: str, seconds: float) -> float:
     return float(np.exp(np.interp(np.log(seconds), times, errors)))
 
 
-def ours_over(curves: Curves, peer: str, what: str, at_least: float) -> tuple[float, str]:
-    """(largest ratio of our error to the peer's at equal processor time, over the peer's steps >= at_least; where).
+def ratios(curves: Curves, peer: str, what: str) -> dict[float, float]:
+    """Our error over the peer's at equal processor time, by time step of the peer [s].
 
-    Ours is the best of our orders, whose time steps may differ from the peer's. A step with which the peer is lost
-    does not count.
+    Ours is the best of our orders, whose time steps may differ from the peer's; infinite where all of them take longer.
+    A step with which the peer is lost is left out.
     """
-    worst, where = 0.0, "no step of the peer succeeded"
-    for p in curves[peer]:
-        if p.time_step < at_least or not np.isfinite(p.errors[what]):
-            continue
-        best = min(at_time(points, what, p.seconds) for name, points in curves.items() if name.startswith("dojo-opt"))
-        ratio = best / max(p.errors[what], FLOOR)
-        if ratio > worst:
-            worst, where = ratio, f"worst at {peer} with {1e3 * p.time_step:g} ms"
-    return worst, where
+    mine = [points for name, points in curves.items() if name.startswith("dojo-opt")]
+    return {
+        p.time_step: min(at_time(points, what, p.seconds) for points in mine) / max(p.errors[what], FLOOR)
+        for p in curves[peer]
+        if np.isfinite(p.errors[what])
+    }
 
 
-def pieces(scene: Scene, engine: Engine, h: float, count: int, piece: float) -> float:
-    """Mean position error [m] after short pieces, each started again from the reference.
+def worst(over: dict[float, float], at_least: float) -> tuple[float, str]:
+    """(largest ratio for steps of the peer from `at_least` upward, for which of its steps ours is better)."""
+    judged = {h: ratio for h, ratio in over.items() if h >= at_least}
+    better = [f"{1e3 * h:g}" for h, ratio in sorted(judged.items()) if ratio <= 1.0]
+    note = f"ours is better at steps of RK4 of {', '.join(better)} ms" if better else "at no step of RK4"
+    return max(judged.values(), default=0.0), note if len(better) < len(judged) else "at every step of RK4"
+
+
+class Cut(NamedTuple):
+    """A motion cut into pieces that each start again on the reference.
 
     After Erez, Tassa, Todorov (ICRA 2015), so that errors are not amplified by chaos; but against the ODE instead of
     the engine's own limit.
     """
+
+    scene: Scene
+    piece: float  # [s]
+    q: Floats  # (count + 1, nq)
+    v: Floats  # (count + 1, nv)
+    position: Floats  # (count + 1, nbody, 3) [m]
+
+    def error(self, engine: Engine, h: float) -> float:
+        """Largest distance of a body from the reference at the end of a piece, mean over the pieces [m]."""
+        errors = []
+        for k in range(len(self.q) - 1):
+            args: dict[str, Any] = {"time_step": h, "q": self.q[k], "v": self.v[k], "duration": self.piece}
+            run = engine.simulate(self.scene.mechanism, **args, samples=1)
+            lost = len(run.time) < 2
+            errors.append(np.inf if lost else np.linalg.norm(run.position[-1] - self.position[k + 1], axis=-1).max())
+        return float(np.mean(errors))
+
+
+def cut(scene: Scene, count: int, piece: float) -> Cut:
+    """The reference of the scene in `count` pieces."""
     times = np.linspace(0.0, count * piece, count + 1)
     q, v = scene.reference(scene.q, scene.v, times)
     exact = observe(Simulator(scene.mechanism, time_step=1.0), times, q, v, 0.0, 0)
-    errors = []
-    for k in range(count):
-        run = engine.simulate(scene.mechanism, time_step=h, q=q[k], v=v[k], duration=piece, samples=1)
-        lost = len(run.time) < 2
-        errors.append(np.inf if lost else np.linalg.norm(run.position[-1] - exact.position[k + 1], axis=-1).max())
-    return float(np.mean(errors))
+    return Cut(scene, piece, q, v, exact.position)
