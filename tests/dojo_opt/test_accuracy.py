@@ -74,6 +74,12 @@ def test_lost_runs_have_infinite_errors() -> None:
     assert lost.errors["position"] == np.inf and "half a turn" in lost.message
 
 
+def test_a_mechanism_that_an_order_refuses_is_left_out_with_the_reason() -> None:
+    scene = scenes.smooth(dojo.models.npendulum(2, damper=5.0), np.array([0.3, 0.1]), np.zeros(2), 0.5)
+    refused = curves.point(scene, curves.ours(4, 0), 0.05, scene.exact())
+    assert refused.errors["position"] == np.inf and "too fast" in refused.message
+
+
 def test_the_largest_step_that_is_good_enough_is_chosen() -> None:
     trials = [
         Trial(0.02, 1e-4, 1e-8, 5e-3, 1e-3, ""),
@@ -111,6 +117,13 @@ def test_a_robot_gets_a_recommendation() -> None:
         "Without contacts and limits, against the ODE",
     ]
     assert report.figure is not None and len(report.details["trials"]) > 5
+
+
+@pytest.mark.slow
+def test_a_robot_without_contacts_and_limits_is_measured_too() -> None:
+    report = study("accuracy", quick=True, mechanism=dojo.models.npendulum(2)).run(Progress())
+    assert len(report.tables) == 1 and len(report.figure.axes) == 2
+    assert "times real time" in report.rows[0].note
 
 
 @pytest.mark.slow

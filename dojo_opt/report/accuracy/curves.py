@@ -57,9 +57,12 @@ def measure(scene: Scene, engines: Sequence[Engine], steps: Sequence[float], lim
 
 
 def point(scene: Scene, engine: Engine, h: float, exact: Run) -> Point:
-    """One run against the reference."""
+    """One run against the reference; one that the engine refuses has infinite errors, and says why."""
     args: dict[str, Any] = {"time_step": h, "q": scene.q, "v": scene.v, "duration": scene.duration}
-    run = engine.simulate(scene.mechanism, **args, samples=SAMPLES)
+    try:
+        run = engine.simulate(scene.mechanism, **args, samples=SAMPLES)
+    except ValueError as error:
+        return Point(h, 0.0, 0, scene.errors(exact._replace(time=exact.time[:0]), exact), str(error))
     return Point(h, run.seconds, run.steps, scene.errors(run, exact), run.message)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from dojo_opt.report.accuracy.curves import Curves
 
-_PANELS = (
+PANELS = (  # scene, what, title
     ("free body", "attitude", "free body: attitude [rad]"),
     ("tree of 13 bodies", "position", "tree of 13 bodies: position [m]"),
     ("tree of 13 bodies", "energy", "tree: energy, relative"),
@@ -27,11 +27,11 @@ _OURS = {
 _PEERS = ("#e6550d", "#31a354", "#756bb1", "#dd1c77", "#636363", "#b8860b", "#17becf", "#8c564b", "#bcbd22")
 
 
-def figure(measured: Mapping[str, Curves]) -> Any:
-    """A matplotlib Figure with up to six panels."""
+def figure(measured: Mapping[str, Curves], panels: Sequence[tuple[str, str, str]] = PANELS) -> Any:
+    """A matplotlib Figure of the first six panels whose scenes were measured."""
     from matplotlib.figure import Figure
 
-    panels = [panel for panel in _PANELS if panel[0] in measured][:6]
+    panels = [panel for panel in panels if panel[0] in measured][:6]
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     out = Figure(figsize=(4.6 * columns, 3.6 * rows + 0.8), layout="constrained")

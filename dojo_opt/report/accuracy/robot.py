@@ -23,7 +23,7 @@ _DURATION = _PIECE * _PIECES
 _TARGET = 1e-3  # [m] error that is asked for after a piece
 _STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
 _KAPPAS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
-_SHARP = 1e-9  # kappa of the converged motion
+_SHARP = ((1e-4, 1e-10), (2e-4, 1e-10), (5e-4, 1e-10), (5e-4, 1e-9), (1e-3, 1e-8))  # steps, kappas to converge with
 _TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 
@@ -129,18 +129,19 @@ class Converged(NamedTuple):
     v: Floats  # (_PIECES + 1, nv) at the node
     position: Floats  # (_PIECES + 1, nbody, 3) [m]
     time_step: float
+    kappa: float
 
 
 def _converged(mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> Converged:
     """With the smallest time step whose steps are all solved.  ValueError: none is."""
     message = ""
-    for fine in (2e-4, 5e-4, 1e-3) if quick else (5e-5, 1e-4, 2e-4, 5e-4, 1e-3):
-        sim = Simulator(mechanism, time_step=fine, kappa=_SHARP)
+    for fine, kappa in _SHARP[1:] if quick else _SHARP:
+        sim = Simulator(mechanism, time_step=fine, kappa=kappa)
         every = round(_PIECE / fine)
         motion = sim.rollout(sim.start(q, v), np.zeros((_PIECES * every, sim.nu)))
         if motion.success:
             x = motion.x[::every]
-            return Converged(x[:, : sim.nq], sim.velocity(x), sim.maximal(x)[..., :3], fine)
+            return Converged(x[:, : sim.nq], sim.velocity(x), sim.maximal(x)[..., :3], fine, kappa)
         message = motion.message
     raise ValueError(f"report accuracy: {mechanism.name} cannot be simulated with 1 ms either: {message}")
 
@@ -163,21 +164,27 @@ def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float,
 def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
     """Trials with contacts and limits, and the recommendation."""
     exact = _converged(mechanism, q, v, quick)
-    own = _trial(mechanism, exact, (2.0 * exact.time_step, _SHARP, 1e-8), 0).error
+    own = _trial(mechanism, exact, (2.0 * exact.time_step, exact.kappa, 1e-8), 0).error
+    target = max(_TARGET, 2.0 * own) if np.isfinite(own) else _TARGET
     rounds = 1 if quick else 3
     steps = _STEPS[1::2] if quick else _STEPS
-    kappas = (1e-4, 1e-6) if quick else _KAPPAS
+    kappas = (1e-5, 1e-8) if quick else _KAPPAS
     trials = [_trial(mechanism, exact, (h, kappa, 1e-8), rounds) for h in steps for kappa in kappas]
-    best = choose(trials)
+    best = choose(trials, target)
     tolerances = [
         _trial(mechanism, exact, (best.time_step, best.kappa, tolerance), rounds) for tolerance in _TOLERANCES
     ]
     report.rows += [
         Row("recommended time step", 1e3 * best.time_step, "ms", note=str(best)),
         Row("recommended kappa", best.kappa, "N s m"),
-        Row(f"its error after {_PIECE:g} s", 1e3 * best.error, "mm", 1e3 * _TARGET),
+        Row(f"its error after {_PIECE:g} s", 1e3 * best.error, "mm", 1e3 * target),
         Row("its speed", best.realtime, "times real time"),
-        Row("the converged motion, against twice its step", 1e3 * own, "mm", note=f"h = {1e3 * exact.time_step:g} ms"),
+        Row(
+            "the converged motion, against twice its step",
+            1e3 * own,
+            "mm",
+            note=f"h = {1e3 * exact.time_step:g} ms, kappa {exact.kappa:g}; asked for is no less than twice this",
+        ),
     ]
     rows: list[list[Cell]] = [
         [1e3 * t.time_step, t.kappa, t.tolerance, 1e3 * t.error, t.realtime, t.message] for t in (*trials, *tolerances)
@@ -185,15 +192,15 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
     header = ["step, ms", "kappa", "tolerance", "error, mm", "times real time", "ended early"]
     report.tables.append(Table("With contacts and limits", header, rows, note="the last rows vary the tolerance"))
     report.details["trials"] = [{**vars(t), "realtime": t.realtime} for t in (*trials, *tolerances)]
-    report.figure = _figure(mechanism.name, trials, own)
+    report.figure = _figure(mechanism.name, trials, own, target)
 
 
-def choose(trials: Sequence[Trial]) -> Trial:
+def choose(trials: Sequence[Trial], target: float = _TARGET) -> Trial:
     """The largest time step, then the largest kappa, that meets the target; the most exact trial when none does.
 
     A larger kappa makes smoother derivatives.
     """
-    good = [t for t in trials if t.error <= _TARGET]
+    good = [t for t in trials if t.error <= target]
     if good:
         return max(good, key=lambda t: (t.time_step, t.kappa))
     return min(trials, key=lambda t: t.error)
@@ -202,23 +209,23 @@ def choose(trials: Sequence[Trial]) -> Trial:
 def _smooth(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
     """The same start without contacts and limits, against the ODE, for all orders and peers."""
     scene = replace(scenes.smooth(mechanism, q, v, _DURATION), name="without contact")
-    everyone: list[Engine] = []
-    for order in (2, 4, 6, 8):
-        try:
-            Simulator(scene.mechanism, time_step=0.01, order=order)
-        except ValueError as error:
-            report.notes.append(str(error))
-            continue
-        everyone.append(curves.ours(order, 1 if quick else 3))
+    everyone: list[Engine] = [curves.ours(order, 1 if quick else 3) for order in (2, 4, 6, 8)]
     everyone += installed()
     steps = (0.05, 0.01, 0.002) if quick else (0.05, 0.025, 0.01, 0.005, 0.0025, 0.001)
     measured = curves.measure(scene, everyone, steps, 0.05 if quick else 0.3)
     rows: list[list[Cell]] = [
-        [name, 1e3 * p.time_step, 1e3 * p.errors["position"], _DURATION / max(p.seconds, 1e-9), p.errors["energy"]]
+        [
+            name,
+            1e3 * p.time_step,
+            1e3 * p.errors["position"],
+            _DURATION / p.seconds if p.seconds else None,
+            p.errors["energy"],
+            p.message,
+        ]
         for name, points in measured.items()
         for p in points
     ]
-    header = ["engine", "step, ms", "error, mm", "times real time", "energy error, relative"]
+    header = ["engine", "step, ms", "error, mm", "times real time", "energy error, relative", "ended early"]
     report.tables.append(Table("Without contacts and limits, against the ODE", header, rows))
     report.details["smooth"] = {name: [p._asdict() for p in points] for name, points in measured.items()}
     ours = [(p, name) for name, points in measured.items() if name.startswith("dojo-opt") for p in points]
@@ -228,10 +235,11 @@ def _smooth(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: b
         note = f"{name}, h = {1e3 * p.time_step:g} ms, {_DURATION / p.seconds:.3g} times real time"
         report.rows.append(Row("smooth motion: cheapest to the target", 1e3 * p.errors["position"], "mm", note=note))
     if report.figure is None:
-        report.figure = drawing.figure({"tree of 13 bodies": measured})
+        panels = [("", "position", f"{mechanism.name}: position [m]"), ("", "energy", "energy, relative")]
+        report.figure = drawing.figure({"": measured}, panels)
 
 
-def _figure(name: str, trials: Sequence[Trial], own: float) -> Any:
+def _figure(name: str, trials: Sequence[Trial], own: float, target: float) -> Any:
     """Error against processor time, one line per kappa."""
     from matplotlib.figure import Figure
 
@@ -242,9 +250,9 @@ def _figure(name: str, trials: Sequence[Trial], own: float) -> Any:
         axis.loglog([1e3 * t.seconds for t in line], [1e3 * t.error for t in line], "o-", label=f"kappa {kappa:g}")
         for t in line:
             axis.annotate(f"{1e3 * t.time_step:g}", (1e3 * t.seconds, 1e3 * t.error), fontsize=7, alpha=0.6)
-    axis.axhline(1e3 * _TARGET, color="k", lw=0.8, ls=":", label="asked for")
+    axis.axhline(1e3 * target, color="k", lw=0.8, ls=":", label="asked for")
     if np.isfinite(own) and own > 0.0:
-        axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="reference")
+        axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="the converged motion itself")
     axis.set(xlabel=f"processor time of {_DURATION:g} s [ms]", ylabel="position error [mm]")
     axis.set_title(f"{name}: error against run time (numbers: time step in ms)", fontsize=10)
     axis.legend(fontsize=8)
