@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.report import Progress, study
-from dojo_opt.report.accuracy import Accuracy, curves, robot, scenes
+from dojo_opt.report.accuracy import Accuracy, curves, robot, scenes, start
 from dojo_opt.report.accuracy.curves import Point
 from dojo_opt.report.accuracy.robot import Trial
 from dojo_opt.report.engines import Ours
@@ -94,8 +94,8 @@ def test_the_largest_step_that_is_good_enough_is_chosen() -> None:
 
 @pytest.mark.parametrize("mechanism", [dojo.models.quadruped(), dojo.models.cartpole(), dojo.models.raiberthopper()])
 def test_starts_are_reproducible_within_limits_and_above_ground(mechanism: dojo.Mechanism) -> None:
-    q, v = robot.start(mechanism)
-    again = robot.start(mechanism)
+    q, v = start.start(mechanism)
+    again = start.start(mechanism)
     np.testing.assert_array_equal(q, again[0])
     np.testing.assert_array_equal(v, again[1])
     sim = dojo.Simulator(mechanism, time_step=0.01)
@@ -103,7 +103,7 @@ def test_starts_are_reproducible_within_limits_and_above_ground(mechanism: dojo.
     for k, dof in enumerate(sim.model.limit_dof):
         assert sim.model.limit_sign[k] * (q[sim.model.dof_qadr[dof]] - sim.model.limit_bound[k]) > 0.0
     if mechanism.contacts:
-        assert min(robot._gaps(sim, q)) == pytest.approx(0.02)
+        assert min(start.gaps(sim, q)) == pytest.approx(0.02)
 
 
 @pytest.mark.slow
