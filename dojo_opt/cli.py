@@ -48,6 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     names = {"all": "every study", **{name: what for name, (what, *_) in STUDIES.items()}}
     report.add_argument("name", choices=list(names), metavar="NAME", help=_listing(names))
     report.add_argument("robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="measure this robot instead")
+    report.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
     report.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
     report.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
     report.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
@@ -131,7 +132,7 @@ def _run_loop(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
-    mechanism = None if args.robot is None else dojo.load_urdf(args.robot)
+    mechanism = None if args.robot is None else dojo.load_urdf(args.robot, floating=not args.fixed)
     names = list(STUDIES) if args.name == "all" else [args.name]
     reports = {name: run_report(name, quick=args.quick, mechanism=mechanism, verbose=True) for name in names}
     if args.json:
@@ -139,7 +140,12 @@ def _report(args: argparse.Namespace) -> int:
     else:
         print("\n\n".join(report.as_text() for report in reports.values()))
     if args.out:
-        arguments = [args.name, *([str(args.robot)] if args.robot else []), *(["--quick"] if args.quick else [])]
+        arguments = [
+            args.name,
+            *([str(args.robot)] if args.robot else []),
+            *(["--fixed"] if args.fixed else []),
+            *(["--quick"] if args.quick else []),
+        ]
         write_page(reports, args.out, "dojo-opt report " + " ".join(arguments))
     return 1 if args.strict and not all(report.met() for report in reports.values()) else 0
 

@@ -13,15 +13,18 @@ Floats = NDArray[np.float64]
 
 
 def _floats(call: str, value: Any) -> Floats:
-    """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.c_contiguous:
+    """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused.
+
+    One that must not be written to is copied: compiled code would take it for another type, and be compiled again.
+    """
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.flags.carray:
         return value
     try:
         with np.errstate(all="ignore"):
             raw = np.asarray(value)
             if raw.dtype.kind not in "biufO":
                 raise TypeError
-            return np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
+            return np.array(raw, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise ValueError(f"{call}: expected real numbers, got {value!r}") from None
 

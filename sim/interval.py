@@ -7,7 +7,7 @@ from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints import joint_blocks, spring_turns
 from sim.kinematics import velocity_columns
 from sim.model import Model, Options, Outcome, Vector, Work
-from sim.newton import norm, residual_scale
+from sim.newton import norm, residual_scale, rounding
 from sim.node import advance_node
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
@@ -78,6 +78,7 @@ def _matrix(model: Model, work: Work, h: float, q: Vector) -> bool:
 def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vector, impulse: Vector) -> Outcome:
     """Solve -D1 L_d(q, q (+) h nu) = p2 for nu by Newton's method from the guess in work.nu, with one step at least."""
     scale = residual_scale(model, work, Options(h, options.kappa, options.tolerance, options.max_iterations))
+    floor = rounding(model, work, h) / scale
     last = 0.0
     r = 1e300
     alpha = 1.0
@@ -90,6 +91,8 @@ def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vect
         inside = _balance(model, work, h, q, impulse)
         r = norm(work.residual) / scale
         if not (inside and (r < max(last, options.tolerance) or iterations == 0)):
+            if inside and iterations > 0 and r < floor:
+                return Outcome(_SOLVED, iterations, r, 0.0)
             if halvings > 40:
                 return Outcome(_NO_PROGRESS, iterations, r, 0.0)
             halvings += 1

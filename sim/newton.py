@@ -37,6 +37,18 @@ def residual_scale(model: Model, work: Work, options: Options) -> float:
 
 
 @kernel
+def rounding(model: Model, work: Work, h: float) -> float:
+    """Residual that cannot be told from zero: momenta are differences of rounded poses, divided by h."""
+    total = 0.0
+    o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
+    for i in range(model.body_parent.shape[0]):
+        x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
+        J = model.body_inertia[i]
+        total += model.body_mass[i] * x * (1.0 + x + o) + J[0] + J[4] + J[8]
+    return 1e-15 * total / abs(h)
+
+
+@kernel
 def norm(x: Vector) -> float:
     """Largest absolute entry; NaN if any entry is NaN."""
     r = 0.0
@@ -55,6 +67,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     """
     h = options.h
     scale = residual_scale(model, work, options)
+    floor = rounding(model, work, h) / scale
     keep_loops(model, work)
     for d in range(v.shape[0]):
         work.nu_trial[d] = guess.velocity[d]
@@ -79,6 +92,9 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         joint_impulses(model, work, h, q, v, u)
         r = max(norm(work.residual) / scale, gap)
         if not (inside and r < max(last, options.tolerance)):
+            if inside and iterations > 0 and r < floor:
+                status = _SOLVED
+                break
             if halvings > 40:
                 status = _NO_PROGRESS
                 break

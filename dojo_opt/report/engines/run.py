@@ -85,14 +85,17 @@ def held(mechanism: Mechanism, inputs: ArrayLike | None, steps: int) -> Floats:
 
 
 def clocked(run: Callable[[], Any], rounds: int = 3) -> tuple[Any, float]:
-    """(result, processor time): of one call that takes a second, of the median of some after a first one otherwise."""
+    """(result, processor time [s]) of a call: the median of some after a first one, or that one if it took a second.
+
+    rounds: how many at most; half a second of them is enough.
+    """
     start = time.process_time()
     result = run()
     first = time.process_time() - start
-    if first > 1.0:
+    if first > 1.0 or rounds < 1:
         return result, first
-    seconds = []
-    for _ in range(rounds):
+    seconds: list[float] = []
+    while len(seconds) < rounds and (not seconds or sum(seconds) < 0.5):
         start = time.process_time()
         result = run()
         seconds.append(time.process_time() - start)

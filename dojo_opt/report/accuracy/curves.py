@@ -1,0 +1,131 @@
+"""Curves: errors of every engine over its time steps, with the processor time they took, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.report.accuracy.scenes import SAMPLES, Scene
+from dojo_opt.report.engines import Engine, Ours, Run, installed
+from dojo_opt.report.engines.run import observe
+from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+STEPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
+FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse
+
+
+class Point(NamedTuple):
+    """One run of one engine."""
+
+    time_step: float  # [s]
+    seconds: float  # processor time
+    steps: int
+    errors: dict[str, float]
+    message: str
+
+
+Curves = dict[str, list[Point]]  # by the name of the engine
+
+
+def engines(rounds: int) -> list[Engine]:
+    """All orders of ours, solved to rounding, and the peers that are installed."""
+    return [*(ours(order, rounds) for order in (2, 4, 6, 8)), *installed()]
+
+
+def ours(order: int, rounds: int) -> Ours:
+    """Solved to rounding: order 2 keeps momentum as its equations are solved; the others hand on what is left over."""
+    return Ours(order=order, tolerance=1e-14 if order == 2 else 1e-12, rounds=rounds)
+
+
+def measure(scene: Scene, engines: Sequence[Engine], steps: Sequence[float], limit: float) -> Curves:
+    """Errors of the engines from the largest time step down to the first that would take longer than `limit` [s]."""
+    exact = scene.exact()
+    curves: Curves = {}
+    for engine in engines:
+        points: list[Point] = []
+        for h in steps:
+            if points and points[-1].seconds * points[-1].time_step / h > limit:
+                break
+            points.append(point(scene, engine, h, exact))
+        curves[engine.name] = points
+    return curves
+
+
+def point(scene: Scene, engine: Engine, h: float, exact: Run) -> Point:
+    """One run against the reference; one that the engine refuses has infinite errors, and says why."""
+    args: dict[str, Any] = {"time_step": h, "q": scene.q, "v": scene.v, "duration": scene.duration}
+    try:
+        run = engine.simulate(scene.mechanism, **args, samples=SAMPLES)
+    except ValueError as error:
+        return Point(h, 0.0, 0, scene.errors(exact._replace(time=exact.time[:0]), exact), str(error))
+    return Point(h, run.seconds, run.steps, scene.errors(run, exact), run.message)
+
+
+def at_time(points: Sequence[Point], what: str, seconds: float) -> float:
+    """Smallest error reached within a processor time, interpolated between time steps on logarithmic axes."""
+    good = [p for p in points if np.isfinite(p.errors[what]) and p.seconds > 0.0]
+    good.sort(key=lambda p: p.seconds)
+    if not good or seconds < good[0].seconds:
+        return np.inf
+    times = np.log([p.seconds for p in good])
+    errors = np.minimum.accumulate(np.log([max(p.errors[what], FLOOR) for p in good]))
+    return float(np.exp(np.interp(np.log(seconds), times, errors)))
+
+
+def ratios(curves: Curves, peer: str, what: str) -> dict[float, float]:
+    """Our error over the peer's at equal processor time, by time step of the peer [s].
+
+    Ours is the best of our orders, whose time steps may differ from the peer's; infinite where all of them take longer.
+    A step with which the peer is lost is left out.
+    """
+    mine = [points for name, points in curves.items() if name.startswith("dojo-opt")]
+    return {
+        p.time_step: min(at_time(points, what, p.seconds) for points in mine) / max(p.errors[what], FLOOR)
+        for p in curves[peer]
+        if np.isfinite(p.errors[what])
+    }
+
+
+def worst(over: dict[float, float], at_least: float) -> tuple[float, str]:
+    """(largest ratio for steps of the peer from `at_least` upward, for which of its steps ours is better)."""
+    judged = {h: ratio for h, ratio in over.items() if h >= at_least}
+    better = [f"{1e3 * h:g}" for h, ratio in sorted(judged.items()) if ratio <= 1.0]
+    note = f"ours is better at steps of RK4 of {', '.join(better)} ms" if better else "at no step of RK4"
+    return max(judged.values(), default=0.0), note if len(better) < len(judged) else "at every step of RK4"
+
+
+class Cut(NamedTuple):
+    """A motion cut into pieces that each start again on the reference.
+
+    After Erez, Tassa, Todorov (ICRA 2015), so that errors are not amplified by chaos; but against the ODE instead of
+    the engine's own limit.
+    """
+
+    scene: Scene
+    piece: float  # [s]
+    q: Floats  # (count + 1, nq)
+    v: Floats  # (count + 1, nv)
+    position: Floats  # (count + 1, nbody, 3) [m]
+
+    def error(self, engine: Engine, h: float) -> float:
+        """Largest distance of a body from the reference at the end of a piece, mean over the pieces [m]."""
+        errors = []
+        for k in range(len(self.q) - 1):
+            args: dict[str, Any] = {"time_step": h, "q": self.q[k], "v": self.v[k], "duration": self.piece}
+            run = engine.simulate(self.scene.mechanism, **args, samples=1)
+            lost = len(run.time) < 2
+            errors.append(np.inf if lost else np.linalg.norm(run.position[-1] - self.position[k + 1], axis=-1).max())
+        return float(np.mean(errors))
+
+
+def cut(scene: Scene, count: int, piece: float) -> Cut:
+    """The reference of the scene in `count` pieces."""
+    times = np.linspace(0.0, count * piece, count + 1)
+    q, v = scene.reference(scene.q, scene.v, times)
+    exact = observe(Simulator(scene.mechanism, time_step=1.0), times, q, v, 0.0, 0)
+    return Cut(scene, piece, q, v, exact.position)
