@@ -157,7 +157,7 @@ def test_relative_error_is_that_of_the_whole_matrix():
 def test_a_users_mechanism_is_measured_in_one_step_and_told_its_kappa():
     report = Gradients(quick=True, mechanism=dojo.models.sphere()).run(Progress())
     assert report.met() and len(report.rows) == 2 and report.figure is not None
-    assert any("derivatives within 1 %" in note for note in report.notes)
+    assert any("are within 1 % of hard contact" in note for note in report.notes)
     json.loads(report.as_json())
 
 
