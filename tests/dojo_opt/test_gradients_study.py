@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report import Progress
+from dojo_opt.report import Progress, Report
 from dojo_opt.report.engines import Ours
-from dojo_opt.report.gradients import Gradients, one_step, sliding, smoothing, touchdown
+from dojo_opt.report.gradients import Gradients, one_step, sliding, smoothing, study, touchdown
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
 
 
@@ -77,6 +77,17 @@ def test_engines_are_differenced_from_their_own_rest():
     motion = sliding.motions()[-1]
     found = sliding.differenced(Ours(kappa=1e-8), motion, 0.02, 1e-5)
     assert found.value == pytest.approx(sliding.chained(motion, 0.02, 1e-8).value, abs=1e-3)
+
+
+def test_an_engine_that_cannot_is_a_note(monkeypatch):
+    class Unable(Ours):
+        def simulate(self, mechanism, **settings):
+            raise ValueError("no blocks")
+
+    monkeypatch.setattr(study, "installed", lambda: [Unable("unable"), Ours("able")])
+    report = Report("title", "command")
+    assert [engine.name for engine in study._able(report, quick=False)] == ["able"]
+    assert report.notes == ["motions: without unable: no blocks"]
 
 
 def test_mujoco_jacobians_are_chained_as_its_motion_is_differenced():

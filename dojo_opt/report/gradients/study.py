@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.report.clock import slope
-from dojo_opt.report.engines import installed
+from dojo_opt.report.engines import Engine, installed
 from dojo_opt.report.gradients import one_step, sliding, smoothing, touchdown
 from dojo_opt.report.gradients.figure import draw
 from dojo_opt.report.gradients.tables import motion_table, resting_table, smoothing_table, step_table
@@ -81,16 +81,19 @@ class Gradients:
 
     def _motions(self, report: Report) -> list[sliding.Derivative]:
         """Derivatives of whole motions."""
-        engines = [e for e in installed() if e.name != "MuJoCo implicit"]  # of a block the same as implicitfast
-        if self.quick:
-            engines = [e for e in engines if e.name == "MuJoCo implicitfast"]
+        engines = _able(report, self.quick)
         steps = BARRED[-1:] if self.quick else TIME_STEPS
         found: list[sliding.Derivative] = []
         for motion in sliding.motions():
             for h in steps:
                 found += [sliding.chained(motion, h, kappa) for kappa in KAPPAS]
                 found.append(sliding.ours_differenced(motion, h, EPS[0], JUDGED))
-                found += [sliding.differenced(engine, motion, h, eps) for engine in engines for eps in EPS]
+                found += [
+                    sliding.differenced(engine, motion, h, eps)
+                    for engine in engines
+                    if h in BARRED or engine.name.startswith("MuJoCo")  # the others are slower
+                    for eps in EPS
+                ]
                 if find_spec("mujoco") is not None:
                     found += [sliding.mujoco_chained(motion, h, name) for name in CHAINED[: 1 if self.quick else 2]]
         for h in (h for h in BARRED if h in steps):
@@ -130,6 +133,21 @@ class Gradients:
                 report.rows.append(Row(f"touch-down: h times the steepest gradient, {curve.label}", value, ""))
         report.details["touchdown"] = {"heights": heights, **{c.label: c._asdict() for c in curves}}
         return heights, curves
+
+
+def _able(report: Report, quick: bool) -> list[Engine]:
+    """Engines that can simulate the block; a note for those that cannot."""
+    engines = []
+    for engine in installed():
+        if engine.name == "MuJoCo implicit" or (quick and engine.name != "MuJoCo implicitfast"):
+            continue  # of a block the same as implicitfast
+        try:
+            sliding.differenced(engine, sliding.motions()[0], BARRED[-1], EPS[0])
+        except (ValueError, RuntimeError) as error:
+            report.notes.append(f"motions: without {engine.name}: {error}")
+        else:
+            engines.append(engine)
+    return engines
 
 
 def _exactness(name: str, points: list[one_step.Point]) -> list[Row]:
