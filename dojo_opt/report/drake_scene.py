@@ -53,22 +53,19 @@ class DrakeScene:
         q, v = np.zeros(plant.num_positions()), np.zeros(plant.num_velocities())
         for body, joint in enumerate(self._joints):
             own_q, own_v = x[model.body_qadr[body] :], x[nq + model.body_vadr[body] :]
-            if joint is None:
-                first, velocity = self._bodies[body].floating_positions_start(), self._velocity_start(body)
+            first, velocity = joint.position_start(), joint.velocity_start()
+            if joint.num_positions() == 7:
                 q[first : first + 4], q[first + 4 : first + 7] = own_q[3:7], own_q[:3]
                 turn = self._drake.RotationMatrix(self._drake.Quaternion(own_q[3:7] / np.linalg.norm(own_q[3:7])))
                 v[velocity : velocity + 3], v[velocity + 3 : velocity + 6] = turn.multiply(own_v[3:6]), own_v[:3]
-            elif joint.num_positions():
-                q[joint.position_start()], v[joint.velocity_start()] = own_q[0], own_v[0]
+            elif joint.num_positions() == 1:
+                q[first], v[velocity] = own_q[0], own_v[0]
         return np.concatenate([q, v])
 
     def velocity_of(self, dof: int) -> int:
         """Where Drake's v has a degree of freedom that is the only one of its joint; -1: it is not."""
         joint = self._joints[int(self.model.dof_body[dof])]
-        return -1 if joint is None or joint.num_velocities() != 1 else int(joint.velocity_start())
-
-    def _velocity_start(self, body: int) -> int:
-        return int(self._bodies[body].floating_velocities_start_in_v())
+        return -1 if joint.num_velocities() != 1 else int(joint.velocity_start())
 
     def _body(self, body: int) -> Any:
         drake = self._drake
@@ -80,21 +77,21 @@ class DrakeScene:
         )
 
     def _joint(self, body: int) -> Any:
-        """The joint to the parent; None for a floating base, which needs none."""
+        """The joint to the parent."""
         drake, model, first = self._drake, self.model, int(self.model.body_vadr[body])
         kind = int(model.joint_ntrans[body]), int(model.joint_nrot[body])
         parent = int(model.body_parent[body])
-        straight = np.array_equal(model.joint_trans_axes[body], np.eye(3).ravel())
         offset = drake.Quaternion(np.array(model.joint_offset[body]))
         place = drake.RigidTransform(offset, np.array(model.joint_parent_point[body]))
-        if kind == (3, 3) and parent < 0 and straight and not np.any(model.joint_child_point[body]):
-            if place.IsExactlyIdentity():
-                return None
         above = self.plant.world_body() if parent < 0 else self._bodies[parent]
         point = drake.RigidTransform(np.array(model.joint_child_point[body]))
-        frames = (f"joint{body}", above, place, self._bodies[body], point)
+        name = f"joint{body}"
+        F = self.plant.AddFrame(drake.FixedOffsetFrame(f"{name}_F", above.body_frame(), place))
+        M = self.plant.AddFrame(drake.FixedOffsetFrame(f"{name}_M", self._bodies[body].body_frame(), point))
         if kind == (0, 0):
-            return self.plant.AddJoint(drake.WeldJoint, *frames, drake.RigidTransform())
+            return self.plant.AddJoint(drake.WeldJoint(name, F, M, drake.RigidTransform()))
+        if kind == (3, 3) and np.array_equal(model.joint_trans_axes[body], np.eye(3).ravel()):
+            return self.plant.AddJoint(drake.QuaternionFloatingJoint(name, F, M))
         if kind not in ((1, 0), (0, 1)):
             raise ValueError(f"DrakeScene: no joint with {kind[0]} translations and {kind[1]} rotations (body {body})")
         slides = kind == (1, 0)
@@ -103,19 +100,8 @@ class DrakeScene:
         for limit in np.flatnonzero(model.limit_dof == first):
             bound = float(model.limit_bound[limit])
             low, high = (bound, high) if model.limit_sign[limit] > 0 else (low, bound)
-        name, parent_body, X_PF, child, X_BM = frames
-        joint_type = drake.PrismaticJoint if slides else drake.RevoluteJoint
-        joint = self.plant.AddJoint(
-            joint_type(
-                name,
-                self.plant.AddFrame(drake.FixedOffsetFrame(f"{name}_F", parent_body.body_frame(), X_PF)),
-                self.plant.AddFrame(drake.FixedOffsetFrame(f"{name}_M", child.body_frame(), X_BM)),
-                axis,
-                low,
-                high,
-                float(model.dof_damper[first]),
-            )
-        )
+        make = drake.PrismaticJoint if slides else drake.RevoluteJoint
+        joint = self.plant.AddJoint(make(name, F, M, axis, low, high, float(model.dof_damper[first])))
         if model.dof_spring[first] > 0.0:
             spring = drake.PrismaticSpring if slides else drake.RevoluteSpring
             self.plant.AddForceElement(spring(joint, float(model.dof_rest[first]), float(model.dof_spring[first])))

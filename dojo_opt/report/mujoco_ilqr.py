@@ -5,9 +5,8 @@ same mechanism (mujoco_scene.py), the same knots with as many time steps as MuJo
 whose expansion is compiled here, in its favour. Dynamics and their one-sided differences are MuJoCo's C; backward pass
 and line search are NumPy. Multiple shooting with the gaps of FDDP, regularised Q_uu, augmented Lagrangian.
 
-What it does not do: soften contact on the way (MuJoCo's contact is as soft as its default solimp and solref make it,
-or, with `Settings.smooth`, switches on smoothly, as its manual proposes for derivatives), and control limits in the
-backward pass: inputs are clipped in the rollouts.
+What it does not do: soften contact on the way (it is as soft as MuJoCo's default solimp and solref make it, or switches
+on smoothly with `Settings.smooth`), and control limits in the backward pass: inputs are clipped in the rollouts.
 
 Tassa, Mansard, Todorov 2014 (backward pass); Mastalli et al. 2020, "Crocoddyl" (gaps and their line search).
 """
@@ -81,9 +80,8 @@ class MujocoIlqr:
             return self._solve(max_iterations, violation, tolerance)
 
     def _solve(self, max_iterations: int, tight: float, tolerance: float) -> Solution:
-        objective = self._objective
+        objective, (xs, us) = self._objective, self._guess()
         objective.reset()
-        xs, us = self._guess()
         merit, mu, alpha = objective.evaluate(xs, us)[1], 0.0, 1.0
         K, k = np.zeros((len(us), us.shape[1], self._problem.sim.ndx)), np.zeros_like(us)
         seconds: list[float] = []
@@ -114,9 +112,9 @@ class MujocoIlqr:
                 message = "the iterations are used up"
             elif mu > MU_LAST:
                 message = "no step is accepted at any regularisation"
-        cost, gap = objective.evaluate(xs, us)[0], float(np.abs(self._gaps(xs, us)).max())
-        reached, count = objective.violation(xs, us), len(seconds)
-        return Solution(xs, us, K, cost, reached, gap, count, np.array(seconds), np.array(history), message)
+        gap = float(np.abs(self._gaps(xs, us)).max())
+        found = (objective.evaluate(xs, us)[0], objective.violation(xs, us), gap, len(seconds))
+        return Solution(xs, us, K, *found, np.array(seconds), np.array(history), message)
 
     def replay(self, solution: Solution, refine: int = 5) -> tuple[Matrix, Matrix]:
         """(xs, us) of a solution under its gains, with time steps `refine` times as short."""

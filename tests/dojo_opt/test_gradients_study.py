@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report import Progress
+from dojo_opt.report import Progress, Report
 from dojo_opt.report.engines import Ours
-from dojo_opt.report.gradients import Gradients, one_step, sliding, smoothing, touchdown
+from dojo_opt.report.gradients import Gradients, one_step, sliding, smoothing, study, touchdown
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
 
 
@@ -77,6 +77,17 @@ def test_engines_are_differenced_from_their_own_rest():
     motion = sliding.motions()[-1]
     found = sliding.differenced(Ours(kappa=1e-8), motion, 0.02, 1e-5)
     assert found.value == pytest.approx(sliding.chained(motion, 0.02, 1e-8).value, abs=1e-3)
+
+
+def test_an_engine_that_cannot_is_a_note(monkeypatch):
+    class Unable(Ours):
+        def simulate(self, mechanism, **settings):
+            raise ValueError("no blocks")
+
+    monkeypatch.setattr(study, "installed", lambda: [Unable("unable"), Ours("able")])
+    report = Report("title", "command")
+    assert [engine.name for engine in study._able(report, quick=False)] == ["able"]
+    assert report.notes == ["motions: without unable: no blocks"]
 
 
 def test_mujoco_jacobians_are_chained_as_its_motion_is_differenced():
@@ -157,7 +168,7 @@ def test_relative_error_is_that_of_the_whole_matrix():
 def test_a_users_mechanism_is_measured_in_one_step_and_told_its_kappa():
     report = Gradients(quick=True, mechanism=dojo.models.sphere()).run(Progress())
     assert report.met() and len(report.rows) == 2 and report.figure is not None
-    assert any("derivatives within 1 %" in note for note in report.notes)
+    assert any("are within 1 % of hard contact" in note for note in report.notes)
     json.loads(report.as_json())
 
 

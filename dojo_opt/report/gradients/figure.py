@@ -81,16 +81,15 @@ def _motions(axes: Any, found: Sequence[Derivative]) -> None:
             continue  # lies on the chained curve
         if kappa is None and how == f"differences of {EPS_WIDE:g}":
             continue  # in the table
-        y = []
-        for h in steps:
-            own = [d for d in found if (d.engine, d.how, d.kappa, d.time_step) == (engine, how, kappa, h)]
-            y.append(min(worst(own), _TOP))
+        own = [d for d in found if (d.engine, d.how, d.kappa) == (engine, how, kappa)]
+        x = sorted({d.time_step for d in own})
+        y = [min(worst([d for d in own if d.time_step == h]), _TOP) for h in x]
         look: dict[str, Any] = {"color": "C3", "linewidth": 2, "alpha": {1e-6: 0.4, 1e-8: 1.0}.get(kappa or 0.0, 0.7)}
         label = f"dojo-opt, (A, B) chained, kappa {kappa:g}" if kappa else f"{engine}: {how}"
         if kappa is None:
             colour = f"C{[0, 1, 2, 4, 5, 6, 7, 8, 9][engines.index(engine) % 9]}"
             look = {"color": colour, "linestyle": ":" if "chained" in how else "-"}
-        axes.plot(1e3 * np.array(steps), y, marker="o", markersize=3.5, label=label, **look)
+        axes.plot(1e3 * np.array(x), y, marker="o", markersize=3.5, label=label, **look)
     axes.plot(1e3 * np.array(steps), steps, color="0.2", linewidth=1, linestyle=(0, (1, 3)), label="h / 1 s")
     axes.set(xscale="log", yscale="log", xlabel="time step [ms]", ylabel="worst relative error of five derivatives")
     axes.set_ylim(1e-6, 2 * _TOP)

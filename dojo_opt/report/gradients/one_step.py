@@ -127,6 +127,15 @@ def _ours(scene: Scene) -> tuple[list[Point], Cases]:
     return points, cases
 
 
+def loads(scene: Scene) -> Vector:
+    """Normal forces [N] of the contacts that carry at least a hundredth of the weight."""
+    if not scene.sim.ncontact:
+        return np.zeros(0)
+    forces = scene.sim.rollout(scene.start, np.tile(scene.u, (scene.steps + 1, 1)), throw=True).contacts.normal_force
+    weight = float(np.sum(scene.sim.model.body_mass) * np.linalg.norm(scene.sim.model.gravity))
+    return np.asarray(forces[-1][forces[-1] > 0.01 * weight])
+
+
 def smoothed(scene: Scene, kappas: Sequence[float] = KAPPAS) -> list[float]:
     """Relative difference of (A, B) at each kappa from that at a hundredth of the last."""
     x = scene.sim.rollout(scene.start, np.tile(scene.u, (scene.steps, 1)), throw=True).x[-1]

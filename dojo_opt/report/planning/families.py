@@ -26,13 +26,13 @@ class Score(NamedTuple):
     true: int  # of these, also when replayed
     good: int  # of these, near the best
     iterations: float  # median over all
-    excess: float  # median of cost / best - 1 of the true ones
+    excess: float  # median of replayed cost / best - 1 of the true ones
     seconds: float  # median over all, processor time
 
 
 def score(name: str, problems: Sequence[Problem], outcomes: Sequence[tuple[Setting, list[Outcome]]]) -> list[Score]:
-    """Scores of all settings, against the best true plan of each variant."""
-    costs = np.array([[o.cost if _true(o) else np.inf for o in found] for _, found in outcomes])
+    """Scores of all settings, by the costs of replays on hard contact, against the best of each variant."""
+    costs = np.array([[o.hard[0] if _true(o) else np.inf for o in found] for _, found in outcomes])
     best = costs.min(axis=0)
     scores = []
     for (setting, found), cost in zip(outcomes, costs, strict=True):

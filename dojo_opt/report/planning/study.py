@@ -159,7 +159,8 @@ def _scores_table(name: str, scores: list[families.Score]) -> Table:
     ]
     header = ("", "solved", "true", "good", "iterations", "excess cost", "ms")
     note = f"of {scores[0].variants}. True: violation <= {families.TRUE:g} when replayed on hard contact; good: within "
-    note += f"{100 * (families.GOOD - 1):.0f} % of the best true plan of any setting. Medians; 100 iterations at most."
+    note += f"{100 * (families.GOOD - 1):.0f} % of the best true plan of any setting, both "
+    note += "by the cost of the replay. Medians; 100 iterations at most."
     return Table(f"Settings of the planner: {name}", header, rows, note)
 
 
