@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.dense import cholesky, cholesky_solve, dot
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -28,7 +28,7 @@ def _value(H: Matrix, g: Vector, x: Vector) -> float:
     return total
 
 
-@kernel
+@inlined
 def _find_free(
     H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, gradient: Vector, free: Integers
 ) -> tuple[int, bool]:
@@ -58,7 +58,7 @@ def factor_free(H: Matrix, free: Integers, nfree: int, sub: Vector, out: Vector)
     return cholesky(A, out[: nfree * nfree].reshape((nfree, nfree))) == nfree
 
 
-@kernel
+@inlined
 def _search(H: Matrix, g: Vector, lo: Vector, hi: Vector, slope: float, x: Vector, step: Vector, trial: Vector) -> bool:
     """Armijo search along the projected path x <- clip(x + a step); False when no a gives enough decrease."""
     old = _value(H, g, x)
@@ -74,7 +74,7 @@ def _search(H: Matrix, g: Vector, lo: Vector, hi: Vector, slope: float, x: Vecto
     return False
 
 
-@kernel
+@inlined
 def _newton_step(gradient: Vector, free: Integers, nfree: int, factor: Vector, packed: Vector, out: Vector) -> float:
     """out[free] = -H[free, free]^-1 gradient[free], zero elsewhere; returns its slope gradient . out."""
     for i in range(nfree):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
 from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -67,7 +67,7 @@ def value_hessian(buffer: Vector, n: int) -> Matrix:
     return buffer[: n * n].reshape((n, n))
 
 
-@kernel
+@inlined
 def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: Matrix, q: Vector) -> None:
     """Q = H + F^T V F and q = g + F^T (v + V gap_{t+1}) at knot t.   FV: (2, n, n + m) scratch."""
     n = v.shape[0]
@@ -93,7 +93,7 @@ def _action_value(quad: Quadratic, t: int, V: Matrix, v: Vector, FV: Stack, Q: M
         axpy(v[i], F[i], q)
 
 
-@kernel
+@inlined
 def _regularize(reg: Regularization, F: Matrix, Q: Matrix, Huu: Matrix, Z: Matrix) -> None:
     """Huu = Q_uu + control diag(damping) + value B^T B,  Z = -(Q_ux + value B^T A)."""
     m, n = Z.shape
@@ -112,7 +112,7 @@ def _regularize(reg: Regularization, F: Matrix, Q: Matrix, Huu: Matrix, Z: Matri
                     Z[i, j] -= b * F[k, j]
 
 
-@kernel
+@inlined
 def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> None:
     """K = L^-T L^-1 Z on free rows, zero on the others; L packed (nfree, nfree) in `factor`. Z is used up."""
     m, n = K.shape
@@ -128,10 +128,10 @@ def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> 
             K[free[i], j] = Z[i, j]
 
 
-@kernel
-def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, w: Vector, V: Matrix, v: Vector) -> None:
+@inlined
+def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, Quu: Matrix, w: Vector, V: Matrix, v: Vector) -> None:
     """V = Q_xx + K^T W + Q_xu K and v = q_x + K^T w + Q_xu k with W = Q_ux + Q_uu K, w = q_u + Q_uu k: exact for any
-    gains.   CD: (2, 2 m, n) scratch for (K, Q_ux) and (W, K), whose product is the change of Q_xx.
+    gains.   CD: (2, 2 m, n) scratch for (K, Q_ux) and (W, K), whose product is the change of Q_xx; Quu: (m, m) scratch.
     """
     m, n = K.shape
     C, D = CD[0], CD[1]
@@ -144,7 +144,9 @@ def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, w: Vector, V: 
             f[j] = a[j]
             d[j] = b[j]
             e[j] = b[j]
-    add_mul_tn(Q[n:, n:], K, D[:m], False)
+        for i in range(m):
+            Quu[r, i] = Q[n + r, n + i]
+    add_mul_tn(Quu, K, D[:m], False)
     for i in range(n):
         v[i] = q[i]
         a, b = V[i], Q[i]
@@ -156,7 +158,7 @@ def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, w: Vector, V: 
     add_mul_tn(C, D, V, True)
 
 
-@kernel
+@inlined
 def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vector) -> tuple[float, float]:
     """(d0, d1) from the linear rollout of the full step."""
     T, m, n = K.shape
@@ -215,7 +217,7 @@ def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: In
         for i in range(nfree):
             gradient = max(gradient, abs(q[n + free[i]]))
         _gains(Z, free, nfree, box, K[t])
-        _value(K[t], k[t], Q, q, CD, w, V, v)
+        _value(K[t], k[t], Q, q, CD, Huu, w, V, v)
     d0, d1 = _predict(quad, K, k, z, y, dx)
     finite = abs(d0) < np.inf and abs(d1) < np.inf
     return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)
