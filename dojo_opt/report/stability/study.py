@@ -114,8 +114,9 @@ def _tables(
 
 def _passed(verdicts: Sequence[Verdict]) -> Row:
     """How many trials of ours passed; all have to."""
-    count = sum(verdict.passed for verdict in verdicts)
-    return Row("trials passed", float(count), f"of {len(verdicts)}", float(len(verdicts)), at_least=True)
+    count, refused = sum(verdict.passed for verdict in verdicts), sum(v.text == "refused" for v in verdicts)
+    note = f"{refused} of them by a refusal, as their rules ask" if refused else ""
+    return Row("trials passed", float(count), f"of {len(verdicts)}", float(len(verdicts)), at_least=True, note=note)
 
 
 def _advice(trials: Sequence[Trial], verdicts: Sequence[Verdict]) -> str:
