@@ -35,10 +35,11 @@ class Settings(NamedTuple):
     kappa: float  # central-path parameter [N s m]
     tolerance: float
     max_iterations: int
+    order: int = 2  # of a step
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given."""
-        return np.array(self if kappa is None else self._replace(kappa=kappa), dtype=np.float64)
+        """As kernels read it, at another kappa when given; without the order, which chooses the kernels."""
+        return np.array((self if kappa is None else self._replace(kappa=kappa))[:4], dtype=np.float64)
 
 
 class Calls:

@@ -20,7 +20,7 @@ def describe(sim: Simulator) -> str:
     lines = [
         f"{mech.name}: {sim.nbody} bodies, {sim.nv} degrees of freedom, {_total_mass(mech):.4g} kg",
         f"  state x ({sim.nx},) = q ({sim.nq},), v ({sim.nv},);  perturbation dx ({sim.ndx},);  input u ({sim.nu},)",
-        f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}",
+        f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
         "joints",
         *(_joint_line(mech, j) for j in mech.joints),
         "inputs",

@@ -76,14 +76,15 @@ def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
 
 @kernel
 def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
-    """out[i] = inertia of body i about the origin of the world, 6 x 6 row-major, at configuration 2:
+    """out[i] = inertia of body i about O, 6 x 6 row-major, at configuration 2:
 
     [ m I       -m [d]           ]
-    [ m [d]     J - m [d] [d]    ]       d: to the centre of mass
+    [ m [d]     J - m [d] [d]    ]       d: from O to the centre of mass
     """
     for i in range(model.body_parent.shape[0]):
         m = model.body_mass[i]
-        x, y, z = work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2]
+        o = work.origin
+        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
         s = x * x + y * y + z * z
         J = work.inertia_world[i]
         A = out[i]
@@ -100,7 +101,7 @@ def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
 
 @kernel
 def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
-    """out = M^-1 p with M = S2^T (inertia) S2 at configuration 2 in `work`, O the origin of the world.
+    """out = M^-1 p with M = S2^T (inertia) S2 at configuration 2 in `work`.
 
     Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
     """

@@ -17,21 +17,24 @@ _SINGULAR = int(Status.SINGULAR)
 
 
 @kernel
-def residual_scale(model: Model, work: Work, options: Options) -> float:
-    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance.
-
-    Momenta are differences of positions over h; where their rounding, the sum of eps m |x| (1 + |x - O|) / h, exceeds
-    the tolerance, it takes its place: masses of tonnes, steps of microseconds.
-    """
+def residual_scale(work: Work) -> float:
+    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
     s = 1.0
-    noise = 0.0
     for i in range(work.momentum_in.shape[0]):
         for k in range(6):
             s = max(s, 1.0 + abs(work.momentum_in[i, k]))
-        x, y, z = work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2]
-        arm = abs(x - work.origin[0]) + abs(y - work.origin[1]) + abs(z - work.origin[2])
-        noise += model.body_mass[i] * (abs(x) + abs(y) + abs(z)) * (1.0 + arm)
-    return max(s, 4e-16 * noise / (options.h * options.tolerance))
+    return s
+
+
+@kernel
+def rounding(model: Model, work: Work, h: float) -> float:
+    """Residual that cannot be told from zero: momenta are differences of rounded positions, divided by h."""
+    total = 0.0
+    o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
+    for i in range(model.body_parent.shape[0]):
+        x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
+        total += model.body_mass[i] * x * (1.0 + x + o)
+    return 1e-15 * total / abs(h)
 
 
 @kernel
@@ -52,7 +55,8 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
     """
     h = options.h
-    scale = residual_scale(model, work, options)
+    scale = residual_scale(work)
+    tolerance = options.tolerance + rounding(model, work, h) / scale
     for d in range(v.shape[0]):
         work.nu_trial[d] = guess.velocity[d]
         work.dnu[d] = 0.0
@@ -73,7 +77,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         project(model, work.S2, work.subtree, work.residual)
         joint_impulses(model, work, h, q, v, u)
         r = norm(work.residual) / scale
-        if not (inside and r < max(last, options.tolerance)):
+        if not (inside and r < max(last, tolerance)):
             if halvings > 40:
                 status = _NO_PROGRESS
                 break
@@ -83,7 +87,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
                     work.nu_trial[d] *= 0.7
             alpha *= 0.5
             continue
-        if r < options.tolerance:
+        if r < tolerance:
             status = _SOLVED
             break
         if iterations == options.max_iterations:

@@ -12,10 +12,21 @@ from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls, Settings
 from sim.mechanism import Mechanism
+from sim.model import Model
 from sim.results import SimulationError
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
+
+
+def _composed(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
+    """Calls of a higher order; their module is imported by those who ask for it."""
+    from sim.composed import Composed, check
+
+    check(mechanism, settings)
+    calls = Composed(model, settings)
+    calls.check_dampers(mechanism)
+    return calls
 
 
 class States:
@@ -23,11 +34,11 @@ class States:
 
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
-        self.time_step, self.kappa, self.tolerance, self.max_iterations = settings
+        self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order = settings
         self.model = pack(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, _, self.nu = mechanism_sizes(mechanism)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._calls = Calls(self.model, settings)
+        self._calls = Calls(self.model, settings) if self.order == 2 else _composed(self.model, mechanism, settings)
         self._border = Border(mechanism, self._calls)
 
     def __setattr__(self, name: str, value: Any) -> None:

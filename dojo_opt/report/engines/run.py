@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim import bodies
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
@@ -111,25 +112,13 @@ def observe_bodies(
     sim: Simulator, times: Floats, z: Floats, potential: Floats, seconds: float, steps: int, message: str = ""
 ) -> Run:
     """The run of maximal states z (n, nbody, 13) with velocities at the nodes, and their potential energies (n,)."""
-    mass = sim.model.body_mass
-    inertia = sim.model.body_inertia.reshape(-1, 3, 3)
-    x, vel, quat, omega = z[..., :3], z[..., 3:6], z[..., 6:10], z[..., 10:]
-    spin = np.einsum("bij,nbj->nbi", inertia, omega)
-    kinetic = 0.5 * np.einsum("b,nbk,nbk->n", mass, vel, vel) + 0.5 * np.einsum("nbk,nbk->n", omega, spin)
-    p = mass[:, None] * vel
-    angular = np.cross(x, p) + rotated(quat, spin)
-    momentum = np.concatenate([p.sum(axis=1), angular.sum(axis=1)], axis=1)
-    velocity = np.concatenate([vel, omega], axis=2)
-    return Run(times, x, quat, velocity, kinetic + potential, momentum, seconds, steps, message)
+    velocity = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
+    energy = bodies.kinetic_energy(sim.model, z) + potential
+    momentum = bodies.momentum(sim.model, z)
+    return Run(times, z[..., :3], z[..., 6:10], velocity, energy, momentum, seconds, steps, message)
 
 
 def potential(sim: Simulator, q: Floats) -> Floats:
     """Energy of gravity and springs at the coordinates q (n, nq) [J]."""
     x = np.concatenate([q, np.zeros((len(q), sim.nv))], axis=1)
     return np.asarray(sim.energy(x) - sim.kinetic_energy(x))
-
-
-def rotated(quat: Floats, vector: Floats) -> Floats:
-    """R(quat) vector, along the last axes."""
-    w, u = quat[..., :1], quat[..., 1:]
-    return np.asarray(vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector))
