@@ -5,6 +5,7 @@ Springs are explicit torques of the step, as Bullet has none of its own.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -82,6 +83,7 @@ def quiet() -> Iterator[None]:
             os.dup2(nothing.fileno(), 1)
         yield
     finally:
+        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
         os.dup2(kept, 1)
         os.close(kept)
 
