@@ -39,7 +39,7 @@ from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import choose_far_limits, limits_came_near
 from sim.model import Goal, Guess, Model, Options, Outcome, Vector, Work
-from sim.newton import residual_scale
+from sim.newton import residual_scale, rounding
 from solvers.jit import inlined, kernel
 from solvers.status import Status
 
@@ -196,7 +196,7 @@ def try_from(
     h = options.h
     kappa = options.kappa
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
-    scale = residual_scale(model, work, options)
+    scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     smoothing = start(model, work, options, q, v, attempt)
     ratio = 1e-2
     patience = iterations + _PATIENCE

@@ -77,7 +77,7 @@ def _matrix(model: Model, work: Work, h: float, q: Vector) -> bool:
 @kernel
 def solve_interval(model: Model, work: Work, options: Options, h: float, q: Vector, impulse: Vector) -> Outcome:
     """Solve -D1 L_d(q, q (+) h nu) = p2 for nu by Newton's method from the guess in work.nu, with one step at least."""
-    scale = residual_scale(model, work, Options(h, options.kappa, options.tolerance, options.max_iterations))
+    scale = residual_scale(work)
     floor = rounding(model, work, h) / scale
     last = 0.0
     r = 1e300

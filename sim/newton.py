@@ -19,21 +19,13 @@ _SINGULAR = int(Status.SINGULAR)
 
 
 @kernel
-def residual_scale(model: Model, work: Work, options: Options) -> float:
-    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance.
-
-    Momenta are differences of positions over h; where their rounding, the sum of eps m |x| (1 + |x - O|) / h, exceeds
-    the tolerance, it takes its place: masses of tonnes, steps of microseconds.
-    """
+def residual_scale(work: Work) -> float:
+    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
     s = 1.0
-    noise = 0.0
     for i in range(work.momentum_in.shape[0]):
         for k in range(6):
             s = max(s, 1.0 + abs(work.momentum_in[i, k]))
-        x, y, z = work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2]
-        arm = abs(x - work.origin[0]) + abs(y - work.origin[1]) + abs(z - work.origin[2])
-        noise += model.body_mass[i] * (abs(x) + abs(y) + abs(z)) * (1.0 + arm)
-    return max(s, 4e-16 * noise / (abs(options.h) * options.tolerance))
+    return s
 
 
 @kernel
@@ -66,7 +58,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
     """
     h = options.h
-    scale = residual_scale(model, work, options)
+    scale = residual_scale(work)
     floor = rounding(model, work, h) / scale
     keep_loops(model, work)
     for d in range(v.shape[0]):

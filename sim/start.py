@@ -8,6 +8,7 @@ from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spat
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
+from sim.newton import rounding
 from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import Table
@@ -86,16 +87,6 @@ def newton_direction(model: Model, work: Work, h: float, v: Vector) -> bool:
 
 
 @kernel
-def _momentum_noise(model: Model, work: Work, h: float) -> float:
-    """Rounding of node momenta, which are differences of positions over h: sum of eps m |x| (1 + |x|) / h."""
-    noise = 0.0
-    for i in range(work.pos2.shape[0]):
-        length = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
-        noise += 1e-15 * model.body_mass[i] * length * (1.0 + length) / h
-    return noise
-
-
-@kernel
 def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector) -> int:
     """Solve p(q, v15) = M(q) velocity for v15 by Newton's method with backtracking.
 
@@ -137,7 +128,7 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
         if alpha <= 1e-6:
             for d in range(nv):
                 v[d] = work.nu_trial[d]
-            return _SOLVED if error <= 1e-11 * scale + _momentum_noise(model, work, h) else _NO_PROGRESS
+            return _SOLVED if error <= 1e-11 * scale + rounding(model, work, h) else _NO_PROGRESS
         error = trial
     return _MAX_ITERATIONS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.engines.run import Run, rotated
+from dojo_opt.report.engines.run import Run
 from sim.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -16,9 +16,15 @@ def gaps(mechanism: Mechanism, run: Run) -> Floats:
     bodies = [mechanism.body_names.index(contact.body) for contact in mechanism.contacts]
     out = np.empty((len(run.time), len(bodies)))
     for c, (body, contact) in enumerate(zip(bodies, mechanism.contacts, strict=True)):
-        arm = rotated(run.quaternion[:, body], np.broadcast_to(np.asarray(contact.point), (len(out), 3)))
+        arm = _rotated(run.quaternion[:, body], np.asarray(contact.point))
         out[:, c] = (run.position[:, body] + arm) @ np.asarray(contact.normal) - contact.radius - contact.height
     return out
+
+
+def _rotated(quaternion: Floats, vector: Floats) -> Floats:
+    """R(q) v for every quaternion (n, 4)."""
+    w, u = quaternion[:, :1], quaternion[:, 1:]
+    return np.asarray(vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector))
 
 
 def penetration(mechanism: Mechanism, run: Run) -> float:

@@ -7,6 +7,8 @@ import pytest
 from mechanisms import CASES, chain_with, random_state
 
 from dojo_opt import models
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
 from sim.results import SimulationError
 from sim.simulator import Simulator
 from solvers.status import Status
@@ -43,3 +45,29 @@ def test_too_fast_a_spin_is_refused() -> None:
     with pytest.raises(SimulationError, match=r"Simulator.start: .*half a turn") as error:
         sim.start(sim.neutral()[: sim.nq], v)
     assert error.value.status == Status.ANGULAR_STEP
+
+
+def test_stiff_springs_and_tonnes_are_started_to_their_rounding() -> None:
+    """The half impulse of a spring, and momenta from differences of positions, are rounded by more than 1e-11."""
+    body = Body("mass", 1.0, (0.1, 0.1, 0.1))
+    stiff = Mechanism([body], [Joint("prismatic", None, "mass", axis=(1, 0, 0), spring=1e10)], gravity=(0.0, 0.0, 0.0))
+    sim = Simulator(stiff, time_step=0.1)
+    np.testing.assert_allclose(sim.energy(sim.start([0.1], [0.0])), 0.5e8, rtol=1e-9)
+    heavy = Mechanism([Body("load", 1e6, (1e5, 1e5, 1e5))], [Joint("floating", None, "load")])
+    sim = Simulator(heavy, time_step=1e-3)
+    x = sim.start([0.3, 0.2, 0.4, 1, 0, 0, 0], np.zeros(6))
+    np.testing.assert_allclose(sim.kinetic_energy(x), 0.0, atol=1e-6)
+
+
+def test_a_step_of_tonnes_in_microseconds_ends_at_its_rounding() -> None:
+    """1e4 kg 2 m from the origin at 20 us: momenta are rounded by 2e-7 N s, above the tolerance of 1e-8."""
+    bodies = [Body("rod", 0.2, (1e-3, 1e-3, 1e-5)), Body("tip", 1e4, (50.0, 50.0, 50.0))]
+    joints = [
+        Joint("revolute", None, "rod", axis=(0, 1, 0), child_point=(0, 0, 1.0)),
+        Joint("revolute", "rod", "tip", axis=(0, 1, 0), parent_point=(0, 0, -1.0)),
+    ]
+    sim = Simulator(Mechanism(bodies, joints), time_step=2e-5)
+    trajectory = sim.rollout(sim.start([0.5, 0.0], [0.0, 0.0]), np.zeros((500, 2)))
+    assert trajectory.success, trajectory.message
+    energy = sim.energy(trajectory.x)
+    assert np.ptp(energy) < 1e-6 * 1e4 * 9.81 * 2.0

@@ -25,8 +25,10 @@ def sliding(engine: Engine, time_step: float, directions: Floats = DIRECTIONS) -
     lateral   distance off the line                  lift     highest lowest corner [m]
     """
     stops, laterals, lifts, seconds = [], [], [], []
+    rest = scenes.standing().run(engine, time_step)
+    stands = np.r_[rest.position[-1, 0], rest.quaternion[-1, 0]]
     for angle in directions:
-        scene = scenes.sliding(float(angle))
+        scene = scenes.sliding(float(angle), stands)
         run = scene.run(engine, time_step)
         if not complete(run):
             return dict.fromkeys(("stop", "spread", "lateral", "lift", "us_per_step"), nan)

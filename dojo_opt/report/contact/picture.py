@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from dojo_opt.plots.axes import finish
@@ -12,7 +13,7 @@ from dojo_opt.plots.axes import finish
 
 def picture(results: dict[str, dict[str, Any]], curve: dict[str, list[float]], step: str) -> Figure:
     """Creep against kappa; creep, lift-off and penetration of every engine; rate independence."""
-    figure = Figure(figsize=(13, 8.5), layout="constrained")
+    figure = Figure(figsize=(13, 9.5), layout="constrained")
     axes = figure.subplots(2, 2)
     _creep(axes[0, 0], curve)
     _bars(axes[0, 1], results, step)
@@ -22,6 +23,8 @@ def picture(results: dict[str, dict[str, Any]], curve: dict[str, list[float]], s
     axes[0, 1].set_title(f"all engines at h = {1e3 * float(step):g} ms")
     axes[1, 0].set_title("a dropped quadruped: rate independence")
     axes[1, 1].set_title("a tossed cube: self-consistency")
+    handles, labels = axes[1, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize="small")
     return figure
 
 
@@ -53,15 +56,18 @@ def _bars(ax: Any, results: dict[str, dict[str, Any]], step: str) -> None:
     ax.set_xscale("log")
     ax.set_xlim(left=foot)
     finish(ax, "", "[m]")
-    ax.legend(loc="lower left", fontsize="small", framealpha=0.9)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize="small")
 
 
 def _lines(ax: Any, results: dict[str, dict[str, Any]], key: str, xlabel: str, ylabel: str) -> None:
-    for name, found in results.items():
+    colours = colormaps["tab20"]
+    for k, (name, found) in enumerate(results.items()):
         x = [float(value) for value in found[key]]
         ours = name.startswith("dojo-opt")
-        ax.loglog(x, list(found[key].values()), "o-" if ours else "x:", label=name, lw=2 if ours else 1, ms=4)
+        style = {"marker": "o", "lw": 2.0} if ours else {"marker": "x", "lw": 1.0, "ls": ":"}
+        ax.loglog(x, list(found[key].values()), label=name, ms=4, color=colours(k % 20), **style)
     ax.set_xticks(x, [f"{value:g}" for value in x])
     ax.minorticks_off()
-    finish(ax, ylabel, xlabel)
-    ax.legend(fontsize="x-small", framealpha=0.6)
+    ax.set_xlabel(xlabel)
+    ax.set_ylabel(ylabel)
+    ax.grid(alpha=0.3)

@@ -49,10 +49,15 @@ class Scene:
         )
 
 
-def sliding(angle: float) -> Scene:
-    """A cube of half a metre at 3 m/s on friction 0.3, along the direction `angle` [rad]."""
+def standing() -> Scene:
+    """A cube of half a metre that finds its rest: soft contacts sink in a little."""
+    return Scene(block(friction=FRICTION), (0, 0, 0.25, 1, 0, 0, 0), np.zeros(6), 0.5)
+
+
+def sliding(angle: float, q: ArrayLike) -> Scene:
+    """The cube at 3 m/s on friction 0.3, along the direction `angle` [rad], from where it stands."""
     velocity = (SPEED * cos(angle), SPEED * sin(angle), 0.0, 0.0, 0.0, 0.0)
-    return Scene(block(friction=FRICTION), (0, 0, 0.25, 1, 0, 0, 0), velocity, 1.3)
+    return Scene(block(friction=FRICTION), q, velocity, 1.3)
 
 
 def on_slope(duration: float) -> Scene:

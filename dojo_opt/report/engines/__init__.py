@@ -11,7 +11,7 @@ from dojo_opt.report.engines.run import Engine, Run
 __all__ = ["Engine", "Ours", "Run", "installed"]
 
 # package that has to be there -> module of this folder with `engines()`
-_PEERS = {"mujoco": "mujoco"}
+_PEERS = {"mujoco": "mujoco", "pydrake": "drake", "pybullet": "bullet"}
 
 
 def installed() -> list[Engine]:

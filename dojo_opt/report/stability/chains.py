@@ -119,6 +119,7 @@ def on_the_ground(time_step: float) -> Trial:
         measures.growth_and_penetration(1e-3 * MASS * G * 0.7, 1e-8),
         1.0,
         samples=200,
+        peer_duration=2.0 if time_step > 5e-3 else 0.5,
     )
 
 
@@ -132,8 +133,8 @@ def trials() -> list[Trial]:
         lengths(),
         pendulum(10, 1e-3, 10.0, slow=False),
         pendulum(10, 1e-3, 100.0, slow=True, peer_duration=20.0),
-        pendulum(50, 2e-4, 100.0, slow=True, peer_duration=3.0),
-        pendulum(100, 1e-4, 100.0, slow=True, peer_duration=1.0),
+        pendulum(50, 2e-4, 100.0, slow=True, peer_duration=1.0),
+        pendulum(100, 1e-4, 100.0, slow=True, peer_duration=0.2),
         on_the_ground(1e-2),
         on_the_ground(1e-3),
     ]

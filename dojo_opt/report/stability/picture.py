@@ -12,12 +12,12 @@ from dojo_opt.report.stability.trial import Trial, Verdict
 
 
 def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
-    """Green where the rule is met, red where it is not, with the measured value."""
+    """Green where the rule is met, red where it is not, yellow where a scene is refused; with the measured value."""
     rows, columns = len(trials), len(verdicts)
     figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")
     ax = figure.subplots()
-    passed = np.array([[verdict.passed for verdict in found] for found in verdicts.values()], dtype=float).T
-    ax.imshow(passed, cmap=ListedColormap(["#e8a49c", "#a9d8b0"]), vmin=0.0, vmax=1.0, aspect="auto")
+    colours = np.array([[_colour(verdict) for verdict in found] for found in verdicts.values()]).T
+    ax.imshow(colours, cmap=ListedColormap(["#e8a49c", "#ece0a4", "#a9d8b0"]), vmin=0, vmax=2, aspect="auto")
     for column, found in enumerate(verdicts.values()):
         for row, verdict in enumerate(found):
             ax.text(column, row, verdict.text, ha="center", va="center", fontsize=7)
@@ -31,3 +31,7 @@ def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) 
     for side in ax.spines.values():
         side.set_visible(False)
     return figure
+
+
+def _colour(verdict: Verdict) -> int:
+    return 1 if verdict.text == "refused" else 2 * verdict.passed

@@ -28,9 +28,9 @@ NOTES = [
     "what weighs grams or moves in microseconds with a smaller kappa, as the trial says.",
     "x: measured, and above the bar. 'failed': not finite, lost, or a step that was not solved; the time is that of "
     "the last good sample. (s): other engines ran only so many seconds of it.",
-    "Chains: forces of hinges act along the links at the start of a step, as in every integrator that keeps momentum "
-    "and energy this way. That limits the time step to 2/omega, omega = 2 sqrt(tension / (m l)) for links of mass m "
-    "and length l; above it a step has no solution, and says so.",
+    "Chains: forces of hinges act along the links at the start of a step, as in SHAKE and RATTLE. That limits the time "
+    "step to 2/omega, omega = 2 sqrt(tension / (m l)) for links of mass m and length l; above it a step has no "
+    "solution, and says so.",
     "Rules about penetration and rest ask for hard contact; engines with soft contacts miss them by design, and the "
     "table says by how much.",
     "A start in overlap is thrown out of the ground with depth / time step; avoid it.",
@@ -114,8 +114,9 @@ def _tables(
 
 def _passed(verdicts: Sequence[Verdict]) -> Row:
     """How many trials of ours passed; all have to."""
-    count = sum(verdict.passed for verdict in verdicts)
-    return Row("trials passed", float(count), f"of {len(verdicts)}", float(len(verdicts)), at_least=True)
+    count, refused = sum(verdict.passed for verdict in verdicts), sum(v.text == "refused" for v in verdicts)
+    note = f"{refused} of them by a refusal, as their rules ask" if refused else ""
+    return Row("trials passed", float(count), f"of {len(verdicts)}", float(len(verdicts)), at_least=True, note=note)
 
 
 def _advice(trials: Sequence[Trial], verdicts: Sequence[Verdict]) -> str:

@@ -1,0 +1,93 @@
+"""The stability study: rules that can be missed, refusals that have to be made, trials that pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.report import Progress, engines
+from dojo_opt.report.engines import Ours, Run
+from dojo_opt.report.stability import Stability, bodies, chains, ground, joints, study
+from dojo_opt.report.stability.robot import robot_trials
+from dojo_opt.report.stability.trial import Trial
+
+OURS = Ours(kappa=1e-10, rounds=1)
+PASSING = {
+    "a million on one": ground.on_a_foot(1e6, 1e-2),
+    "a box at 100 m/s": ground.impact("box", 1e-3),
+    "half a second": ground.drop(0.5, 20.0),
+    "friction 10": ground.friction(10.0),
+    "a plate on 100": ground.plate(100, 1e-2),
+    "a milligram": ground.small(1e-3, 1e-6),
+    "deep overlap": ground.overlap(0.5),
+    "1e8 N/m": joints.spring(1e8, 1e-2),
+    "1e8 N/m at half a second": joints.spring(1e8, 0.5),
+    "1e8 N m/rad on a ball joint": joints.turning_spring("spherical", 1e8, 1e-2),
+    "1e6 N s/m": joints.damper(1e6, 1e-2),
+    "jammed": joints.jammed_fingers(),
+    "straight legs": joints.straight_legs(0.0),
+    "1000 rad/s": bodies.spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-3),
+    "10 rad per step": bodies.spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-2, refusal="half a turn"),
+    "a tip 50,000 times heavier": chains.heavy_tip(5e4, 2e-4, angle=0.5),
+    "100 links on the ground": chains.on_the_ground(1e-2),
+}
+
+
+def ours(trial: Trial) -> Run:
+    return trial.run(replace(OURS, tolerance=trial.tolerance, kappa=trial.kappa or OURS.kappa))
+
+
+@pytest.mark.parametrize("name", PASSING)
+def test_trials_pass(name: str) -> None:
+    run = ours(PASSING[name])
+    verdict = PASSING[name].judge(run, ours=True)
+    assert verdict.passed, (verdict, run.message)
+
+
+def test_a_rule_is_missed_by_what_breaks_it() -> None:
+    """A damped spring loses its amplitude, a softer kappa holds the load too high, a coarse tolerance loses momentum."""
+    spring = replace(joints.spring(1e2, 1e-2), mechanism=joints.slider(spring=1e2, damper=1.0))
+    assert not spring.judge(ours(spring), ours=True).passed
+    foot = replace(ground.on_a_foot(1e2, 1e-3), kappa=1e-2)
+    assert not foot.judge(ours(foot), ours=True).passed
+    spin = replace(bodies.spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-3), tolerance=1e-4)
+    assert not spin.judge(ours(spin), ours=True).passed
+
+
+def test_what_can_be_represented_is_no_refusal_and_a_stop_is_no_pass() -> None:
+    gentle = bodies.spin((0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 1e-2, refusal="half a turn")
+    verdict = gentle.judge(ours(gentle), ours=True)
+    assert not verdict.passed and verdict.text == "not refused" and np.isnan(verdict.value)
+    stopped = ours(chains.heavy_tip(5e4, 1e-3, angle=np.pi / 2.0))
+    verdict = chains.heavy_tip(5e4, 1e-3, angle=np.pi / 2.0).judge(stopped, ours=True)
+    assert not verdict.passed and verdict.text.startswith("failed at")
+
+
+def test_a_chain_beyond_the_limit_of_the_time_step_says_so() -> None:
+    """h = 2.2/omega of a light link under the weight of the tip, and a fifth of it."""
+    omega = 2.0 * np.sqrt(0.2 * 5e4 * 9.81 / (0.2 * 0.2))
+    steps = [2e-5 * round(factor / omega / 2e-5) for factor in (2.2, 0.4)]
+    found = [chains.heavy_tip(5e4, h, angle=0.5) for h in steps]
+    found = [replace(trial, duration=500 * trial.time_step, samples=100) for trial in found]
+    assert [ours(trial).message == "" for trial in found] == [False, True]
+
+
+def test_trials_of_a_robot_and_what_they_advise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "installed", list)
+    mechanism = dojo.models.raiberthopper()
+    report = Stability(quick=True, mechanism=mechanism).run(Progress())
+    assert len(report.rows) == len(robot_trials(mechanism)) + 1
+    assert report.notes[0].startswith(mechanism.name) and report.figure is not None
+    pendulum = Stability(quick=True, mechanism=dojo.models.npendulum(3)).run(Progress())
+    assert pendulum.met() and "stable up to a time step of 50 ms" in pendulum.notes[0]
+
+
+@pytest.mark.slow
+def test_every_quick_trial_passes() -> None:
+    report = Stability(quick=True).run(Progress())
+    missed = [row.name for row in report.rows if row.met is False]
+    assert not missed
+    assert len(report.tables[-1].header) == 1 + min(1, len(engines.installed()[1:2]))
