@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state
-from sim.layout import allocate_work, sizes_of, table
+from sim.layout import allocate_work, sizes_of, table, work_view
 from sim.model import Integers, Model, Vector
 from solvers.status import Status
 
@@ -161,6 +161,16 @@ class Calls:
         settings, works = self.settings.array(), self._chunks(n)
         rollout.roll_batch(self._model, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
         return xs, status, knots
+
+    def far(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which contacts and which limits were far in the last step of this thread, (ncontact,) and (nlimit,)."""
+        contacts, limits = np.ones(self.sizes.ncontact, dtype=bool), np.ones(self.sizes.nlimit, dtype=bool)
+        if self.hard:
+            work = work_view(self._work())
+            for first, last in work.near[: work.count[0]]:
+                contacts[first:last] = False
+            limits[work.near_limit[: work.count[1]]] = False
+        return contacts, limits
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

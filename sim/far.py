@@ -6,13 +6,15 @@ no part of its matrix. Contacts of one body against one direction are a cluster,
 
 A cluster is far when its stiffness, in units of the inertia behind it, cannot be seen at the tolerance of the step:
 
-    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 100 tolerance
+    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
 
 for n contacts (all of the mechanism, so that the sum holds), a: half the gap that is ahead. With W the largest
 |J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds the velocity
 per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ within a
 cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with the body.
-The gradient leaves out a part e of the inertia. The step leaves out no force: wherever an
+
+The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
+solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
 iterate is, the impulses in use are those of the law there, but for a change of tolerance/2 in all (`moved` bounds it,
 cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution makes the
 cluster near, and the step is solved again.
@@ -30,7 +32,7 @@ from sim.model import Matrix, Model, Options, Work
 from sim.rotation import rotate
 from solvers.jit import kernel
 
-_STIFFNESS = 100.0  # largest e, in units of the tolerance
+STIFFNESS = 1000.0  # largest e, in units of the tolerance
 
 
 @kernel
@@ -59,7 +61,7 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
     while c < count:
         a = _half_gap_ahead(model, work, c)
         row = work.far[c]
-        if a > 0.0 and count * _stiffness(model, options.h, options.kappa, c, a) <= _STIFFNESS * options.tolerance:
+        if a > 0.0 and count * _stiffness(model, options.h, options.kappa, c, a) <= STIFFNESS * options.tolerance:
             row[23] = row[23] if known else 0.0
             _bound_changes(model, work, options.kappa, c, a)
         else:
