@@ -162,15 +162,13 @@ class Calls:
         rollout.roll_batch(self._model, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
         return xs, status, knots
 
-    def far(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Which contacts and which limits were far in the last step of this thread, (ncontact,) and (nlimit,)."""
-        contacts, limits = np.ones(self.sizes.ncontact, dtype=bool), np.ones(self.sizes.nlimit, dtype=bool)
-        if self.hard:
-            work = work_view(self._work())
-            for first, last in work.near[: work.count[0]]:
-                contacts[first:last] = False
-            limits[work.near_limit[: work.count[1]]] = False
-        return contacts, limits
+    def far(self) -> NDArray[np.bool_]:
+        """Which contacts were far in the last step of this thread, (ncontact,)."""
+        out = np.ones(self.sizes.ncontact, dtype=bool)
+        work = work_view(self._work())
+        for first, last in work.near[: work.counts[0]]:
+            out[first:last] = False
+        return out
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

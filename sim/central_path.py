@@ -62,7 +62,7 @@ def first_attempt(
     Leaves the iterate at the start of attempt 0.
     """
     q, v, u = inputs
-    if work.count[0] + work.count[1] == 0:  # nothing to be on the central path of
+    if work.counts[0] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         return 0 if place(model, work, options.h, q, guess.velocity, 1.0) else 1
     keep_inequalities(model, work)
     if not place(model, work, options.h, q, v, 1.0):

@@ -57,19 +57,28 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
     known = work.far_law[0] == options.kappa
     work.far_law[0] = options.kappa
     count = model.contact_body.shape[0]
+    least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
+    work.counts[0] = 0
+    work.counts[1] = 0
     c = 0
     while c < count:
-        a = _half_gap_ahead(model, work, c)
-        row = work.far[c]
-        if a > 0.0 and count * _stiffness(model, options.h, options.kappa, c, a) <= STIFFNESS * options.tolerance:
-            row[23] = row[23] if known else 0.0
+        i = model.contact_body[c]
+        n = model.contact_frame[c]
+        most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
+        most = 0.5 * (most + model.cluster[c, 4])  # no contact has more: a quick no, for most
+        a = 0.0
+        if most > 0.0 and _stiffness(model, options.h, c, most) <= least * most * most:
+            a = _half_gap_ahead(model, work, c)
+            if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
+                a = 0.0
+        work.far[c, 0] = a
+        if a > 0.0:
             _bound_changes(model, work, options.kappa, c, a)
-        else:
-            row[0] = 0.0
-            row[23] = 0.0
+        if a == 0.0 or not known:
+            work.far[c, 23] = 0.0
+        _enlist(model, work, c)
         c = model.cluster_end[c]
-    _sort(model, work)
-    work.far_law[1] = 0.5 * options.tolerance / max(1, work.count[2])
+    work.far_law[1] = 0.5 * options.tolerance / max(1, work.counts[1])
 
 
 @kernel
@@ -79,25 +88,19 @@ def forget_far(work: Work) -> None:
 
 
 @kernel
-def _sort(model: Model, work: Work) -> None:
-    """near: runs of contacts whose clusters are near; far_first: the first contact of each far cluster."""
-    runs = 0
-    far = 0
-    c = 0
-    while c < model.contact_body.shape[0]:
-        end = model.cluster_end[c]
-        if work.far[c, 0] > 0.0:
-            work.far_first[far] = c
-            far += 1
-        elif runs > 0 and work.near[runs - 1, 1] == c:
-            work.near[runs - 1, 1] = end
-        else:
-            work.near[runs, 0] = c
-            work.near[runs, 1] = end
-            runs += 1
-        c = end
-    work.count[0] = runs
-    work.count[2] = far
+def _enlist(model: Model, work: Work, c: int) -> None:
+    """Append a cluster to far_first, or its contacts to the runs of near."""
+    end = model.cluster_end[c]
+    runs = work.counts[0]
+    if work.far[c, 0] > 0.0:
+        work.far_first[work.counts[1]] = c
+        work.counts[1] += 1
+    elif runs > 0 and work.near[runs - 1, 1] == c:
+        work.near[runs - 1, 1] = end
+    else:
+        work.near[runs, 0] = c
+        work.near[runs, 1] = end
+        work.counts[0] += 1
 
 
 @kernel
@@ -111,16 +114,15 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
 
 
 @kernel
-def _stiffness(model: Model, h: float, kappa: float, c: int, a: float) -> float:
-    """e of one contact of a cluster at the gap a, see above."""
+def _stiffness(model: Model, h: float, c: int, a: float) -> float:
+    """e a^2/(n kappa) of a cluster at the gap a, see above."""
     p = model.cluster[c]
-    mu = p[6]
-    return kappa * ((mu * mu + h * (1.0 + mu)) * p[5] / a + h * (1.0 + mu) * p[7]) / a
+    return (p[6] * p[6] + h * (1.0 + p[6])) * p[5] + h * (1.0 + p[6]) * p[7] * a
 
 
 @kernel
 def _bound_changes(model: Model, work: Work, kappa: float, c: int, a: float) -> None:
-    """far[c, :4]: a, and how much the impulses of the cluster can change beyond that gap, times their lever about O."""
+    """far[c, 1:4]: how much the impulses of the cluster can change beyond the gap a, times their lever about O."""
     i = model.contact_body[c]
     mu = model.cluster[c, 6]
     lever = 1.0 + model.cluster[c, 4]
@@ -128,7 +130,6 @@ def _bound_changes(model: Model, work: Work, kappa: float, c: int, a: float) -> 
         lever += abs(work.pos2[i, k] - work.origin[k])
     push = lever * (model.cluster_end[c] - c) * kappa / a
     row = work.far[c]
-    row[0] = a
     row[1] = push * (1.0 + mu) / a
     row[2] = push * mu * mu / a
     row[3] = push * (1.0 + mu)
@@ -138,12 +139,17 @@ def _bound_changes(model: Model, work: Work, kappa: float, c: int, a: float) -> 
 def came_near(model: Model, work: Work) -> bool:
     """Whether a far cluster is not, at configuration 3; it is near from now on."""
     found = False
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         if cluster_gap(model, c, work.pos3, work.rot3) < work.far[c, 0]:
             found = True
             work.far[c, 0] = 0.0
             work.far[c, 23] = 0.0
     if found:
-        _sort(model, work)
+        work.counts[0] = 0
+        work.counts[1] = 0
+        c = 0
+        while c < model.contact_body.shape[0]:
+            _enlist(model, work, c)
+            c = model.cluster_end[c]
     return found

@@ -41,7 +41,7 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
 @kernel
 def far_impulses(model: Model, work: Work, h: float) -> None:
     """Impulses of the far clusters at configuration 3, evaluated again where they may have changed."""
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         if moved(model, work, h, c):
             _evaluate(model, work, h, c)
@@ -131,7 +131,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
 @kernel
 def add_far_wrenches(model: Model, work: Work) -> None:
     """wrench -= impulses of the far clusters, about O."""
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         i = model.contact_body[c]
         row = work.far[c]

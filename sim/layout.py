@@ -36,12 +36,12 @@ MODEL_FLOATS = _shapes(
     body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, dof_spring nv, dof_damper nv, dof_rest nv,
     contact_point ncontact 3, contact_radius ncontact, contact_friction ncontact, contact_frame ncontact 9,
-    contact_height ncontact, cluster ncontact 8, limit_sign nlimit, limit_bound nlimit, limit_mobility nlimit,
+    contact_height ncontact, cluster ncontact 8, limit_sign nlimit, limit_bound nlimit,
     input_wrench nu 6, gravity 3
     """
 )
 
-WORK_INTS = _shapes("count 3, near ncontact 2, near_limit nlimit, far_first ncontact")
+WORK_INTS = _shapes("counts 2, near ncontact 2, far_first ncontact")
 
 WORK_FLOATS = _shapes(
     """
@@ -54,7 +54,7 @@ WORK_FLOATS = _shapes(
     bound_step nlimit 2, bound_trial nlimit 2, bound_gap nlimit, bound_w nlimit,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
-    far ncontact 24, far_limit nlimit, far_law 2
+    far ncontact 24, far_law 2
     """
 )
 

@@ -12,7 +12,7 @@ from sim import checks
 from sim.border import whole
 from sim.calls import Settings
 from sim.describe import describe
-from sim.left_out import LeftOut, left_out
+from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
 from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
 from sim.states import States
@@ -83,8 +83,8 @@ class Simulator(States):
         """What the scene consists of, what a step computes, and what is left out because nothing needs it."""
         return describe(self)
 
-    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> LeftOut:
-        """Contacts and limits that the step from x is solved without, because they are far.
+    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
+        """Names of the contacts that the step from x is solved without, because they are far.
 
         Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
         """

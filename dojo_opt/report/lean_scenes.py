@@ -21,7 +21,8 @@ from sim.simulator import Simulator
 MANY = 100  # contacts at once
 FAR = 40.0  # [m] to the wall that they might touch
 TIME_STEP = 0.01
-REACHES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # [m] distances of the wall in the figure
+DISTANCES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # [m] of the wall
+KAPPAS = (1e-4, 1e-6, 1e-8)  # [N s m]
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,12 @@ def pendulum_scene(name: str, mechanism: Mechanism, kappa: float = 1e-6) -> Scen
     return Scene(name, Simulator(mechanism, time_step=TIME_STEP, kappa=kappa), np.array([-0.1, 0.5]))
 
 
+def robot_scene(name: str, mechanism: Mechanism, time_step: float) -> Scene:
+    """A robot in its neutral state, nothing held."""
+    simulator = Simulator(mechanism, time_step=time_step)
+    return Scene(name, simulator, simulator.neutral())
+
+
 def with_joints(mechanism: Mechanism, **features: Any) -> Mechanism:
     """The same with these fields of all joints that are not floating."""
     joints = [j if j.kind == "floating" else replace(j, **features) for j in mechanism.joints]
@@ -51,10 +58,16 @@ def with_contacts(mechanism: Mechanism, contacts: Sequence[Contact]) -> Mechanis
 
 def along(mechanism: Mechanism, count: int, *, friction: float, distance: float | None) -> Mechanism:
     """The pendulum with more points along its lower half: over the floor, or facing a wall at this distance [m]."""
-    height = {} if distance is None else {"normal": (0.0, 1.0, 0.0), "height": -distance}
-    kind = "floor" if distance is None else "wall"
+    kind, normal, height = ("floor", (0.0, 0.0, 1.0), 0.0) if distance is None else ("wall", (0.0, 1.0, 0.0), -distance)
     points = [
-        Contact("link_0", (0.0, 0.0, -0.5 * (k + 1.0) / count), friction=friction, name=f"{kind} {k}", **height)
+        Contact(
+            "link_0",
+            (0.0, 0.0, -0.5 * (k + 1.0) / count),
+            friction=friction,
+            normal=normal,
+            height=height,
+            name=f"{kind} {k}",
+        )
         for k in range(count)
     ]
     return with_contacts(mechanism, points)
