@@ -69,7 +69,10 @@ def first_attempt(
         return 1
     start_inequalities(model, work, options.h, options.kappa, 1.0)
     soft, _ = residuals(model, work, options.h, q, v, u)
-    if not place(model, work, options.h, q, guess.velocity, 1.0):
+    placed = True  # a rollout guesses the incoming velocity: there already
+    for d in range(v.shape[0]):
+        placed = placed and guess.velocity[d] == v[d]
+    if not placed and not place(model, work, options.h, q, guess.velocity, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 0.0)
     hard, _ = residuals(model, work, options.h, q, v, u)
