@@ -15,13 +15,13 @@ cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn
 
 The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
 solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
-iterate is, the impulses in use are those of the law there, but for a change of tolerance/2 in all (`moved` bounds it,
+iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`moved` bounds it,
 cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution makes the
 cluster near, and the step is solved again.
 
-Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(impulse), with the lever, per
-gap, slip and turn; 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular velocity of the body, 17:23 force and
-moment about the centre of mass when the law was evaluated, 23 whether it was.
+Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(wrench about O) per gap, slip
+and turn; and of the body when the law was evaluated, 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular
+velocity; 17:23 force and moment about the centre of mass, 23 the smallest gap (0: not evaluated).
 Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: largest distance from the centre of mass,
 5 M, 6 largest friction, 7 T.
 """
@@ -72,13 +72,11 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
             if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
                 a = 0.0
         work.far[c, 0] = a
-        if a > 0.0:
-            _bound_changes(model, work, options.kappa, c, a)
         if a == 0.0 or not known:
             work.far[c, 23] = 0.0
         _enlist(model, work, c)
         c = model.cluster_end[c]
-    work.far_law[1] = 0.5 * options.tolerance / max(1, work.counts[1])
+    work.far_law[1] = options.tolerance / max(1, work.counts[1])
 
 
 @kernel
@@ -118,21 +116,6 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
     """e a^2/(n kappa) of a cluster at the gap a, see above."""
     p = model.cluster[c]
     return (p[6] * p[6] + h * (1.0 + p[6])) * p[5] + h * (1.0 + p[6]) * p[7] * a
-
-
-@kernel
-def _bound_changes(model: Model, work: Work, kappa: float, c: int, a: float) -> None:
-    """far[c, 1:4]: how much the impulses of the cluster can change beyond the gap a, times their lever about O."""
-    i = model.contact_body[c]
-    mu = model.cluster[c, 6]
-    lever = 1.0 + model.cluster[c, 4]
-    for k in range(3):
-        lever += abs(work.pos2[i, k] - work.origin[k])
-    push = lever * (model.cluster_end[c] - c) * kappa / a
-    row = work.far[c]
-    row[1] = push * (1.0 + mu) / a
-    row[2] = push * mu * mu / a
-    row[3] = push * (1.0 + mu)
 
 
 @kernel

@@ -6,6 +6,7 @@ features one by one. All on one core, in interleaved rounds; what is compiled fo
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from dojo_opt.report import lean_figure
 from dojo_opt.report.clock import ratio
-from dojo_opt.report.lean_measure import Cost, costs, new_process
+from dojo_opt.report.lean_measure import HEAVY, Cost, costs, new_process
 from dojo_opt.report.lean_scenes import (
     DISTANCES,
     FAR,
@@ -50,7 +51,7 @@ class Lean:
     def run(self, progress: Progress) -> Report:
         """Measure."""
         flags = " --quick" if self.quick else ""
-        rounds = 7 if self.quick else 60
+        rounds = 15 if self.quick else 100
         if self.mechanism is not None:
             report = Report("What each feature costs", f"dojo-opt report lean ROBOT.urdf{flags}")
             with threads(1):
@@ -145,35 +146,42 @@ def _distance(report: Report, rounds: int) -> None:
 
 
 def _processes(report: Report, progress: Progress, *, cold: bool) -> None:
-    """Kernels, processor time and modules of new processes: the plain pendulum, and the one with a contact."""
+    """Modules that new processes import, and, with an empty cache, what they compile: without and with a contact."""
     names = ["pendulum", "+ cone"]
     runs = {name: new_process(name, cold=cold) for name in progress([(n, n) for n in names], "new process")}
+    heavy = sum(len(run["modules"]) for run in runs.values())
+    report.rows.append(
+        Row("heavy libraries imported by a simulation", float(heavy), "", 0.0, note="none of " + ", ".join(HEAVY))
+    )
     report.details["processes"] = {"cold": cold, **runs}
-    lines: list[list[Any]] = []
-    for name, run in runs.items():
-        packages: dict[str, int] = {}
-        for kernel in run["kernels"]:
-            module = kernel.rpartition(".")[0].removeprefix("sim.").removeprefix("solvers.")
-            packages[module] = packages.get(module, 0) + 1
-        listing = ", ".join(f"{module} {n}" for module, n in packages.items())
-        lines.append([name, run["seconds"], len(run["kernels"]), listing])
-    what = "an empty cache" if cold else "a filled cache (the time to load; without --quick, to compile)"
-    header = ("", "CPU seconds", "kernels", "by module")
-    note = "Limits, and contacts of every law, share one interior point: with any of them, all of it is compiled."
-    report.tables.append(Table(f"Steps and derivatives in a new process with {what}", header, lines, note))
+    if not cold:
+        report.notes.append("quick: nothing is compiled in a process of its own, so no kernels are counted")
+        return
     plain, full = runs.values()
-    extra = sorted(set(full["kernels"]) - set(plain["kernels"]))
-    report.details["kernels without contacts and limits"] = plain["kernels"]
-    report.details["kernels for contacts and limits"] = extra
-    contact = [name for name in plain["kernels"] if name.startswith(CONTACT_KERNELS)]
+    unwanted = [name for name in plain["kernels"] if name.startswith(CONTACT_KERNELS)]
+    saved = plain["seconds"] / full["seconds"]
     report.rows += [
-        Row("kernels of the interior point compiled for a pendulum", float(len(contact)), "", 0.0),
+        Row("kernels of contacts and limits compiled for a pendulum", float(len(unwanted)), "", 0.0),
         Row("kernels: pendulum / with a contact", len(plain["kernels"]) / len(full["kernels"]), ""),
-        Row("heavy libraries imported by a simulation", float(len(plain["modules"] + full["modules"])), "", 0.0),
+        Row("CPU seconds to compile: pendulum / with a contact", saved, "", note="of steps and derivatives"),
     ]
-    if cold:
-        saved = plain["seconds"] / full["seconds"]
-        report.rows.append(Row("CPU seconds to compile: pendulum / with a contact", saved, ""))
+    report.tables.append(
+        Table(
+            "Steps and derivatives in a new process with an empty cache",
+            ("", "CPU seconds", "kernels", "by module"),
+            [
+                [name, run["seconds"], str(len(run["kernels"])), _by_module(run["kernels"])]
+                for name, run in runs.items()
+            ],
+            "Limits, and contacts of every law, share one interior point: with any of them, all of it is compiled.",
+        )
+    )
+
+
+def _by_module(kernels: list[str]) -> str:
+    """Numbers of kernels, by the module they are in."""
+    modules = Counter(name.split(".")[-2] for name in kernels)
+    return ", ".join(f"{module} {count}" for module, count in modules.items())
 
 
 CONTACT_KERNELS = tuple(

@@ -24,6 +24,10 @@ def pendulum(details: dict[str, Any]) -> Any:
             right.plot([r["distance"] for r in points], [r["step"] for r in points], marker="o", **marks)
     right.axhline(details["none"]["step"], color="0.5", linestyle=":", label="without them")
     right.set(xscale="log", yscale="log", xlabel="distance of the wall [m]", ylabel="step [us]")
+    for axis in (right.xaxis, right.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
+    right.set_yticks([3.0, 5.0, 10.0, 20.0, 50.0, 100.0])
     right.set_title("100 contacts that face a wall; hollow: far")
     right.legend(frameon=False)
     return figure
@@ -51,4 +55,4 @@ def _bars(axes: Any, rows: Sequence[dict[str, Any]]) -> None:
     axes.invert_yaxis()
     axes.set_xlabel("processor time [us]")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="lower right")
+    axes.legend(frameon=False, loc="upper right")

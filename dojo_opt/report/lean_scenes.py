@@ -19,7 +19,7 @@ from sim.parts import Contact
 from sim.simulator import Simulator
 
 MANY = 100  # contacts at once
-FAR = 40.0  # [m] to the wall that they might touch
+FAR = 50.0  # [m] to the wall that they might touch
 TIME_STEP = 0.01
 DISTANCES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # [m] of the wall
 KAPPAS = (1e-4, 1e-6, 1e-8)  # [N s m]
