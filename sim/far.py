@@ -52,7 +52,7 @@ def cluster_gap(model: Model, c: int, pos: Matrix, rot: Matrix) -> float:
 def choose_far(model: Model, work: Work, options: Options) -> None:
     """Sort contacts into near and far ones, from configuration 2 and the motion that led there.
 
-    Impulses of the step before stand until the motion changes them, unless `forget_far` was called in between.
+    Impulses of the step before stand until the motion changes them, unless another motion began in between (rollout.py).
     """
     known = work.far_law[0] == options.kappa
     work.far_law[0] = options.kappa
@@ -77,12 +77,6 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         _enlist(model, work, c)
         c = model.cluster_end[c]
     work.far_law[1] = options.tolerance / max(1, work.counts[1])
-
-
-@kernel
-def forget_far(work: Work) -> None:
-    """Begin a motion: what is known of far contacts belongs to another one."""
-    work.far_law[0] = 0.0
 
 
 @kernel
