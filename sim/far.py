@@ -52,7 +52,7 @@ def cluster_gap(model: Model, c: int, pos: Matrix, rot: Matrix) -> float:
 def choose_far(model: Model, work: Work, options: Options) -> None:
     """Sort contacts into near and far ones, from configuration 2 and the motion that led there.
 
-    Impulses of the step before stand until the motion changes them, unless another motion began in between (rollout.py).
+    Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
     known = work.far_law[0] == options.kappa
     work.far_law[0] = options.kappa
