@@ -96,18 +96,7 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
         for dof, sign, bound in _bounds(joint):
             model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
             model.limit_cone[limit] = sign == _CONE
-            model.limit_mobility[limit] = _joint_mobility(model, i, dof < joint.ntrans)
             limit += 1
-
-
-def _joint_mobility(model: Model, i: int, along: bool) -> float:
-    """Bound of d(velocity)/d(impulse) of joint i, along an axis or about one: its two bodies as if they were free."""
-    total = 0.0
-    for body, point in ((i, model.joint_child_point[i]), (int(model.body_parent[i]), model.joint_parent_point[i])):
-        if body >= 0:
-            mass, turning = _mobility(model, body)
-            total += mass + float(point @ point) * turning if along else turning
-    return total
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:

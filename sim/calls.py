@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
 from sim.build import bind
-from sim.layout import allocate_work, sizes_of, table
+from sim.layout import allocate_work, sizes_of, table, work_view
 from sim.model import Integers, Model, Vector
 from sim.policy import Path, Policy, closed_loop
 from solvers.status import Status
@@ -181,6 +181,14 @@ class Calls:
         settings, works = self.settings.array(), self._chunks(n)
         rollout.roll_batch(self._model, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
         return xs, status, knots
+
+    def far(self) -> NDArray[np.bool_]:
+        """Which contacts were far in the last step of this thread, (ncontact,)."""
+        out = np.ones(self.sizes.ncontact, dtype=bool)
+        work = work_view(self._work())
+        for first, last in work.near[: work.counts[0]]:
+            out[first:last] = False
+        return out
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

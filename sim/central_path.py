@@ -63,14 +63,17 @@ def first_attempt(
     Leaves the iterate at the start of attempt 0.
     """
     q, v, u = inputs
-    if work.count[3] + work.count[1] == 0:  # nothing to be on the central path of
+    if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         return 0 if place(model, work, options.h, q, guess.velocity, 1.0) else 1
     keep_inequalities(model, work)
     if not place(model, work, options.h, q, v, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 1.0)
     soft, _ = residuals(model, work, options.h, q, v, u)
-    if not place(model, work, options.h, q, guess.velocity, 1.0):
+    placed = True  # a rollout guesses the incoming velocity: there already
+    for d in range(v.shape[0]):
+        placed = placed and guess.velocity[d] == v[d]
+    if not placed and not place(model, work, options.h, q, guess.velocity, 1.0):
         return 1
     start_inequalities(model, work, options.h, options.kappa, 0.0)
     hard, _ = residuals(model, work, options.h, q, v, u)

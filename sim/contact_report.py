@@ -15,10 +15,9 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
     worst = -1.0
     error = 0.0
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
             if e > error:
@@ -33,7 +32,7 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
 
     (ncontact, 11)
     """
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         first = work.far_first[m]
         contact_kinematics(model, work, h, first, model.cluster_end[first])
     for c in range(model.contact_height.shape[0]):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.build import mechanism_sizes
+from sim.left_out import reach
 from sim.mechanism import Mechanism
 from sim.parts import Joint
 
@@ -29,6 +30,7 @@ def describe(sim: Simulator) -> str:
         *_contact_lines(mech),
         "a step",
         *(f"  {what:<18}{state}" for what, state in _parts(mech)),
+        *_far_lines(sim),
     ]
     return "\n".join(lines)
 
@@ -67,6 +69,17 @@ def _contact_lines(mech: Mechanism) -> list[str]:
         shape = f"ball of {c.radius:g} m" if c.radius else "point"
         lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}")
     return lines
+
+
+def _far_lines(sim: Simulator) -> list[str]:
+    """From how far on contacts are left out of the solver at this kappa and tolerance."""
+    if not sim.ncontact:
+        return []
+    distances = reach(sim.model, sim.time_step, sim.kappa, sim.tolerance)
+    last = int(np.argmax(distances))
+    nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
+    span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {sim.mechanism.contact_names[last]} {farthest} m"
+    return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
 
 
 def _parts(mech: Mechanism) -> list[tuple[str, str]]:

@@ -6,20 +6,22 @@ no part of its matrix. Contacts of one body against one direction are a cluster,
 
 A cluster is far when its stiffness, in units of the inertia behind it, cannot be seen at the tolerance of the step:
 
-    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 100 tolerance
+    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
 
 for n contacts (all of the mechanism, so that the sum holds), a: half the gap that is ahead. With W the largest
 |J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds the velocity
 per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ within a
 cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with the body.
-The gradient leaves out a part e of the inertia. The step leaves out no force: wherever an
-iterate is, the impulses in use are those of the law there, but for a change of tolerance/2 in all (`moved` bounds it,
+
+The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
+solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
+iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`moved` bounds it,
 cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution makes the
 cluster near, and the step is solved again.
 
-Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(impulse), with the lever, per
-gap, slip and turn; 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular velocity of the body, 17:23 force and
-moment about the centre of mass when the law was evaluated, 23 whether it was.
+Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(wrench about O) per gap, slip
+and turn; and of the body when the law was evaluated, 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular
+velocity; 17:23 force and moment about the centre of mass, 23 the smallest gap (0: not evaluated).
 Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: largest distance from the centre of mass,
 5 M, 6 largest friction, 7 T.
 """
@@ -30,7 +32,7 @@ from sim.model import Matrix, Model, Options, Work
 from sim.rotation import rotate
 from solvers.jit import kernel
 
-_STIFFNESS = 100.0  # largest e, in units of the tolerance
+STIFFNESS = 1000.0  # largest e, in units of the tolerance
 
 
 @kernel
@@ -50,57 +52,59 @@ def cluster_gap(model: Model, c: int, pos: Matrix, rot: Matrix) -> float:
 def choose_far(model: Model, work: Work, options: Options) -> None:
     """Sort contacts into near and far ones, from configuration 2 and the motion that led there.
 
-    Impulses of the step before stand until the motion changes them, unless `forget_far` was called in between.
+    Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
     known = work.far_law[0] == options.kappa
     work.far_law[0] = options.kappa
     count = model.contact_height.shape[0]
+    least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
+    work.counts[0] = 0
+    work.counts[1] = 0
     c = 0
     while c < count:
-        a = _half_gap_ahead(model, work, c)
-        row = work.far[c]
-        if a > 0.0 and count * _stiffness(model, options.h, options.kappa, c, a) <= _STIFFNESS * options.tolerance:
-            row[23] = row[23] if known else 0.0
-            _bound_changes(model, work, options.kappa, c, a)
-        else:
-            row[0] = 0.0
-            row[23] = 0.0
+        i = model.contact_body[c]
+        n = model.contact_frame[c]
+        most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
+        most = 0.5 * (most + model.cluster[c, 4])  # no contact has more: a quick no, for most
+        a = 0.0
+        if most > 0.0 and _stiffness(model, options.h, c, most) <= least * most * most:
+            a = _half_gap_ahead(model, work, c)
+            if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
+                a = 0.0
+        work.far[c, 0] = a
+        if a == 0.0 or not known:
+            work.far[c, 23] = 0.0
+        _enlist(model, work, c)
         c = model.cluster_end[c]
-    _sort(model, work)
-    work.far_law[1] = 0.5 * options.tolerance / max(1, work.count[2])
+    _enlist_pairs(model, work)
+    work.far_law[1] = options.tolerance / max(1, work.counts[1])
 
 
 @kernel
-def forget_far(work: Work) -> None:
-    """Begin a motion: what is known of far contacts belongs to another one."""
-    work.far_law[0] = 0.0
-
-
-@kernel
-def _sort(model: Model, work: Work) -> None:
-    """near: runs of contacts whose clusters are near; far_first: the first contact of each far cluster."""
-    runs = 0
-    far = 0
-    c = 0
-    while c < model.contact_height.shape[0]:
-        end = model.cluster_end[c]
-        if work.far[c, 0] > 0.0:
-            work.far_first[far] = c
-            far += 1
-        elif runs > 0 and work.near[runs - 1, 1] == c:
-            work.near[runs - 1, 1] = end
-        else:
-            work.near[runs, 0] = c
-            work.near[runs, 1] = end
-            runs += 1
-        c = end
-    work.count[0] = runs
-    work.count[2] = far
-    if model.contact_body.shape[0] > c:  # pairs of bodies
-        work.near[runs, 0] = c
+def _enlist_pairs(model: Model, work: Work) -> None:
+    """One more run of near: the contacts between bodies."""
+    runs = work.counts[0]
+    if model.contact_body.shape[0] > model.contact_height.shape[0]:
+        work.near[runs, 0] = model.contact_height.shape[0]
         work.near[runs, 1] = model.contact_body.shape[0]
         runs += 1
-    work.count[3] = runs
+    work.counts[2] = runs
+
+
+@kernel
+def _enlist(model: Model, work: Work, c: int) -> None:
+    """Append a cluster to far_first, or its contacts to the runs of near."""
+    end = model.cluster_end[c]
+    runs = work.counts[0]
+    if work.far[c, 0] > 0.0:
+        work.far_first[work.counts[1]] = c
+        work.counts[1] += 1
+    elif runs > 0 and work.near[runs - 1, 1] == c:
+        work.near[runs - 1, 1] = end
+    else:
+        work.near[runs, 0] = c
+        work.near[runs, 1] = end
+        work.counts[0] += 1
 
 
 @kernel
@@ -114,39 +118,28 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
 
 
 @kernel
-def _stiffness(model: Model, h: float, kappa: float, c: int, a: float) -> float:
-    """e of one contact of a cluster at the gap a, see above."""
+def _stiffness(model: Model, h: float, c: int, a: float) -> float:
+    """e a^2/(n kappa) of a cluster at the gap a, see above."""
     p = model.cluster[c]
-    mu = p[6]
-    return kappa * ((mu * mu + h * (1.0 + mu)) * p[5] / a + h * (1.0 + mu) * p[7]) / a
-
-
-@kernel
-def _bound_changes(model: Model, work: Work, kappa: float, c: int, a: float) -> None:
-    """far[c, :4]: a, and how much the impulses of the cluster can change beyond that gap, times their lever about O."""
-    i = model.contact_body[c]
-    mu = model.cluster[c, 6]
-    lever = 1.0 + model.cluster[c, 4]
-    for k in range(3):
-        lever += abs(work.pos2[i, k] - work.origin[k])
-    push = lever * (model.cluster_end[c] - c) * kappa / a
-    row = work.far[c]
-    row[0] = a
-    row[1] = push * (1.0 + mu) / a
-    row[2] = push * mu * mu / a
-    row[3] = push * (1.0 + mu)
+    return (p[6] * p[6] + h * (1.0 + p[6])) * p[5] + h * (1.0 + p[6]) * p[7] * a
 
 
 @kernel
 def came_near(model: Model, work: Work) -> bool:
     """Whether a far cluster is not, at configuration 3; it is near from now on."""
     found = False
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         if cluster_gap(model, c, work.pos3, work.rot3) < work.far[c, 0]:
             found = True
             work.far[c, 0] = 0.0
             work.far[c, 23] = 0.0
     if found:
-        _sort(model, work)
+        work.counts[0] = 0
+        work.counts[1] = 0
+        c = 0
+        while c < model.contact_height.shape[0]:
+            _enlist(model, work, c)
+            c = model.cluster_end[c]
+        _enlist_pairs(model, work)
     return found

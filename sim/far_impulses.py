@@ -10,6 +10,7 @@ from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
 
 _LINEAR = int(Law.LINEAR)
+_NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulses are evaluated again
 _ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
@@ -34,6 +35,8 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
         w += abs(omega)
     arm = model.cluster[c, 4]
     turn = _ANGLE * dq
+    if dx + arm * turn > _NEARER * row[23]:
+        return True
     change = row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)) + row[3] * turn
     return not change <= work.far_law[1]
 
@@ -41,7 +44,7 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
 @kernel
 def far_impulses(model: Model, work: Work, h: float) -> None:
     """Impulses of the far clusters at configuration 3, evaluated again where they may have changed."""
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         if moved(model, work, h, c):
             _evaluate(model, work, h, c)
@@ -66,7 +69,23 @@ def _keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
         row[8 + k] = work.quat3[i, 1 + k]
         row[11 + k] = (work.pos3[i, k] - work.pos2[i, k]) / h
         row[14 + k] = 2.0 / h * work.turn[i, 1 + k]
-    row[23] = 1.0
+
+
+@kernel
+def _bound_changes(model: Model, work: Work, c: int, gap: float) -> None:
+    """far[c, 1:3]: how much the wrench of a cluster can change beyond this gap, with the lever about O.
+
+    d gamma <= kappa/gap^2 d(gap),   d beta <= mu d gamma + mu^2 kappa/gap^2 d(slip)
+    """
+    i = model.contact_body[c]
+    mu = model.cluster[c, 6]
+    lever = 1.0 + model.cluster[c, 4]
+    for k in range(3):
+        lever += abs(work.pos2[i, k] - work.origin[k])
+    push = (model.cluster_end[c] - c) * work.far_law[0] / gap
+    row = work.far[c]
+    row[1] = lever * push * (1.0 + mu) / gap
+    row[2] = lever * push * mu * mu / gap
 
 
 @kernel
@@ -94,10 +113,12 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     N, X, Y, rX, rY = 0.0, 0.0, 0.0, 0.0, 0.0
     N0, N1, N2, X0, X1, X2, Y0, Y1, Y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     kappa = work.far_law[0]
+    least = 1e300
     for k in range(c, model.cluster_end[c]):
         p = model.contact_point[k]
         rho = model.contact_radius[k]
         gap = max(D - model.contact_height[k] + n0 * p[0] + n1 * p[1] + n2 * p[2] - rho, row[0])
+        least = min(least, gap)
         x = va + a0 * p[0] + a1 * p[1] + a2 * p[2] - rho * ra
         y = vb + b0 * p[0] + b1 * p[1] + b2 * p[2] - rho * rb
         if model.contact_law[k] == _LINEAR:
@@ -117,6 +138,10 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
         N0, N1, N2 = N0 + fn * p[0], N1 + fn * p[1], N2 + fn * p[2]
         X0, X1, X2 = X0 + fx * p[0], X1 + fx * p[1], X2 + fx * p[2]
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
+    row[23] = least
+    _bound_changes(model, work, c, (1.0 - _NEARER) * least)
+    turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
+    row[3] = turning / (1.0 - _NEARER)  # the arms of the impulses turn with the body
     nx, ny, nz = cross(*rotate(R, i, N0, N1, N2), f[0], f[1], f[2])
     ax, ay, az = cross(*rotate(R, i, X0, X1, X2), f[3], f[4], f[5])
     bx, by, bz = cross(*rotate(R, i, Y0, Y1, Y2), f[6], f[7], f[8])
@@ -131,7 +156,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
 @kernel
 def add_far_wrenches(model: Model, work: Work) -> None:
     """wrench -= impulses of the far clusters, about O."""
-    for m in range(work.count[2]):
+    for m in range(work.counts[1]):
         c = work.far_first[m]
         i = model.contact_body[c]
         row = work.far[c]

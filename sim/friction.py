@@ -89,7 +89,7 @@ def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
 def slip_noise(model: Model, work: Work, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             i = model.contact_body[c]
             k = work.contact_kin[c]

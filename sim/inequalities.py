@@ -1,6 +1,6 @@
-"""All near contacts and limits of a step at once: what the interior point asks of them, one verb per kernel.
+"""All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
 
-Those that are far (far.py) have no part in its variables and its matrix.
+Far contacts (far.py) have no part in its variables and its matrix.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, i
 
 @kernel
 def inequality_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gaps and slips of near contacts and of limits, impulses of far contacts, at configuration 3."""
-    for m in range(work.count[0]):
+    """Gaps and slips of near contacts, impulses of far ones, gaps of limits, at configuration 3."""
+    for m in range(work.counts[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
     pair_kinematics(model, work, h)
@@ -54,23 +54,21 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     """
     k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             d = -work.contact_kin[c, 0]
             if d > 0.0:
                 k0 = max(k0, growth * 0.3 * model.body_mass[model.contact_body[c]] * d * d / h)
                 floor = max(floor, 0.5 * d)
-    for m in range(work.count[1]):
-        j = work.near_limit[m]
+    for j in range(model.limit_dof.shape[0]):
         d = -work.bound_gap[j]
         if d > 0.0:
             k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             start_contact(model, work, c, k0, floor)
-    for m in range(work.count[1]):
-        j = work.near_limit[m]
+    for j in range(model.limit_dof.shape[0]):
         s = max(work.bound_gap[j], floor)
         work.bound[j, 0] = s
         work.bound[j, 1] = k0 / s
@@ -81,22 +79,21 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
 def apply_inequalities(model: Model, work: Work) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
             r = max(r, contact_error(model, work, c))
     add_far_wrenches(model, work)
     r = max(r, apply_pairs(model, work))
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
     return r
 
 
 @kernel
 def apply_limits(model: Model, work: Work) -> None:
-    """residual -= sign gamma, of near and far limits, and p gamma of a cone."""
+    """residual -= sign gamma, and p gamma of a cone."""
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, work, k, -work.bound[k, 1], work.residual)
 
@@ -111,7 +108,7 @@ def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> N
 @kernel
 def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)"""
-    for m in range(work.count[0]):
+    for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
             condense_contact(model, work, c, kappa)
@@ -123,7 +120,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix)
 @kernel
 def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
     """A2 -= contacts: slips depend on pose 2."""
-    for m in range(work.count[0]):
+    for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             add_slip_jacobian(model, work, h, c)
 
@@ -134,7 +131,7 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
-    for m in range(work.count[0]):
+    for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_constant(model, work, c, goal)
             w = work.contact_w[c]
@@ -151,7 +148,7 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
 @kernel
 def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             recover_contact(model, work, h, c, share)
     recover_limits(model, work, h, share)
@@ -163,14 +160,13 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
     total = 0.0
     count = 0.0
     violation = 0.0
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             t, n, low, high = contact_products(model, work, c)
             total += t
             count += n
             violation = max(violation, high - kappa, kappa - low)
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         t = work.bound[k, 0] * work.bound[k, 1]
         total += t
         count += 1.0
@@ -182,7 +178,7 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
 def slip_error(model: Model, work: Work, kappa: float) -> float:
     """Largest violation of the friction law of the central path of kappa, in units of kappa."""
     e = 0.0
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             e = max(e, slip_violation(model, work, c, kappa))
     return e
@@ -193,13 +189,12 @@ def products_ahead(model: Model, work: Work, alpha: float) -> float:
     """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
     total = 0.0
     count = 0.0
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             t, n = contact_products_ahead(model, work, c, alpha)
             total += t
             count += n
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
         d = work.bound_step[k]
         total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
@@ -211,11 +206,10 @@ def products_ahead(model: Model, work: Work, alpha: float) -> float:
 def boundary_step(model: Model, work: Work) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
     a = 1e30
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             a = min(a, contact_boundary(model, work, c))
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
         d = work.bound_step[k]
         a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
@@ -225,12 +219,11 @@ def boundary_step(model: Model, work: Work) -> float:
 @kernel
 def keep_inequalities(model: Model, work: Work) -> None:
     """Remember the cone variables from which the line search starts."""
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             for k in range(12):
                 work.cone_trial[c, k] = work.cone[c, k]
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         work.bound_trial[k, 0] = work.bound[k, 0]
         work.bound_trial[k, 1] = work.bound[k, 1]
     keep_loops(model, work)
@@ -239,13 +232,12 @@ def keep_inequalities(model: Model, work: Work) -> None:
 @kernel
 def move_inequalities(model: Model, work: Work, alpha: float) -> None:
     """cone = kept + alpha step."""
-    for m in range(work.count[3]):
+    for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             for k in range(12):
                 work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
             keep_in_cone(model, work, c)
-    for m in range(work.count[1]):
-        k = work.near_limit[m]
+    for k in range(model.limit_dof.shape[0]):
         work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
         work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
     move_loops(model, work, alpha)

@@ -37,7 +37,6 @@ from sim.inequalities import (
 )
 from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
-from sim.limits import choose_far_limits, limits_came_near
 from sim.model import Goal, Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
 from solvers.jit import inlined, kernel
@@ -241,11 +240,10 @@ def interior_point(
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     choose_far(model, work, options)
-    choose_far_limits(model, work, options, q, v)
     while True:
         for attempt in range(first_attempt(model, work, options, (q, v, u), guess), _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations)
             if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
                 break
-        if not (came_near(model, work) or limits_came_near(model, work)):
+        if not came_near(model, work):
             return out

@@ -39,11 +39,11 @@ MODEL_FLOATS = _shapes(
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_frame nground 9,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, loop_point nloop 6,
     loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9, limit_sign nlimit, limit_bound nlimit,
-    limit_mobility nlimit, input_wrench nu 6, gravity 3
+    input_wrench nu 6, gravity 3
     """
 )
 
-WORK_INTS = _shapes("count 4, near ncontact 2, near_limit nlimit, far_first nground")
+WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground")
 
 WORK_FLOATS = _shapes(
     """
@@ -63,7 +63,7 @@ WORK_FLOATS = _shapes(
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
-    far nground 24, far_limit nlimit, far_law 2
+    far nground 24, far_law 2
     """
 )
 

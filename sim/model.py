@@ -108,7 +108,6 @@ class Model(NamedTuple):
     loop_axis: Matrix  # (nloop, 9) two directions across the free axis, and the axis, joint frame
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
-    limit_mobility: Vector  # (nlimit,) bound of d(velocity)/d(impulse) of its degree of freedom [1/kg, 1/(kg m^2)]
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
     gravity: Vector  # (3,) [m/s^2]
 
@@ -154,13 +153,11 @@ class Work(NamedTuple):
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
-    # near and far
-    count: Integers  # (4,) runs of near contacts, near limits, far clusters
+    # near and far contacts
+    counts: Integers  # (3,) runs of near contacts with the ground, far clusters, runs with that of the pairs
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
-    near_limit: Integers  # (nlimit,) the near limits
     far_first: Integers  # (nground,) first contacts of the far clusters
     far: Matrix  # (nground, 24) see far.py
-    far_limit: Vector  # (nlimit,) gap below which a far limit is near, 0 for a near one
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables, see contact.py

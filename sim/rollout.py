@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.contact_report import report_contacts
-from sim.far import forget_far
 from sim.gradients import gradient
 from sim.layout import model_view, work_view
 from sim.model import Guess, Integers, Matrix, Options, Vector, Work
@@ -42,7 +41,7 @@ class Linearized(NamedTuple):
 @kernel
 def begin(work: Work, settings: Vector) -> Options:
     """Settings of a motion that begins here."""
-    forget_far(work)
+    work.far_law[0] = 0.0  # what is known of far contacts (far.py) belongs to another motion
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 

@@ -13,6 +13,7 @@ from sim.border import whole
 from sim.calls import Settings
 from sim.describe import describe
 from sim.horizon import Horizon
+from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
 from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
 from sim.states import States
@@ -89,6 +90,13 @@ class Simulator(States):
     def describe(self) -> str:
         """What the scene consists of, what a step computes, and what is left out because nothing needs it."""
         return describe(self)
+
+    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
+        """Names of the contacts that the step from x is solved without, because they are far.
+
+        Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
+        """
+        return left_out(self, x, u)
 
     def step(self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False) -> StepResult:
         """One time step from x under the input u (zero when left out)."""

@@ -27,7 +27,7 @@ class Maps:
         self.model_at = table(self.model)
         self.work = allocate_work(sizes_of(self.model))
         for array in self.work:
-            array[...] = np.nan
+            array[...] = np.nan if array.dtype.kind == "f" else -(2**62)
         self.work_at = table(self.work)
         self.nx, self.ndx = mech.nq + mech.nv, 2 * mech.nv
 

@@ -1,0 +1,244 @@
+"""Report `lean`: what a scene leaves out, and what that saves.
+
+One pendulum gets limits, a spring, a contact, friction, and a hundred contacts more, far and near; a robot loses its
+features one by one. All on one core, in interleaved rounds; what is compiled for a scene, in a process of its own.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.report import lean_figure
+from dojo_opt.report.clock import ratio
+from dojo_opt.report.lean_measure import HEAVY, Cost, costs, new_process
+from dojo_opt.report.lean_scenes import (
+    DISTANCES,
+    FAR,
+    KAPPAS,
+    MANY,
+    Scene,
+    absent,
+    along,
+    features,
+    pendulum_scene,
+    robot_scene,
+    without,
+)
+from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.report.study import Progress
+from sim.left_out import reach
+from sim.mechanism import Mechanism
+from solvers.jit import threads
+
+ABSENT = 1.05  # of the time of a model that never had the feature: what two runs of the same model differ by
+SHARE = 0.03  # of a near contact
+
+_COSTS = ("", "velocities", "variables", "left out", "bytes", "iterations", "step us", "gradient us")
+
+
+@dataclass(frozen=True)
+class Lean:
+    """The pendulum, or a mechanism and what each of its features costs."""
+
+    quick: bool = False
+    mechanism: Mechanism | None = None
+    time_step: float = 0.01  # [s] of a mechanism
+
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        flags = " --quick" if self.quick else ""
+        rounds = 15 if self.quick else 100
+        if self.mechanism is not None:
+            report = Report("What each feature costs", f"dojo-opt report lean ROBOT.urdf{flags}")
+            with threads(1):
+                _robot(report, self.mechanism, self.time_step, rounds, progress)
+            return report
+        report = Report("What a scene leaves out", f"dojo-opt report lean{flags}")
+        report.summary = (
+            "A pendulum of one link to which features are added one by one, each compared with the scene that never "
+            f"had it; then {MANY} contacts that face a wall {FAR:g} m away, against {MANY} that are over the floor. "
+            "Times are processor time on one core, medians over interleaved rounds; ratios are taken round by round."
+        )
+        with threads(1):
+            for measure in progress([("features", _features), ("absent", _absent), ("distance", _distance)], "lean"):
+                measure(report, rounds)
+        _processes(report, progress, cold=not self.quick)
+        report.figure = lean_figure.pendulum(report.details)
+        return report
+
+
+def _features(report: Report, rounds: int) -> None:
+    """The pendulum with one feature more in every row, and what one far contact costs of a near one."""
+    measured = costs([pendulum_scene(name, mechanism) for name, mechanism in features()], rounds)
+    report.tables.append(
+        Table(
+            "One feature more in every row",
+            _COSTS,
+            [_line(cost) for cost in measured],
+            "Variables: of the interior point. Left out: contacts that are far, whose forces are given, not "
+            "solved for. Gradient: all of d(next state)/d(state, input), without its step. The last row has the "
+            "contacts of the row before over the floor instead.",
+        )
+    )
+    report.details["features"] = [_raw(cost) for cost in measured]
+    base, far, near = measured[-3:]
+    for what in ("step", "gradient", "total"):
+        t0, t1, t2 = (np.asarray(getattr(cost, what)) for cost in (base, far, near))
+        share = float(np.median((t1 - t0) / (t2 - t0)))
+        note = f"{_us(t1 - t0) / MANY * 1e3:.3g} of {_us(t2 - t0) / MANY * 1e3:.3g} ns per contact"
+        name = {"total": "step and gradient"}.get(what, what)
+        report.rows.append(Row(f"far contact / near contact: {name}", share, "", SHARE, note=note))
+    report.rows.append(Row(f"{MANY} far contacts / none: step", ratio(far.step, base.step), "", note="the whole step"))
+
+
+def _absent(report: Report, rounds: int) -> None:
+    """Features that a model mentions and does not have, against one that never had them; and a model against itself."""
+    cases = absent()
+    scenes = [pendulum_scene(what, mechanism) for what, *both in cases for mechanism in both]
+    measured = costs([*scenes, scenes[0]], rounds)
+    for k, (what, *_) in enumerate(cases):
+        never, absent_here = measured[2 * k : 2 * k + 2]
+        value = ratio(absent_here.total, never.total)
+        note = "bytes and unknowns equal" if absent_here[1:5] == never[1:5] else "bytes or unknowns DIFFER"
+        report.rows.append(Row(f"absent {what}: step and gradient / never had it", value, "", ABSENT, note=note))
+        same = float(absent_here[1:5] != never[1:5])
+        report.rows.append(Row(f"absent {what}: sizes that differ", same, "", 0.0))
+    noise = ratio(measured[-1].total, measured[0].total)
+    report.rows.append(Row("the same model twice: step and gradient", noise, "", note="the noise of the rows above"))
+    report.details["absent"] = [_raw(cost) for cost in measured]
+
+
+def _distance(report: Report, rounds: int) -> None:
+    """A step with the wall at many distances, at several kappa; and from where on its contacts are far."""
+    cone = dict(features())["+ cone"]
+    grid = [(kappa, distance) for kappa in KAPPAS for distance in DISTANCES]
+    scenes = [
+        pendulum_scene(f"{kappa:g} {distance:g}", along(cone, MANY, friction=0.5, distance=distance), kappa)
+        for kappa, distance in grid
+    ]
+    measured = costs([*scenes, pendulum_scene("none", cone)], max(3, rounds // 6))
+    report.details["distance"] = [
+        {"kappa": kappa, "distance": distance, **_raw(cost)}
+        for (kappa, distance), cost in zip(grid, measured, strict=False)
+    ]
+    report.details["none"] = _raw(measured[-1])
+    lines: list[list[Cell]] = []
+    for k, distance in enumerate(DISTANCES):
+        line = measured[k : len(grid) : len(DISTANCES)]
+        cells = (f"{_us(cost.step):.3g} us, {cost.far - measured[-1].far} far" for cost in line)
+        lines.append([distance, *cells])
+    sims = [scenes[k * len(DISTANCES)].simulator for k in range(len(KAPPAS))]
+    edges = [reach(sim.model, sim.time_step, sim.kappa, sim.tolerance)[-1] for sim in sims]
+    lines.append(["far from", *(f"{edge:.3g} m" for edge in edges)])
+    report.tables.append(
+        Table(
+            f"{MANY} contacts that face a wall, by its distance [m]",
+            ("", *(f"kappa {kappa:g}" for kappa in KAPPAS)),
+            lines,
+            "A contact pushes with kappa/gap at every distance. It is far where the stiffness of all together cannot "
+            "be seen at the tolerance of the step; the push stays.",
+        )
+    )
+
+
+def _processes(report: Report, progress: Progress, *, cold: bool) -> None:
+    """Modules that new processes import, and, with an empty cache, what they compile: without and with a contact."""
+    names = ["pendulum", "+ cone"]
+    runs = {name: new_process(name, cold=cold) for name in progress([(n, n) for n in names], "new process")}
+    heavy = sum(len(run["modules"]) for run in runs.values())
+    report.rows.append(
+        Row("heavy libraries imported by a simulation", float(heavy), "", 0.0, note="none of " + ", ".join(HEAVY))
+    )
+    report.details["processes"] = {"cold": cold, **runs}
+    if not cold:
+        report.notes.append("quick: nothing is compiled in a process of its own, so no kernels are counted")
+        return
+    plain, full = runs.values()
+    unwanted = [name for name in plain["kernels"] if name.startswith(CONTACT_KERNELS)]
+    saved = plain["seconds"] / full["seconds"]
+    report.rows += [
+        Row("kernels of contacts and limits compiled for a pendulum", float(len(unwanted)), "", 0.0),
+        Row("kernels: pendulum / with a contact", len(plain["kernels"]) / len(full["kernels"]), ""),
+        Row("CPU seconds to compile: pendulum / with a contact", saved, "", note="of steps and derivatives"),
+    ]
+    report.tables.append(
+        Table(
+            "Steps and derivatives in a new process with an empty cache",
+            ("", "CPU seconds", "kernels", "by module"),
+            [
+                [name, run["seconds"], str(len(run["kernels"])), _by_module(run["kernels"])]
+                for name, run in runs.items()
+            ],
+            "Limits, and contacts of every law, share one interior point: with any of them, all of it is compiled.",
+        )
+    )
+
+
+def _by_module(kernels: list[str]) -> str:
+    """Numbers of kernels, by the module they are in."""
+    modules = Counter(name.split(".")[-2] for name in kernels)
+    return ", ".join(f"{module} {count}" for module, count in modules.items())
+
+
+CONTACT_KERNELS = tuple(
+    f"sim.{name}."
+    for name in ("contact", "contact_report", "friction", "cone", "pyramid", "limits", "far", "far_impulses")
+) + ("sim.interior_point.", "sim.inequalities.", "sim.central_path.", "solvers.cones.")
+
+
+def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:
+    """A robot as it is, and without each of its features."""
+    report.summary = (
+        f"{mechanism.name}, moving freely from its neutral state with {1e3 * time_step:g} ms steps; then without each "
+        "of its features. A feature costs what the robot takes less without it: processor time on one core, medians "
+        "over interleaved rounds."
+    )
+    scenes = [robot_scene(name, variant, time_step) for name, variant in without(mechanism)]
+    measured: list[Cost] = []
+    for batch in progress([(mechanism.name, scenes)], "lean"):
+        measured = costs(batch, rounds)
+    report.tables.append(
+        Table("The robot without its features", _COSTS, [_line(cost) for cost in measured], _messages(measured))
+    )
+    whole = measured[0]
+    for cost in measured[1:]:
+        saved = 1.0 - ratio(cost.total, whole.total)
+        note = f"{_us(cost.total):.3g} of {_us(whole.total):.3g} us"
+        report.rows.append(Row(f"{cost.name} saves of step and gradient", 100.0 * saved, "%", note=note))
+    report.details["robot"] = [_raw(cost) for cost in measured]
+    report.notes += [line.strip() for line in scenes[0].simulator.describe().partition("a step\n")[2].splitlines()]
+    report.notes += _far_notes(scenes[0], whole)
+    report.figure = lean_figure.robot(mechanism.name, report.details["robot"])
+
+
+def _far_notes(scene: Scene, cost: Cost) -> list[str]:
+    """What is far where the robot stands."""
+    if not np.isfinite(cost.iterations):
+        return ["the first step from the neutral state is not solved: " + cost.message]
+    far = scene.simulator.left_out(scene.state)
+    return [f"far in the neutral state: {', '.join(far) or 'nothing'}"]
+
+
+def _messages(measured: list[Cost]) -> str:
+    """Why motions ended early."""
+    return " ".join(f"{cost.name}: {cost.message}" for cost in measured if cost.message)
+
+
+def _line(cost: Cost) -> list[Any]:
+    numbers = (cost.velocities, cost.variables, cost.far, cost.bytes, round(cost.iterations, 2))
+    return [cost.name, *(str(n) for n in numbers), _us(cost.step), _us(cost.gradient)]
+
+
+def _us(seconds: Any) -> float:
+    """Median, in microseconds."""
+    return 1e6 * float(np.median(seconds))
+
+
+def _raw(cost: Cost) -> dict[str, Any]:
+    """Every number of a cost, times in microseconds round by round."""
+    times = {f"{what}_us": (1e6 * getattr(cost, what)).tolist() for what in ("step", "knot", "gradient")}
+    return {**cost._asdict(), **times, "step": _us(cost.step), "knot": _us(cost.knot), "gradient": _us(cost.gradient)}

@@ -1,0 +1,89 @@
+"""The report `lean`: its scenes differ by what they say, and it counts what is there."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.report import Progress, lean
+from dojo_opt.report.lean_measure import costs, new_process
+from dojo_opt.report.lean_scenes import MANY, absent, features, pendulum_scene, without
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Costs of the scenes, by name."""
+    return {cost.name: cost for cost in costs([pendulum_scene(*scene) for scene in features()], 1)}
+
+
+def test_every_row_has_one_feature_more(measured):
+    variables = {name: cost.variables for name, cost in measured.items()}
+    far = {name: cost.far for name, cost in measured.items()}
+    assert all(cost.velocities == 1 and not cost.message for cost in measured.values())
+    assert (variables["pendulum"], far["pendulum"]) == (0, 0)
+    assert variables["+ limit"] == 4  # two bounds, of two variables each
+    assert variables["+ spring"] == variables["+ limit"]
+    assert variables["+ frictionless contact"] == variables["+ spring"] + 2
+    assert variables["+ cone"] == variables["+ spring"] + 4
+    assert variables[f"+ {MANY} far contacts"] == variables["+ cone"]
+    assert far[f"+ {MANY} far contacts"] == MANY
+    assert variables[f"+ {MANY} near instead"] == variables["+ cone"] + 4 * MANY
+    sizes = [cost.bytes for cost in measured.values()]
+    assert sizes[0] < sizes[1] == sizes[2] < sizes[3] == sizes[4] < sizes[5] == sizes[6]
+
+
+def test_times_are_those_of_solved_steps(measured):
+    for cost in measured.values():
+        assert cost.step.shape == (1,) and np.all(cost.step > 0.0) and cost.iterations >= 1.0
+
+
+def test_a_motion_that_does_not_get_anywhere_is_reported():
+    scene = pendulum_scene("stuck", features()[0][1])
+    scene = type(scene)("stuck", scene.simulator.replace(max_iterations=1, tolerance=1e-15), np.array([2.0, 9.0]))
+    (cost,) = costs([scene], 1)
+    assert "iteration limit" in cost.message and np.isnan(cost.step).all() and np.isnan(cost.iterations)
+
+
+@pytest.mark.parametrize(("never", "there"), [pair for _, *pair in absent()], ids=[what for what, *_ in absent()])
+def test_an_absent_feature_leaves_no_trace_in_the_model(never, there):
+    for a, b in zip(dojo.Simulator(never).model, dojo.Simulator(there).model, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_robot_loses_the_features_that_it_has():
+    hopper = dojo.models.raiberthopper(limits=(0.2, 0.8), spring=10.0)
+    names = [name for name, _ in without(hopper)]
+    assert names == ["as it is"] + [
+        f"without {what}" for what in ("friction", "contacts", "limits", "spring", "damper", "all of these")
+    ]
+    assert [name for name, _ in without(dojo.models.pendulum())] == ["as it is"]
+
+
+def test_the_report_of_a_robot():
+    hopper = dojo.models.raiberthopper(limits=(0.2, 0.8))
+    report = dojo.report.run_report("lean", quick=True, mechanism=hopper)
+    saved = {row.name: row.value for row in report.rows}
+    assert set(saved) == {
+        f"without {what} saves of step and gradient"
+        for what in ("friction", "contacts", "limits", "damper", "all of these")
+    }
+    assert all(np.isfinite(value) and value < 100.0 for value in saved.values())
+    assert any("far contacts" in note for note in report.notes)
+    assert report.figure is not None and json.loads(report.as_json())["details"]["robot"]
+
+
+@pytest.mark.slow
+def test_the_report_of_the_pendulum():
+    report = lean.Lean(quick=True).run(Progress())
+    rows = {row.name: row for row in report.rows}
+    assert rows["heavy libraries imported by a simulation"].met
+    assert len(report.tables) == 2 and len(report.figure.axes) == 2
+    assert json.loads(report.as_json())["details"]["features"][0]["name"] == "pendulum"
+
+
+def test_a_simulation_in_a_new_process_imports_no_heavy_library():
+    run = new_process("pendulum", cold=False)
+    assert run["success"] and run["modules"] == [] and run["kernels"]
