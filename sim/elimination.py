@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from sim.model import Matrix, Model, Vector, Work
 from solvers.jit import kernel
-from solvers.lu import lu_factor, lu_solve, lu_solve_rows
+from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_rows
 
 
 @kernel
@@ -37,14 +37,15 @@ def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
 
 
 @kernel
-def factor(model: Model, work: Work) -> bool:
+def factor(model: Model, work: Work) -> int:
     """Eliminate the joints from the leaves to the root; work.A is overwritten by the articulated matrices.
 
         U = A S3nu,   D = S2^T U + joint block,   L = D^-1 S2^T A,      A_parent += A - U L
 
-    False when a joint block is singular.
+    Returns the sign of det H, 0 when a joint block is singular.
     """
     A = work.A
+    sign = 1
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
@@ -75,14 +76,17 @@ def factor(model: Model, work: Work) -> bool:
                 D[a * n + b] = B[a * n + b] + dot
         if n == 1:
             if not abs(D[0]) > 1e-300:
-                return False
+                return 0
+            if D[0] < 0.0:
+                sign = -sign
             D[0] = 1.0 / D[0]
             for k in range(6):
                 work.L[d0, k] *= D[0]
         elif n > 1:
             swaps = lu_factor(D, n)
             if swaps < 0:
-                return False
+                return 0
+            sign *= lu_sign(D, n, swaps)
             D[36] = float(swaps)
             if p >= 0:
                 lu_solve_rows(D, n, swaps, work.L, d0)
@@ -97,7 +101,7 @@ def factor(model: Model, work: Work) -> bool:
                     Ai[6 * r + k] -= f * L[k]
         for k in range(36):
             A[p, k] += Ai[k]
-    return True
+    return sign
 
 
 @kernel
