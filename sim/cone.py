@@ -54,10 +54,10 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, work: Work, c: int, kappa: float) -> None:
+def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) -> None:
     """d(beta)/d(gap, slip) by the law linearised at kappa, b = mu gamma and r = psi - a:
 
-    psi dbeta = -(b I + beta v_t^T/r) dv_t - (v_t + beta dpsi/db) db - residual
+    psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual
     """
     z = work.cone[c]
     k = work.contact_kin[c]
@@ -74,8 +74,8 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float) -> None:
     W[7] = -i * b2 * k[1] / r
     W[8] = -i * (b0 + b2 * k[2] / r)
     g = -(a / b0) * (1.0 + a / r)  # dpsi/db
-    q[0] = -i * (k[1] + b1 * g)
-    q[1] = -i * (k[2] + b2 * g)
+    q[0] = -i * share * (k[1] + b1 * g)
+    q[1] = -i * share * (k[2] + b2 * g)
     q[2] = i * (b0 * k[1] + psi * z[2])
     q[3] = i * (b0 * k[2] + psi * z[3])
     W[3] = mu * W[0] * q[0]

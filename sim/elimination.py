@@ -9,8 +9,8 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 from __future__ import annotations
 
 from sim.model import Matrix, Model, Vector, Work
-from solvers.jit import kernel
-from solvers.lu import lu_factor, lu_solve, lu_solve_rows
+from solvers.jit import inlined, kernel
+from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_rows
 
 
 @kernel
@@ -36,53 +36,67 @@ def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
         out[d] = a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
 
 
+@inlined
+def joint_products(model: Model, work: Work, i: int) -> None:
+    """U = A S3nu,  L = S2^T A,  D = S2^T U + joint block of joint i, at the articulated matrix of its body."""
+    A = work.A[i]
+    d0 = model.body_vadr[i]
+    n = model.body_vadr[i + 1] - d0
+    for d in range(d0, d0 + n):
+        s = work.S3nu[d]
+        t = work.S2[d]
+        U = work.U[d]
+        L = work.L[d]
+        for r in range(6):
+            U[r] = (
+                A[6 * r] * s[0] + A[6 * r + 1] * s[1] + A[6 * r + 2] * s[2]
+                + A[6 * r + 3] * s[3] + A[6 * r + 4] * s[4] + A[6 * r + 5] * s[5]
+            )  # fmt: skip
+        for k in range(6):
+            L[k] = (
+                t[0] * A[k] + t[1] * A[6 + k] + t[2] * A[12 + k]
+                + t[3] * A[18 + k] + t[4] * A[24 + k] + t[5] * A[30 + k]
+            )  # fmt: skip
+    D = work.D[i]
+    B = work.joint_block[i]
+    for a in range(n):
+        t = work.S2[d0 + a]
+        for b in range(n):
+            U = work.U[d0 + b]
+            dot = t[0] * U[0] + t[1] * U[1] + t[2] * U[2] + t[3] * U[3] + t[4] * U[4] + t[5] * U[5]
+            D[a * n + b] = B[a * n + b] + dot
+
+
 @kernel
-def factor(model: Model, work: Work) -> bool:
+def factor(model: Model, work: Work) -> int:
     """Eliminate the joints from the leaves to the root; work.A is overwritten by the articulated matrices.
 
         U = A S3nu,   D = S2^T U + joint block,   L = D^-1 S2^T A,      A_parent += A - U L
 
-    False when a joint block is singular.
+    Returns the sign of det H, 0 when a joint block is singular.
     """
     A = work.A
+    sign = 1
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         p = model.body_parent[i]
         Ai = A[i]
-        for d in range(d0, d0 + n):
-            s = work.S3nu[d]
-            t = work.S2[d]
-            U = work.U[d]
-            L = work.L[d]
-            for r in range(6):
-                U[r] = (
-                    Ai[6 * r] * s[0] + Ai[6 * r + 1] * s[1] + Ai[6 * r + 2] * s[2]
-                    + Ai[6 * r + 3] * s[3] + Ai[6 * r + 4] * s[4] + Ai[6 * r + 5] * s[5]
-                )  # fmt: skip
-            for k in range(6):
-                L[k] = (
-                    t[0] * Ai[k] + t[1] * Ai[6 + k] + t[2] * Ai[12 + k]
-                    + t[3] * Ai[18 + k] + t[4] * Ai[24 + k] + t[5] * Ai[30 + k]
-                )  # fmt: skip
         D = work.D[i]
-        B = work.joint_block[i]
-        for a in range(n):
-            t = work.S2[d0 + a]
-            for b in range(n):
-                U = work.U[d0 + b]
-                dot = t[0] * U[0] + t[1] * U[1] + t[2] * U[2] + t[3] * U[3] + t[4] * U[4] + t[5] * U[5]
-                D[a * n + b] = B[a * n + b] + dot
+        joint_products(model, work, i)
         if n == 1:
             if not abs(D[0]) > 1e-300:
-                return False
+                return 0
+            if D[0] < 0.0:
+                sign = -sign
             D[0] = 1.0 / D[0]
             for k in range(6):
                 work.L[d0, k] *= D[0]
         elif n > 1:
             swaps = lu_factor(D, n)
             if swaps < 0:
-                return False
+                return 0
+            sign *= lu_sign(D, n, swaps)
             D[36] = float(swaps)
             if p >= 0:
                 lu_solve_rows(D, n, swaps, work.L, d0)
@@ -97,7 +111,7 @@ def factor(model: Model, work: Work) -> bool:
                     Ai[6 * r + k] -= f * L[k]
         for k in range(36):
             A[p, k] += Ai[k]
-    return True
+    return sign
 
 
 @kernel

@@ -19,9 +19,10 @@ from sim.pyramid import (
     pyramid_products,
     pyramid_products_ahead,
     recover_pyramid,
+    return_pyramid,
     start_pyramid,
 )
-from solvers.cones import orthant_step
+from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
 
 _IMPACT = int(Law.IMPACT)
@@ -131,15 +132,32 @@ def contact_boundary(model: Model, work: Work, c: int) -> float:
 
 
 @kernel
-def condense_contact(model: Model, work: Work, c: int, kappa: float) -> None:
-    """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale."""
+def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
+    """The pairs of contact c that left their cones put back onto the central path of kappa.
+
+    Gaps weigh against impulses as h/m, slips as 1/m, m the mass of the body (1 kg where it has none): the change that
+    an impulse makes to a free body.
+    """
+    m = model.body_mass[model.contact_body[c]]
+    weight = 1.0 / m if m > 0.0 else 1.0
+    return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
+    if law_of(model, c) == _LINEAR:
+        return_pyramid(work, c, weight, kappa)
+
+
+@kernel
+def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float) -> None:
+    """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
+
+    share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
+    """
     W = work.contact_W[c]
     for e in range(9):
         W[e] = 0.0
     W[0] = -work.cone[c, 1] / work.cone[c, 0]
     law = law_of(model, c)
     if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa)
+        condense_cone(model, work, c, kappa, share)
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
 

@@ -35,7 +35,7 @@ def gradient(
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     joint_blocks(model, work, h, q, v)
     if hard is not None:
-        condense_into(model, work, h, kappa, work.A3)
+        condense_into(model, work, h, kappa, 1.0, work.A3)
         add_slip_jacobians(model, work, h)
         add_limit_blocks(model, work, h)
     pose2_to_origin(work)

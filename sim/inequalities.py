@@ -31,7 +31,7 @@ from solvers.cones import orthant_step
 from solvers.jit import kernel
 
 _KAPPA_START = 1e-2  # [N s m]
-_LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit, in the start only
+LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
 
 @kernel
@@ -63,7 +63,7 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     for j in range(model.limit_dof.shape[0]):
         d = -work.bound_gap[j]
         if d > 0.0:
-            k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
+            k0 = max(k0, growth * LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
@@ -99,22 +99,26 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
-    """A += contacts, joint_block += limits: their slacks and impulses eliminated."""
-    condense_into(model, work, h, kappa, work.A)
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
+    """A += contacts, joint_block += limits: their slacks and impulses eliminated.  share: see `condense_into`."""
+    condense_into(model, work, h, kappa, share, work.A)
     add_limit_blocks(model, work, h)
 
 
 @kernel
-def condense_into(model: Model, work: Work, h: float, kappa: float, out: Matrix) -> None:
-    """out += contacts, condensed at kappa.  (nbody, 36)"""
+def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, out: Matrix) -> None:
+    """out += contacts, condensed at kappa.  (nbody, 36)
+
+    share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
+    turning of the arms of the impulses; 1 for the derivative.
+    """
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
-            condense_contact(model, work, c, kappa)
+            condense_contact(model, work, c, kappa, share)
             fn, f1, f2 = contact_impulse(model, work, c)
-            add_contact_matrix(model, work, h, c, fn, f1, f2, out)
-    condense_pairs(model, work, h, kappa)
+            add_contact_matrix(model, work, h, c, share * fn, share * f1, share * f2, out)
+    condense_pairs(model, work, h, kappa, share)
 
 
 @kernel

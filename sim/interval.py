@@ -71,7 +71,7 @@ def _matrix(model: Model, work: Work, h: float, q: Vector) -> bool:
         n = model.body_vadr[i + 1] - d
         for k in range(n):  # a damper has half of its impulse at this end
             work.joint_block[i, k * n + k] -= 0.5 * h * model.dof_damper[d + k]
-    return factor(model, work)
+    return factor(model, work) != 0
 
 
 @kernel

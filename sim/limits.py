@@ -9,6 +9,7 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 from __future__ import annotations
 
 from sim.model import Goal, Late, Model, Vector, Work
+from solvers.cones import return_pair
 from solvers.jit import kernel
 from solvers.record import call_late
 
@@ -76,6 +77,13 @@ def limit_constants(model: Model, work: Work, goal: Goal) -> None:
         w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         add_limit_impulse(model, work, k, w, work.dnu)
+
+
+@kernel
+def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+    """The pairs that left their cones put back onto the central path of kappa."""
+    for k in range(model.limit_dof.shape[0]):
+        return_pair(work.bound[k], work.bound_trial[k], 0, 1, weight, kappa)
 
 
 @kernel

@@ -108,7 +108,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         velocity_columns(model, work.S3, work.nu, h, work.S3nu)
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        if not (factor(model, work) and factor_coupling(model, work)):
+        if factor(model, work) == 0 or not factor_coupling(model, work):
             status = _SINGULAR
             break
         for d in range(v.shape[0]):

@@ -60,14 +60,14 @@ def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
 
 
 @kernel
-def add_pair_stiffness(model: Model, work: Work, j: int) -> None:
-    """coupling_K += pair j, condensed."""
+def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
+    """coupling_K += pair j, condensed; share: of the turning of its impulse."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
     wa, wb = shares(b)
     n, t1, t2 = contact_impulse(model, work, c)
-    f = pair_force(work, j, n, t1, t2)
+    f = pair_force(work, j, share * n, share * t1, share * t2)
     P = pair_arm(model, work, j)
     Ka = work.coupling_K[2 * model.pair_coupling[j]]
     Kb = work.coupling_K[2 * model.pair_coupling[j] + 1]
@@ -99,16 +99,16 @@ def add_pair_stiffness(model: Model, work: Work, j: int) -> None:
 
 
 @rich()
-def condense_pairs(model: Model, work: Work, h: float, kappa: float) -> None:
-    """coupling_K of all pairs, their laws linearised at kappa; overwritten."""
+def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
+    """coupling_K of all pairs, their laws linearised at kappa; overwritten.  share: as in `condense_into`."""
     for r in range(work.coupling_K.shape[0]):
         for k in range(36):
             work.coupling_K[r, k] = 0.0
     for j in range(model.pair_kind.shape[0]):
         pair_jacobian(model, work, h, j)
-        condense_contact(model, work, model.contact_height.shape[0] + j, kappa)
+        condense_contact(model, work, model.contact_height.shape[0] + j, kappa, share)
         if not is_absent(work, j):
-            add_pair_stiffness(model, work, j)
+            add_pair_stiffness(model, work, j, share)
 
 
 @rich("0.0")

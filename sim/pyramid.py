@@ -9,7 +9,7 @@ along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:1
 from __future__ import annotations
 
 from sim.model import Goal, Model, Work
-from solvers.cones import orthant_step
+from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
 
 
@@ -106,6 +106,14 @@ def pyramid_boundary(work: Work, c: int) -> float:
     for e in range(2, 12):
         a = min(a, orthant_step(work.cone[c, e], work.cone_step[c, e]))
     return a
+
+
+@kernel
+def return_pyramid(work: Work, c: int, weight: float, kappa: float) -> None:
+    """The five pairs put back onto the central path of kappa where they left their cones."""
+    return_pair(work.cone[c], work.cone_trial[c], 2, 3, weight, kappa)
+    for e in range(4):
+        return_pair(work.cone[c], work.cone_trial[c], 8 + e, 4 + e, weight, kappa)
 
 
 @kernel

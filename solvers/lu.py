@@ -44,6 +44,18 @@ def lu_factor(A: Vector, n: int) -> int:
 
 
 @kernel
+def lu_sign(A: Vector, n: int, swaps: int) -> int:
+    """Sign of the determinant of the matrix whose factors and row exchanges these are."""
+    sign = 1
+    for k in range(n):
+        if A[k * n + k] < 0.0:
+            sign = -sign
+        if (swaps >> (4 * k)) & 15 != k:
+            sign = -sign
+    return sign
+
+
+@kernel
 def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
     """b[first : first + n] := A^-1 b[first : first + n]."""
     for k in range(n):

@@ -21,12 +21,20 @@ CELLS = (
     ("hopper", 2.0, 0.05, 1e-4, 20),
     ("hopper", 2.0, 0.05, 1e-8, 134),
     ("quadruped", 0.0, 0.05, 1e-8, 90),
+    ("quadruped", 0.0, 0.05, 1e-4, 67),
+    ("quadruped", 0.0, 0.05, 1e-8, 67),
+    ("quadruped", 0.0, 0.05, 1e-4, 140),
+    ("quadruped", 0.0, 0.05, 1e-8, 140),
+    ("quadruped", 1.0, 0.02, 1e-4, 109),
     ("quadruped", 2.0, 0.02, 1e-4, 130),
     ("quadruped", 2.0, 0.05, 1e-4, 45),
     ("quadruped", 2.0, 0.05, 1e-4, 113),
     ("quadruped12", 0.5, 0.05, 1e-8, 68),
     ("quadruped12", 1.0, 0.05, 1e-4, 151),
+    ("quadruped12", 2.0, 0.01, 1e-4, 73),
+    ("quadruped12", 2.0, 0.01, 1e-8, 73),
     ("quadruped12", 2.0, 0.02, 1e-4, 79),
+    ("quadruped12", 2.0, 0.02, 1e-8, 79),
     ("quadruped12", 2.0, 0.05, 1e-4, 68),
 )
 
@@ -64,3 +72,16 @@ def test_tumbling_block_for_a_second(time_step, kappa):
     trajectory = sim.rollout(np.r_[q, 2.0, 1.0, -1.0, 3.0, -2.0, 1.0], np.zeros((round(1.0 / time_step), 0)))
     assert trajectory.status == 0, trajectory.message
     assert gaps(sim, trajectory.x[-1]).min() > -1e-8
+
+
+@pytest.mark.parametrize("kappa", [3e-3, 1e-3, 1e-4, 1e-6])
+def test_foot_between_sticking_and_sliding(kappa):
+    """A knot of a planned trot, one foot at the edge of its cone: Newton's method went to and fro between two slips."""
+    sim = dojo.problems.trot(speed=0.41, damping=0.3).sim.replace(kappa=kappa)
+    pose = [0.107, -0.003, 0.295, *rot.exp(np.array([0.004, 0.002, -0.002]))]
+    legs = [0.023, 0.796, -1.665, 0.017, 0.889, -1.8, 0.013, 1.215, -1.729, 0.02, 1.067, -1.546]
+    rates = [0.024, 1.49, -0.141, -0.076, -5.331, -1.648, 0.018, -2.311, -5.096, 0.04, 0.868, 0.81]
+    torques = [-1.0, -3.47, 6.03, -0.17, -3.72, 1.29, 0.43, -3.84, -0.69, -0.17, 7.09, 10.59]
+    result = sim.step(np.array([*pose, *legs, 0.421, -0.013, 0.009, 0.01, 0.028, 0.007, *rates]), np.array(torques))
+    assert result.status == 0, result.status
+    assert result.iterations <= 100

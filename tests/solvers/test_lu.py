@@ -1,0 +1,27 @@
+"""LU factors against NumPy."""
+
+import numpy as np
+import pytest
+
+from solvers.lu import lu_factor, lu_sign, lu_solve
+
+pytestmark = pytest.mark.kernel
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6])
+def test_sign_of_the_determinant_and_solution(n):
+    rng = np.random.default_rng(n)
+    signs = set()
+    for _ in range(20):
+        A, b = rng.normal(size=(n, n)), rng.normal(size=n)
+        factors, x = A.ravel().copy(), b.copy()
+        swaps = lu_factor(factors, n)
+        lu_solve(factors, n, swaps, x, 0)
+        np.testing.assert_allclose(A @ x, b, rtol=1e-9, atol=1e-9)
+        assert lu_sign(factors, n, swaps) == np.sign(np.linalg.det(A))
+        signs.add(lu_sign(factors, n, swaps))
+    assert signs == {-1, 1}
+
+
+def test_a_singular_matrix_is_found():
+    assert lu_factor(np.zeros(9), 3) == -1
