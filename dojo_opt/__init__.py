@@ -22,9 +22,11 @@ __all__ = [
     "Box",
     "Capsule",
     "ClosedLoop",
+    "Collision",
     "Contact",
     "Cylinder",
     "Disturbances",
+    "HalfSpace",
     "Input",
     "Joint",
     "Linearization",
@@ -42,6 +44,7 @@ __all__ = [
     "Simulator",
     "Sphere",
     "Status",
+    "String",
     "Trajectory",
     "UrdfError",
     "UrdfMechanism",
@@ -68,9 +71,11 @@ _HOME: dict[str, str | None] = {
     "Box": "sim.shapes",
     "Capsule": "sim.shapes",
     "ClosedLoop": "dojo_opt.plant.loop",
+    "Collision": "sim.collisions",
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
     "Disturbances": "dojo_opt.plant.disturbances",
+    "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
@@ -88,6 +93,7 @@ _HOME: dict[str, str | None] = {
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
+    "String": "sim.shapes",
     "Trajectory": "sim.results",
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
@@ -121,11 +127,12 @@ if TYPE_CHECKING:
     from dojo_opt.plant.study import monte_carlo
     from dojo_opt.problem import Problem
     from dojo_opt.rest import equilibrium
+    from sim.collisions import Collision
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory
-    from sim.shapes import Box, Capsule, Cylinder, Sphere
+    from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
     from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status

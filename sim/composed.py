@@ -140,11 +140,11 @@ class Composed(Calls):
         columns = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
         return columns.reshape(len(z), -1), np.concatenate([linear, angular], axis=2).reshape(len(z), -1)
 
-    def linearize(self, xs: Floats, us: Floats, substeps: int, kappa: float | None) -> tuple[Floats, ...]:
+    def linearize(self, *_: Any, **__: Any) -> NoReturn:
         """Refused."""
         self._refuse("derivatives are")
 
-    def closed_loop(self, *_: Any) -> tuple[int, Floats, Floats, Vector]:
+    def closed_loop(self, *_: Any, **__: Any) -> NoReturn:
         """Refused."""
         self._refuse("feedback is")
 
@@ -182,8 +182,13 @@ class Composed(Calls):
 
 def check(mechanism: Mechanism, settings: Settings) -> None:
     """Refuse mechanisms whose steps cannot be composed."""
-    limited = [j.name for j in mechanism.joints if any(np.isfinite(b) for pair in j.limits or () for b in pair)]
-    for what, names in (("contact", mechanism.contact_names), ("limits of joint", limited)):
+    limited = [
+        j.name
+        for j in mechanism.joints
+        if j.cone is not None or any(np.isfinite(b) for pair in j.limits or () for b in pair)
+    ]
+    loops = [j.name for j in mechanism.loops]
+    for what, names in (("contact", mechanism.contact_names), ("limits of joint", limited), ("loop joint", loops)):
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
