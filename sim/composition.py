@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.dynamics import joints_below_turn
 from sim.interval import arrive, solve_interval
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Options, Vector, Work
@@ -81,6 +82,8 @@ def composed_step(
     nq = work.theta1.shape[0]
     q, v = x[:nq], x[nq:]
     impulse, past = composition.impulse, composition.past
+    if not joints_below_turn(model, v, options.h):
+        return _ANGULAR_STEP
     place_node(model, work, q)
     momenta_of_velocity(model, work, v)
     for d in range(v.shape[0]):

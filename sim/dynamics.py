@@ -186,12 +186,12 @@ def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
 
 
 @kernel
-def _joints_below_turn(model: Model, work: Work, h: float) -> bool:
+def joints_below_turn(model: Model, nu: Vector, h: float) -> bool:
     """|h nu| < pi for rotations against the world, 2 pi for those between bodies: poses cannot tell further turns."""
     for i in range(model.body_parent.shape[0]):
         t = 0.0
         for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
-            t += work.nu[d] * work.nu[d]
+            t += nu[d] * nu[d]
         if not h * h * t < (9.8696 if model.body_parent[i] < 0 else 39.4784):
             return False
     return True
@@ -206,7 +206,7 @@ def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
     displace(model, q, work.nu, h, work.theta3)
     tree_poses(model, work.theta3, q, work.origin, work.pos3, work.quat3, work.rot3, work.S3)
     turns(work.quat2, work.quat3, work.turn)
-    inside = _joints_below_turn(model, work, h)
+    inside = joints_below_turn(model, work.nu, h)
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         inside = inside and c > 1e-3

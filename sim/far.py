@@ -60,8 +60,9 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
     work.counts[0] = 0
     work.counts[1] = 0
-    c = 0
-    while c < count:
+    for c in range(count):
+        if model.cluster_end[c] == 0:
+            continue  # not the first of its cluster
         i = model.contact_body[c]
         n = model.contact_frame[c]
         most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
@@ -75,7 +76,6 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         if a == 0.0 or not known:
             work.far[c, 23] = 0.0
         _enlist(model, work, c)
-        c = model.cluster_end[c]
     _enlist_pairs(model, work)
     work.far_law[1] = options.tolerance / max(1, work.counts[1])
 
@@ -137,9 +137,8 @@ def came_near(model: Model, work: Work) -> bool:
     if found:
         work.counts[0] = 0
         work.counts[1] = 0
-        c = 0
-        while c < model.contact_height.shape[0]:
-            _enlist(model, work, c)
-            c = model.cluster_end[c]
+        for c in range(model.contact_height.shape[0]):
+            if model.cluster_end[c] > 0:
+                _enlist(model, work, c)
         _enlist_pairs(model, work)
     return found

@@ -71,9 +71,7 @@ class Model(NamedTuple):
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
     pair_feature: Integers  # (npair,) which point of a pair of shapes with several
-    coupling_body: (
-        IntegerMatrix  # (ncoupling, 2) bodies a and b, -1 for the world; couplings of pairs first, then loops
-    )
+    coupling_body: IntegerMatrix  # (ncoupling, 2) bodies a and b, -1 for the world; loops after pairs
     coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
     loop_ntrans: Integers  # (nloop,) free translations
     loop_nrot: Integers  # (nloop,) free rotations

@@ -81,12 +81,14 @@ def test_engines_are_differenced_from_their_own_rest():
 
 def test_an_engine_that_cannot_is_a_note(monkeypatch):
     class Unable(Ours):
+        name = "unable"
+
         def simulate(self, mechanism, **settings):
             raise ValueError("no blocks")
 
-    monkeypatch.setattr(study, "installed", lambda: [Unable("unable"), Ours("able")])
+    monkeypatch.setattr(study, "installed", lambda: [Unable(), Ours()])
     report = Report("title", "command")
-    assert [engine.name for engine in study._able(report, quick=False)] == ["able"]
+    assert [engine.name for engine in study._able(report, quick=False)] == ["dojo-opt"]
     assert report.notes == ["motions: without unable: no blocks"]
 
 

@@ -23,7 +23,7 @@ def measure(mech: Mechanism, q: Floats, v: Floats, h: float) -> tuple[Floats, Fl
     model = pack(mech)
     work = allocate_work(sizes_of(model))
     for array in work:
-        array[...] = np.nan
+        array[...] = np.nan if array.dtype.kind == "f" else 0
     model_at, work_at = table(model), table(work)
     x = np.concatenate([q, v])[None]
     e, p, z = np.empty((1, 2)), np.empty((1, 6)), np.empty((mech.nbody, 13))
