@@ -15,6 +15,7 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from sim import shapes
+from sim.parts import WORLD
 from sim.simulator import Simulator
 
 __all__ = ["save_html"]
@@ -99,7 +100,7 @@ def _scene(m: Motion) -> list[Any]:
     steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
     for k, body in enumerate(m.mechanism.bodies):
         node = Node(("meshcat", "bodies", body.name))
-        for part, (solid, place) in enumerate(_solids(body)):
+        for part, (solid, place) in enumerate(_solids(body.shape)):
             commands.append(SetObject(solid, steel, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
         for contact in m.mechanism.contacts:
@@ -108,14 +109,20 @@ def _scene(m: Motion) -> list[Any]:
                 commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), rubber, ball))
                 commands.append(SetTransform(_place(contact.point), ball))
         commands.append(SetTransform(_place(m.position[0, k], m.quaternion[0, k]), node))
+    earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
+    for collision in m.mechanism.collisions:
+        if collision.b != WORLD or isinstance(collision.shape_b, shapes.String):
+            continue
+        for part, (solid, place) in enumerate(_solids(collision.shape_b)):
+            node = Node(("meshcat", "obstacles", collision.name, f"part{part}"))
+            commands += [SetObject(solid, earth, node), SetTransform(place, node)]
     return commands
 
 
-def _solids(body: Any) -> list[tuple[Any, Any]]:
-    """(MeshCat geometry, placement in the body) of a body's shape; a body without one is a small ball."""
+def _solids(shape: Any) -> list[tuple[Any, Any]]:
+    """(MeshCat geometry, placement in the body) of a shape; a body without one is a small ball."""
     from meshcat import geometry
 
-    shape = body.shape
     if shape is None:
         return [(geometry.Sphere(0.02), np.eye(4))]
     place = _place(shape.center, shape.orientation)
@@ -123,6 +130,8 @@ def _solids(body: Any) -> list[tuple[Any, Any]]:
         return [(geometry.Sphere(shape.radius), place)]
     if isinstance(shape, shapes.Box):
         return [(geometry.Box([shape.x, shape.y, shape.z]), place)]
+    if isinstance(shape, shapes.HalfSpace):
+        return [(geometry.Box([10.0, 10.0, _THICK]), place @ _place((0, 0, -0.5 * _THICK)))]
     # MeshCat's cylinders stand along y, ours along z
     upright = place @ _place((0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
     solids = [(geometry.Cylinder(shape.length, shape.radius), upright)]

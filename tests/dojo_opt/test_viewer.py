@@ -111,3 +111,18 @@ def test_a_plant_with_short_steps_does_not_make_a_long_file(tmp_path):
     coarse = sim.replace(time_step=16e-3)
     long = viewer.save_html(coarse.rollout(sim.neutral(), us[:25]), tmp_path / "b.html").stat().st_size
     assert abs(short - long) < 5_000
+
+
+def test_obstacles_are_drawn():
+    ball = dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1))
+    walls = [
+        dojo.Collision("ball", shape_b=dojo.HalfSpace(center=(0, 0, 0.5)), name="floor"),
+        dojo.Collision("ball", shape_b=dojo.Box(0.2, 1.0, 1.0, center=(1, 0, 0)), name="wall"),
+    ]
+    mech = dojo.Mechanism([ball], [dojo.Joint("floating", None, "ball")], collisions=walls)
+    sim = dojo.Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[2] = 1.0
+    commands = viewer._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
+    drawn = [command.path.lower() for command in commands if "obstacles" in command.path.lower()]
+    assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
