@@ -10,7 +10,7 @@ from typing import Any
 from dojo_opt.report.contact.study import KAPPA
 from dojo_opt.report.engines import Engine, Ours, installed
 from dojo_opt.report.result import Cell, Report, Row, Table
-from dojo_opt.report.stability import bodies, chains, ground, joints
+from dojo_opt.report.stability import bodies, chains, ground, joints, stacks
 from dojo_opt.report.stability.picture import picture
 from dojo_opt.report.stability.robot import robot_trials
 from dojo_opt.report.stability.trial import Trial, Verdict
@@ -72,7 +72,7 @@ class Stability:
         """What is run."""
         if self.mechanism is not None:
             return robot_trials(self.mechanism)
-        return [*ground.trials(), *joints.trials(), *bodies.trials(), *chains.trials()]
+        return [*ground.trials(), *stacks.trials(), *joints.trials(), *bodies.trials(), *chains.trials()]
 
     def _measure(self, trial: Trial, peers: Sequence[Engine], verdicts: dict[str, list[Verdict]]) -> dict[str, Any]:
         """One trial by every engine; verdicts are appended, numbers returned."""
