@@ -8,16 +8,16 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from dojo_opt.report.stability.trial import Trial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
 
 
 def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
-    """Green where the rule is met, red where it is not, yellow where a scene is refused; with the measured value."""
+    """Green where the rule is met, red where it is not, yellow where a scene is refused, grey where it is not given."""
     rows, columns = len(trials), len(verdicts)
     figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")
     ax = figure.subplots()
     colours = np.array([[_colour(verdict) for verdict in found] for found in verdicts.values()]).T
-    ax.imshow(colours, cmap=ListedColormap(["#e8a49c", "#ece0a4", "#a9d8b0"]), vmin=0, vmax=2, aspect="auto")
+    ax.imshow(colours, cmap=ListedColormap(["#e8a49c", "#ece0a4", "#a9d8b0", "#e4e4e4"]), vmin=0, vmax=3, aspect="auto")
     for column, found in enumerate(verdicts.values()):
         for row, verdict in enumerate(found):
             ax.text(column, row, verdict.text, ha="center", va="center", fontsize=7)
@@ -34,4 +34,6 @@ def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) 
 
 
 def _colour(verdict: Verdict) -> int:
+    if verdict.text == NOT_GIVEN:
+        return 3
     return 1 if verdict.text == "refused" else 2 * verdict.passed

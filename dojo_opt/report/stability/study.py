@@ -13,7 +13,7 @@ from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.stability import bodies, chains, ground, joints, stacks
 from dojo_opt.report.stability.picture import picture
 from dojo_opt.report.stability.robot import robot_trials
-from dojo_opt.report.stability.trial import Trial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
 from dojo_opt.report.study import Progress
 from sim.mechanism import Mechanism
 
@@ -83,7 +83,7 @@ class Stability:
             try:
                 run = trial.run(engine, 0.0 if own else trial.peer_duration)
             except ValueError as error:
-                verdict = Verdict(float("nan"), False, "not represented")
+                verdict = Verdict(float("nan"), False, NOT_GIVEN)
                 found: dict[str, Any] = {"message": str(error)}
             else:
                 verdict = trial.judge(run, ours=own)
@@ -107,7 +107,8 @@ def _tables(
                 cost = float(numbers[k]["dojo-opt"].get("us_per_step", 0.0))
                 rows.append([trial.name, trial.rule, *(found[k].text for found in verdicts.values()), cost])
         tables.append(Table(group, ("", "passes when", *verdicts, "dojo-opt [us per step]"), rows))
-    passed: list[Cell] = [f"{sum(v.passed for v in found)} of {len(found)}" for found in verdicts.values()]
+    given = [[v.passed for v in found if v.text != NOT_GIVEN] for found in verdicts.values()]
+    passed: list[Cell] = [f"{sum(found)} of {len(found)}" for found in given]
     tables.append(Table("passed", tuple(verdicts), [passed]))
     return tables
 

@@ -24,6 +24,9 @@ class Verdict(NamedTuple):
     text: str  # as it stands in a table
 
 
+NOT_GIVEN = "not given"  # a scene that this study does not translate for an engine: no verdict on it
+
+
 @dataclass(frozen=True)
 class Trial:
     """A motion, what is measured on it, and the largest value that passes.
