@@ -29,7 +29,9 @@ class Simulator(States):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
     kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
-                    kappa / impulse; smaller is harder
+                    kappa / impulse; smaller is harder. 1e-10 to simulate: creep is proportional to it, run time is
+                    not. Derivatives of a contact that carries m are within 1 % of those of hard contact up to
+                    .01 m g^2 h^3
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
     order           of a step; 4, 6, 8 for mechanisms without contacts and limits: each composed of 5, 9, 15 of order 2

@@ -27,7 +27,7 @@ class Status(IntEnum):
 MESSAGES: dict[Status, str] = {
     Status.SOLVED: "Solved to the requested tolerance.",
     Status.MAX_ITERATIONS: "The iteration limit was reached before the tolerance.",
-    Status.NO_PROGRESS: "The line search of the time step failed before the tolerance was reached.",
+    Status.NO_PROGRESS: "The time step found no way to its tolerance; a smaller one may.",
     Status.NOT_FINITE: "A number that is not finite appeared.",
     Status.SINGULAR: "A matrix was singular, or not positive definite where it has to be.",
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
