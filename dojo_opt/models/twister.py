@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from dojo_opt.models.box_chain import box_chain
 from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.shapes import Box
+from sim.parts import Contact
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -35,25 +35,7 @@ def twister(
     [kg], length, width, height [m] of one box; radius of the contacts [m]; spring and damper of each joint; law: see
     Contact.
     """
-    if not isinstance(n, int) or n < 1:
-        raise ValueError(f"twister(n): expected a whole number >= 1, got {n!r}")
-    links = [Body(f"link_{i}", mass, shape=Box(length, width, height)) for i in range(n)]
-    front, rear = (length / 2, 0.0, 0.0), (-length / 2, 0.0, 0.0)
-    joints = [Joint("floating", None, "link_0", name="base")]
-    joints += [
-        Joint(
-            joint,
-            f"link_{i - 1}",
-            f"link_{i}",
-            name=f"joint_{i}",
-            parent_point=rear,
-            child_point=front,
-            axis=AXES[(i - 1) % 3],
-            spring=spring,
-            damper=damper,
-        )
-        for i in range(1, n)
-    ]
+    links, joints, front, rear = box_chain("twister", n, joint, AXES, mass, (length, width, height), spring, damper)
     contacts = [Contact("link_0", front, radius, friction, law, name="link_0_front")]
     contacts += [Contact(f"link_{i}", rear, radius, friction, law, name=f"link_{i}_rear") for i in range(n)]
     neutral = {"base": (0.0, 0.0, radius, 1.0, 0.0, 0.0, 0.0)}

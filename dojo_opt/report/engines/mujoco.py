@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
+from dojo_opt.report.mujoco_warnings import quiet
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
@@ -62,7 +62,7 @@ class MuJoCo:
             getattr(model, f"pair_{name}")[:] = values
         start = np.concatenate([np.asarray(q, dtype=np.float64), np.asarray(v, dtype=np.float64)])
         data = mujoco_scene.state(model, start)
-        with _quiet(mujoco):
+        with quiet():
             (xs, steps), seconds = clocked(lambda: _steps(mujoco, model, data, start, u, marks), self.rounds)
         times = time_step * marks[: len(xs)].astype(np.float64)
         message = "" if steps == marks[-1] else f"lost between {times[-1]:g} s and {time_step * steps:g} s"
@@ -100,14 +100,3 @@ def _steps(
         if not np.abs(xs[k]).max() < _LOST:
             return xs[:k], last
     return xs, int(marks[-1])
-
-
-@contextmanager
-def _quiet(mujoco: Any) -> Iterator[None]:
-    """Warnings of unstable scenes are dropped: MuJoCo would write them to a file where the user stands."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)

@@ -1,0 +1,38 @@
+"""Boxes end to end along x, the first one free: what snake and twister have in common."""
+
+from __future__ import annotations
+
+from sim.parts import Body, Joint
+from sim.shapes import Box
+
+Point = tuple[float, float, float]
+
+
+def box_chain(
+    call: str, n: int, joint: str, axes: tuple[Point, ...], mass: float, size: Point, spring: float, damper: float
+) -> tuple[list[Body], list[Joint], Point, Point]:
+    """(bodies link_0, link_1, ..., joints base, joint_1, ..., front end, rear end of a box).
+
+    joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
+    each joint. ValueError: n is no whole number of boxes; the message names `call`.
+    """
+    if not isinstance(n, int) or n < 1:
+        raise ValueError(f"{call}(n): expected a whole number >= 1, got {n!r}")
+    links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]
+    front, rear = (size[0] / 2, 0.0, 0.0), (-size[0] / 2, 0.0, 0.0)
+    joints = [Joint("floating", None, "link_0", name="base")]
+    joints += [
+        Joint(
+            joint,
+            f"link_{i - 1}",
+            f"link_{i}",
+            name=f"joint_{i}",
+            parent_point=rear,
+            child_point=front,
+            axis=axes[(i - 1) % len(axes)],
+            spring=spring,
+            damper=damper,
+        )
+        for i in range(1, n)
+    ]
+    return links, joints, front, rear
