@@ -121,6 +121,12 @@ def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
     return out
 
 
+def fixed_axes(joint: Joint) -> Floats:
+    """Orthonormal directions along which a joint does not move, (3 - ntrans, 3), joint frame."""
+    free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
+    return np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
+
+
 def contact_frame(normal: ArrayLike) -> Floats:
     """Rows n, t1, t2 of a right-handed frame: t1 along x (along y for a normal near x), t2 = n x t1."""
     n = np.asarray(normal, dtype=np.float64)
@@ -197,8 +203,7 @@ def _pack_loops(mech: Mechanism, model: Model) -> None:
         model.loop_ntrans[m], model.loop_nrot[m] = joint.ntrans, joint.nrot
         model.loop_point[m] = np.concatenate([np.asarray(joint.parent_point), np.asarray(joint.child_point)])
         model.loop_offset[m] = rotation_matrix(joint.orientation).ravel()
-        free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
-        fixed = np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
+        fixed = fixed_axes(joint)
         model.loop_axes[m, : fixed.size] = fixed.ravel()
         axis, first_across, second_across = contact_frame(joint.axis)
         model.loop_axis[m] = np.concatenate([first_across, second_across, axis])

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.build import contact_frame, translation_axes
+from sim.build import contact_frame, fixed_axes
 from sim.calls import Calls
 from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
@@ -42,15 +42,13 @@ class Closure:
             Rb, xb = rotation_matrix(z[b, 6:10]), z[b, :3]
         Q = Rb @ rotation_matrix(joint.orientation)
         apart = Q.T @ (xa + Ra @ np.asarray(joint.child_point) - xb - Rb @ np.asarray(joint.parent_point))
-        free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
-        fixed = np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
         E = Q.T @ Ra
         if joint.nrot == 1:
             frame = contact_frame(joint.axis)
             turned = frame[1:] @ (E @ frame[0])
         else:
             turned = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
-        return np.concatenate([fixed @ apart, turned if joint.nrot < 3 else turned[:0]])
+        return np.concatenate([fixed_axes(joint) @ apart, turned if joint.nrot < 3 else turned[:0]])
 
     def close(self, x: Floats) -> Floats:
         """The state near x whose loops are closed at both ends of its interval.

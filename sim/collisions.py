@@ -167,8 +167,3 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
     for k, (a, b) in enumerate(bodies):
         model.coupling_body[k] = a, b
         model.coupling_row[k + 1] = model.coupling_row[k] + 6
-
-
-def names_of(found: Sequence[Touch]) -> tuple[str, ...]:
-    """Names of the contact points."""
-    return tuple(touch.name for touch in found)
