@@ -14,11 +14,14 @@ from sim.inequalities import add_slip_jacobians, condense_into
 from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import add_limit_blocks, add_limit_derivatives
-from sim.model import InputKind, Matrix, Model, Vector, Work
+from sim.model import InputKind, Late, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
 from solvers.jit import inlined, kernel
+from solvers.record import call_late
 
+_COMPOSITES = int(Late.BOUNCE_COMPOSITES)
+_ACROSS = int(Late.BOUNCE_ACROSS)
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)
 
@@ -39,6 +42,8 @@ def gradient(
         add_slip_jacobians(model, work, h)
         add_limit_blocks(model, work, h)
     pose2_to_origin(work)
+    if model.late[_COMPOSITES] != 0:
+        call_late(model.late[_COMPOSITES], model, work, 0, h, 0.0)
     for i in range(work.A.shape[0]):
         for k in range(36):
             work.A[i, k] = work.A3[i, k]
@@ -47,6 +52,8 @@ def gradient(
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    if model.late[_ACROSS] != 0:
+        call_late(model.late[_ACROSS], model, work, 0, h, 0.0)
     add_coupling_derivatives(model, work)
     if not factor_coupling(model, work):
         return False

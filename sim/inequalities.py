@@ -5,7 +5,13 @@ Far contacts (far.py) have no part in its variables and its matrix.
 
 from __future__ import annotations
 
-from sim.contact import add_contact_matrix, add_contact_wrench, contact_jacobian, contact_kinematics
+from sim.contact import (
+    add_contact_matrix,
+    add_contact_wrench,
+    add_frame_matrix,
+    contact_jacobian,
+    contact_kinematics,
+)
 from sim.elimination import subtree_sums
 from sim.far_impulses import add_far_wrenches, far_impulses
 from sim.friction import (
@@ -23,13 +29,15 @@ from sim.friction import (
 )
 from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
 from sim.loops import keep_loops, move_loops
-from sim.model import Goal, Matrix, Model, Work
+from sim.model import Goal, Late, Matrix, Model, Work
 from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
+from solvers.record import call_late
 
+_GAPS = int(Late.BOUNCE_GAPS)
 _KAPPA_START = 1e-2  # [N s m]
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
@@ -41,6 +49,8 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
     pair_kinematics(model, work, h)
+    if model.late[_GAPS] != 0:
+        call_late(model.late[_GAPS], model, work, 0, h, 0.0)
     limit_gaps(model, work, h)
 
 
@@ -117,7 +127,9 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
             contact_jacobian(model, work, h, c)
             condense_contact(model, work, c, kappa, share)
             fn, f1, f2 = contact_impulse(model, work, c)
-            add_contact_matrix(model, work, h, c, share * fn, share * f1, share * f2, out)
+            add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+            if model.contact_terrain[c] > 0:
+                add_frame_matrix(model, work, c, share, out)
     condense_pairs(model, work, h, kappa, share)
 
 
@@ -154,7 +166,7 @@ def recover_inequalities(model: Model, work: Work, h: float, share: float) -> No
     """Steps of all cone variables from the twists and rates of the last solve."""
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            recover_contact(model, work, h, c, share)
+            recover_contact(model, work, c, share)
     recover_limits(model, work, h, share)
 
 

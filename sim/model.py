@@ -50,6 +50,16 @@ class Late(IntEnum):
     CONE_DERIVATIVE = 2
     SWING_POSE = 3
     SWING_CURVATURE = 4
+    TERRAIN_PLACE = 5
+    TERRAIN_TURN = 6
+    TERRAIN_BLOCK = 7
+    TERRAIN_GAP = 8
+    TERRAIN_FAR = 9
+    BOUNCE_START = 10
+    BOUNCE_GAPS = 11
+    BOUNCE_CHECK = 12
+    BOUNCE_COMPOSITES = 13
+    BOUNCE_ACROSS = 14
 
 
 class Model(NamedTuple):
@@ -66,7 +76,9 @@ class Model(NamedTuple):
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
     contact_body: Integers  # (ncontact,) contacts with the ground come first, then the pairs
     contact_law: Integers  # (ncontact,) Law
-    late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
+    late: Integers  # (15,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
+    contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
+    terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
     cluster_end: Integers  # (nground,) of the cluster whose first contact this is, one past its last; see far.py
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
@@ -95,8 +107,11 @@ class Model(NamedTuple):
     contact_point: Matrix  # (nground, 3) sphere centre in the body, from its centre of mass [m]
     contact_radius: Vector  # (nground,) [m], 0 for a point
     contact_friction: Vector  # (ncontact,) coefficient
+    contact_restitution: Vector  # (ncontact,) share of the normal velocity that an impact gives back
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
-    contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]
+    contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
+    terrain_place: Matrix  # (nterrain, 8) see height_field.py
+    terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
@@ -161,7 +176,13 @@ class Work(NamedTuple):
     cone: Matrix  # (ncontact, 12) cone variables, see contact.py
     cone_step: Matrix  # (ncontact, 12)
     cone_trial: Matrix  # (ncontact, 12)
-    contact_kin: Matrix  # (ncontact, 24) gap, tangential velocity, arms and their Jacobian
+    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
+    contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
+    contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
+    terrain_block: Vector  # (36,) scratch
+    terrain_gap: Vector  # (5,) scratch: see `terrain_gap`
+    bounce: Matrix  # (ncontact, 16) see restitution.py
+    bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same
     contact_scale: Matrix  # (ncontact, 16) scaling of the cone
