@@ -123,7 +123,7 @@ def terrain_turn(model_at: Any, work_at: Any, c: int, h: float, _: float) -> int
         u, v = e1[r], e2[r]
         W[6 * r], W[6 * r + 1], W[6 * r + 2] = u, v, 0.0
         W[6 * r + 3], W[6 * r + 4], W[6 * r + 5] = -az * v, az * u, ax * v - ay * u
-    g = k[0] * f[2] * f[2]
+    g = (k[0] + work.bounce[c, 0]) * f[2] * f[2]  # contact_kin has the gap above the floor of an impact
     mx, my, mz = f[0] - g * (Fxx * Fx + Fxy * Fy), f[1] - g * (Fxy * Fx + Fyy * Fy), f[2]
     k[18], k[19], k[20] = mx, my, mz
     k[9], k[10], k[11] = cross(ax, ay, az, mx, my, mz)
