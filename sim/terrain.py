@@ -134,7 +134,7 @@ class Terrain:
 
     def _spline(self, coefficients: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
         """(F, F_x, F_y) of the spline with these coefficients."""
-        (ox, oy), (dx, dy), (C, S) = self.origin, self.spacing, self.direction  # type: ignore[misc]
+        (ox, oy), (dx, dy), (C, S) = (np.asarray(a, float) for a in (self.origin, self.spacing, self.direction))
         s, t = (C * (x - ox) + S * (y - oy)) / dx, (C * (y - oy) - S * (x - ox)) / dy
         f, fs, ft = spline(coefficients, s, t)
         fs, ft = fs / dx, ft / dy
@@ -163,7 +163,7 @@ class Terrain:
     @property
     def bounds(self) -> tuple[float, float]:
         """Bounds of sqrt(1 + |grad F|^2) and of |second derivative| [1/m], from the differences of coefficients."""
-        P, (dx, dy) = np.pad(self.coefficients, 2, mode="edge"), self.spacing  # type: ignore[misc]
+        P, (dx, dy) = np.pad(self.coefficients, 2, mode="edge"), np.asarray(self.spacing, float)
         slopes = np.abs(np.diff(P, axis=0)).max() / dx, np.abs(np.diff(P, axis=1)).max() / dy
         xx, yy = np.abs(np.diff(P, 2, axis=0)).max() / dx**2, np.abs(np.diff(P, 2, axis=1)).max() / dy**2
         xy = np.abs(np.diff(np.diff(P, axis=0), axis=1)).max() / (dx * dy)

@@ -36,7 +36,7 @@ class Ground:
         self._point = np.array([c.point for c in contacts], dtype=np.float64).reshape(-1, 3)
         self._normal = sim.mechanism.contact_normals
         self._lowest = np.array([c.radius for c in contacts], dtype=np.float64)[:, None] * self._normal
-        self._terrain = [(k, c) for k, c in enumerate(contacts) if c.terrain is not None]
+        self._surfaces = [(k, c.terrain.surface(c.radius)) for k, c in enumerate(contacts) if c.terrain is not None]
         self.height = sim.model.contact_height  # (ncontact,) [m], a view
         self._flat = self.height.copy()
 
@@ -59,9 +59,8 @@ class Ground:
     def gaps(self, points: Stack) -> Matrix:
         """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""
         out = np.asarray((self._normal * points).sum(axis=-1) - self.height)
-        for k, contact in self._terrain:  # vertically: the height that is learnt is added to it
+        for k, surface in self._surfaces:  # vertically: the height that is learnt is added to it
             centres = points[..., k, :] + self._lowest[k]
-            surface = contact.terrain.surface(contact.radius)
             out[..., k] = centres[..., 2] - surface.height(centres[..., 0], centres[..., 1]) - self.height[k]
         return out
 

@@ -59,16 +59,18 @@ def test_a_loop_is_carried_over():
     ]
     bodies = [dojo.Body(name, 1.0, shape=bar) for name in ("crank", "coupler", "rocker")]
     fourbar = dojo.Mechanism(bodies, joints, neutral={"crank": 0.5, "coupler": -0.5, "rocker": 0.5})
-    scene = ball().add(fourbar, (0.0, 1.0, 0.0, *YAW))
+    scene = ball().add(fourbar, (0.0, 1.0, 0.0))
     sim = dojo.Simulator(scene, time_step=0.01)
-    t = sim.rollout(sim.neutral(), np.zeros((20, sim.nu)), throw=True)
+    x = sim.neutral()
+    x[2] = 0.1
+    t = sim.rollout(x, np.zeros((20, sim.nu)), throw=True)
     assert np.abs(sim.loop_gaps(t.x[-1])["pin"]).max() < 1e-8
 
 
 def test_bodies_of_both_collide():
     """A ball rolls into a block of the other mechanism; momentum goes over."""
-    scene = ball(radius=0.1, friction=0.0).add(block(0.4, friction=0.0), (1.0, 0.0, 0.2))
-    touch = dojo.Collision("ball", "block", dojo.Sphere(0.1), dojo.Box(0.4, 0.4, 0.4), friction=0.0)
+    scene = ball(radius=0.1, friction=0.0).add(block(0.2, friction=0.0), (1.0, 0.0, 0.1))
+    touch = dojo.Collision("ball", "block", dojo.Sphere(0.1), dojo.Box(0.2, 0.2, 0.2), friction=0.0)
     sim = dojo.Simulator(scene.with_collisions(touch), time_step=0.01, kappa=1e-8, tolerance=1e-10)
     x = sim.neutral()
     x[2] = 0.1
@@ -84,7 +86,7 @@ def test_an_obstacle_stops_what_touches_the_ground():
     x = sim.neutral()
     x[2] = 0.1
     x[sim.nq] = 1.0
-    assert run(sim, x, 100)[-1, 0] == pytest.approx(0.4, abs=1e-3)
+    assert run(sim, x, 100)[-1, 0] == pytest.approx(0.4, abs=3e-3)
     assert mech.collisions[0].name == "obstacle-ball"
 
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hills import GRID, H, WAVES, derivatives_of, waves
+from hills import GRID, WAVES, H, derivatives_of, waves
 from scenes import ball, block, chain, order, run
 
 import dojo_opt as dojo

@@ -61,7 +61,7 @@ def test_derivatives_are_those_of_the_pushed_step(rng):
     for J, change, n in ((A, lambda d: (sim.integrate(x, d), None), sim.ndx), (B, lambda d: (x, d), sim.nu)):
         for column, d in zip(J.T, 1e-5 * np.eye(n), strict=True):
             ends = [sim.step(*change(s * d), wrenches=push).x for s in (1.0, -1.0)]
-            slope = (sim.difference(after, ends[0]) - sim.difference(after, ends[1])) / 2e-5
+            slope = (sim.difference(x1=ends[0], x0=after) - sim.difference(x1=ends[1], x0=after)) / 2e-5
             np.testing.assert_allclose(column, slope, atol=1e-5 * np.abs(J).max())
     lines = sim.linearize_trajectory(x[None], np.zeros((1, sim.nu)), wrenches=push)
     np.testing.assert_allclose(lines.B[0], B, atol=1e-9)
