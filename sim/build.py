@@ -8,16 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.collisions import couples, pack_collisions
-from sim.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
-from sim.model import InputKind, Late, Law, Model
+from sim.model import InputKind, Law, Model
 from sim.parts import WORLD, Contact, Joint
-from sim.restitution import bounce_across, bounce_check, bounce_composites, bounce_gaps, bounce_start
 from sim.shapes import rotation_matrix
-from sim.swing import swing_curvature, swing_pose
 from sim.terrain import Terrain
-from sim.terrain_contact import terrain_block, terrain_far, terrain_gap, terrain_place, terrain_turn
 
 Floats = NDArray[np.float64]
 
@@ -56,31 +52,7 @@ def pack(mech: Mechanism) -> Model:
     _pack_loops(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
-    bind(model)
     return model
-
-
-def bind(model: Model) -> None:
-    """Fill in the addresses, in this process, of the kernels that few scenes have."""
-    if np.any(model.limit_cone):
-        model.late[Late.CONE_GAP] = cone_gap.address()
-        model.late[Late.CONE_BLOCK] = cone_block.address()
-        model.late[Late.CONE_DERIVATIVE] = cone_derivative.address()
-    if np.any(model.joint_nrot == 2):
-        model.late[Late.SWING_POSE] = swing_pose.address()
-        model.late[Late.SWING_CURVATURE] = swing_curvature.address()
-    if np.any(model.contact_terrain):
-        model.late[Late.TERRAIN_PLACE] = terrain_place.address()
-        model.late[Late.TERRAIN_TURN] = terrain_turn.address()
-        model.late[Late.TERRAIN_BLOCK] = terrain_block.address()
-        model.late[Late.TERRAIN_GAP] = terrain_gap.address()
-        model.late[Late.TERRAIN_FAR] = terrain_far.address()
-    if np.any(model.contact_restitution):
-        model.late[Late.BOUNCE_START] = bounce_start.address()
-        model.late[Late.BOUNCE_GAPS] = bounce_gaps.address()
-        model.late[Late.BOUNCE_CHECK] = bounce_check.address()
-        model.late[Late.BOUNCE_COMPOSITES] = bounce_composites.address()
-        model.late[Late.BOUNCE_ACROSS] = bounce_across.address()
 
 
 def _pack_tree(mech: Mechanism, model: Model) -> None:

@@ -14,14 +14,10 @@ contact_frame holds the rows n, T: those of the half-space, or on terrain those 
 
 from __future__ import annotations
 
-from sim.model import Late, Matrix, Model, Work
+from sim.model import Matrix, Model, Work
 from sim.rotation import cross, rotate
+from sim.terrain_contact import place_on_terrain, turn_on_terrain
 from solvers.jit import kernel
-from solvers.record import call_late
-
-_PLACE = int(Late.TERRAIN_PLACE)
-_TURN = int(Late.TERRAIN_TURN)
-_BLOCK = int(Late.TERRAIN_BLOCK)
 
 
 @kernel
@@ -34,7 +30,7 @@ def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int
         f = work.contact_frame[c]
         curved = model.contact_terrain[c] > 0
         if curved:
-            call_late(model.late[_PLACE], model, work, c, 0.0, 0.0)
+            place_on_terrain(model, work, c)
         point = model.contact_point[c]
         px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
         rho = model.contact_radius[c]
@@ -84,7 +80,7 @@ def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
         k[10 + 3 * e] = (ay + w * yy + by) / h - g * my
         k[11 + 3 * e] = (az + w * yz + bz) / h - g * mz
     if model.contact_terrain[c] > 0:
-        call_late(model.late[_TURN], model, work, c, h, 0.0)
+        turn_on_terrain(model, work, h, c)
 
 
 @kernel
@@ -152,15 +148,6 @@ def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f
     A[33] -= pz * x
     A[34] -= pz * y
     A[35] -= pz * z - dot
-
-
-@kernel
-def add_frame_matrix(model: Model, work: Work, c: int, share: float, out: Matrix) -> None:
-    """out[body] -= what the turning of the frame of a contact on terrain does to a share of its impulse."""
-    call_late(model.late[_BLOCK], model, work, c, share, 0.0)
-    A = out[model.contact_body[c]]
-    for k in range(36):
-        A[k] -= work.terrain_block[k]
 
 
 @kernel

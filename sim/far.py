@@ -28,21 +28,19 @@ Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: larges
 
 from __future__ import annotations
 
-from sim.model import Late, Model, Options, Work
+from sim.model import Model, Options, Work
 from sim.rotation import rotate
+from sim.terrain_contact import terrain_gap
 from solvers.jit import kernel
-from solvers.record import call_late
 
 STIFFNESS = 1000.0  # largest e, in units of the tolerance
-_GAP = int(Late.TERRAIN_GAP)
 
 
 @kernel
 def cluster_gap(model: Model, work: Work, c: int, third: bool) -> float:
     """Lower bound of the gaps of the cluster that begins at contact c, at configuration 3 or 2."""
     if model.contact_terrain[c] > 0:
-        call_late(model.late[_GAP], model, work, c, 3.0 if third else 2.0, 0.0)
-        return work.terrain_gap[0]
+        return terrain_gap(model, work, c, third)
     i = model.contact_body[c]
     pos = work.pos3 if third else work.pos2
     rot = work.rot3 if third else work.rot2

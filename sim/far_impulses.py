@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.far_bounds import NEARER, bound_changes, keep_motion
 from sim.friction import contact_impulse, start_contact
-from sim.model import Late, Law, Matrix, Model, Vector, Work
+from sim.model import Law, Matrix, Model, Work
 from sim.rotation import Vec3, cross, rotate
+from sim.terrain_far import evaluate_on_terrain
 from solvers.jit import kernel
-from solvers.record import call_late
 
 _LINEAR = int(Law.LINEAR)
-_FAR = int(Late.TERRAIN_FAR)
-NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulses are evaluated again
 _ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
@@ -50,7 +49,7 @@ def far_impulses(model: Model, work: Work, h: float) -> None:
         c = work.far_first[m]
         if moved(model, work, h, c):
             if model.contact_terrain[c] > 0:
-                call_late(model.late[_FAR], model, work, c, h, 0.0)
+                evaluate_on_terrain(model, work, h, c)
             else:
                 _evaluate(model, work, h, c)
 
@@ -63,34 +62,6 @@ def _to_body(R: Matrix, i: int, x: float, y: float, z: float) -> Vec3:
         R[i, 1] * x + R[i, 4] * y + R[i, 7] * z,
         R[i, 2] * x + R[i, 5] * y + R[i, 8] * z,
     )
-
-
-@kernel
-def keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
-    """The motion of body i at which its far impulses are evaluated."""
-    row[7] = work.quat3[i, 0]
-    for k in range(3):
-        row[4 + k] = work.pos3[i, k]
-        row[8 + k] = work.quat3[i, 1 + k]
-        row[11 + k] = (work.pos3[i, k] - work.pos2[i, k]) / h
-        row[14 + k] = 2.0 / h * work.turn[i, 1 + k]
-
-
-@kernel
-def bound_changes(model: Model, work: Work, c: int, gap: float) -> None:
-    """far[c, 1:3]: how much the wrench of a cluster can change beyond this gap, with the lever about O.
-
-    d gamma <= kappa/gap^2 d(gap),   d beta <= mu d gamma + mu^2 kappa/gap^2 d(slip)
-    """
-    i = model.contact_body[c]
-    mu = model.cluster[c, 6]
-    lever = 1.0 + model.cluster[c, 4]
-    for k in range(3):
-        lever += abs(work.pos2[i, k] - work.origin[k])
-    push = (model.cluster_end[c] - c) * work.far_law[0] / gap
-    row = work.far[c]
-    row[1] = lever * push * (1.0 + mu) / gap
-    row[2] = lever * push * mu * mu / gap
 
 
 @kernel

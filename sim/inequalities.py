@@ -8,7 +8,6 @@ from __future__ import annotations
 from sim.contact import (
     add_contact_matrix,
     add_contact_wrench,
-    add_frame_matrix,
     contact_jacobian,
     contact_kinematics,
 )
@@ -33,11 +32,12 @@ from sim.model import Goal, Late, Matrix, Model, Work
 from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
+from sim.restitution import subtract_floors
+from sim.terrain_contact import add_frame_matrix
 from solvers.cones import orthant_step
 from solvers.jit import kernel
-from solvers.record import call_late
+from solvers.late import late
 
-_GAPS = int(Late.BOUNCE_GAPS)
 _KAPPA_START = 1e-2  # [N s m]
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
@@ -49,8 +49,7 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
     pair_kinematics(model, work, h)
-    if model.late[_GAPS] != 0:
-        call_late(model.late[_GAPS], model, work, 0, h, 0.0)
+    subtract_floors(model, work)
     limit_gaps(model, work, h)
 
 
@@ -129,8 +128,16 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
-                add_frame_matrix(model, work, c, share, out)
+                add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
     condense_pairs(model, work, h, kappa, share)
+
+
+@late(Late.STIFFNESS)
+def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
+    """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
+    condense_into(model, work, h, kappa, 1.0, work.A3)
+    add_slip_jacobians(model, work, h)
+    add_limit_blocks(model, work, h)
 
 
 @kernel

@@ -23,14 +23,13 @@ from sim.friction import slip_noise
 from sim.inequalities import products, slip_error
 from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
-from sim.model import Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
+from sim.restitution import find_impacts, gained_energy
 from solvers.jit import inlined, kernel
-from solvers.record import call_late
+from solvers.late import late
 from solvers.status import Status
 
-_BOUNCE = int(Late.BOUNCE_START)
-_CHECK = int(Late.BOUNCE_CHECK)
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
@@ -109,13 +108,7 @@ def try_from(
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
-@kernel
-def gained_energy(model: Model, work: Work, h: float) -> bool:
-    """Whether impacts gave energy to the motion; they give back less then, and the step is to be solved again."""
-    return model.late[_CHECK] != 0 and call_late(model.late[_CHECK], model, work, 0, h, 0.0) != 0
-
-
-@inlined
+@late(Late.SOLVE, FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:
@@ -125,8 +118,7 @@ def interior_point(
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     choose_far(model, work, options)
-    if model.late[_BOUNCE] != 0:
-        call_late(model.late[_BOUNCE], model, work, 0, options.h, 0.0)
+    find_impacts(model, work, options.h)
     while True:
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):

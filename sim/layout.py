@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.model import Model, Work
+from sim.model import Late, Model, Work
 from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
@@ -25,7 +25,7 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late 15,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
@@ -55,7 +55,7 @@ WORK_FLOATS = _shapes(
     balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
-    contact_turn nground 18, terrain_block 36, terrain_gap 5, bounce ncontact 16, bounce_share 1,
+    contact_turn nground 18, bounce ncontact 16, bounce_share 1,
     contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
@@ -105,6 +105,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "2npair": 2 * sizes.npair,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
+        "nlate": len(Late),
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols

@@ -24,16 +24,14 @@ Scenes without restitution do not compile these kernels.
 
 from __future__ import annotations
 
-from typing import Any
-
 from sim.contact import contact_jacobian, contact_kinematics
 from sim.friction import contact_impulse
-from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pairs import is_absent, pair_arm, pair_force, pair_kinematics
 from sim.rotation import Vec3, cross
 from solvers.dense import dot
-from solvers.jit import kernel, late
+from solvers.jit import kernel
+from solvers.late import late
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none
 _LEAST = 0.1  # of the restitution; below, there is none
@@ -86,11 +84,9 @@ def raise_floors(model: Model, work: Work, share: float) -> None:
             b[1] = e if impact else 0.0
 
 
-@late
-def bounce_start(model_at: Any, work_at: Any, _: int, h: float, __: float) -> int:
+@late(Late.FIND_IMPACTS)
+def find_impacts(model: Model, work: Work, h: float) -> None:
     """Which near contacts are impacts in this step, and their floors."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     for c in range(work.bounce.shape[0]):
         work.bounce[c, 0] = 0.0
         work.bounce[c, 1] = 0.0
@@ -98,17 +94,14 @@ def bounce_start(model_at: Any, work_at: Any, _: int, h: float, __: float) -> in
     look_back(model, work, h, 1)
     look_back(model, work, h, 2)
     raise_floors(model, work, 1.0)
-    return 0
 
 
-@late
-def bounce_gaps(model_at: Any, work_at: Any, _: int, __: float, ___: float) -> int:
+@late(Late.SUBTRACT_FLOORS)
+def subtract_floors(model: Model, work: Work) -> None:
     """contact_kin: gaps above the floors."""
-    work = work_view(work_at)
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             work.contact_kin[c, 0] -= work.bounce[c, 0]
-    return 0
 
 
 @kernel
@@ -144,11 +137,9 @@ def tangential_work(model: Model, work: Work, h: float, c: int, f1: float, f2: f
     return 0.5 * (f1 * t1 + f2 * t2)
 
 
-@late
-def bounce_check(model_at: Any, work_at: Any, _: int, h: float, __: float) -> int:
-    """1, and lower floors, when there were impacts and the impulses of the solved step did work; else 0."""
-    model = model_view(model_at)
-    work = work_view(work_at)
+@late(Late.GAINED_ENERGY, False)
+def gained_energy(model: Model, work: Work, h: float) -> bool:
+    """Whether there were impacts, and the impulses of the solved step did work; floors are lower then."""
     gain = 0.0
     size = 0.0
     impacts = False
@@ -161,13 +152,13 @@ def bounce_check(model_at: Any, work_at: Any, _: int, h: float, __: float) -> in
             gain += 0.5 * fn * (gap - b[14]) / h + tangential_work(model, work, h, c, f1, f2)
             size += 0.5 * fn * (abs(gap - b[15]) + abs(b[15] - b[14])) / h
     if not impacts or not gain > _NOISE * size:
-        return 0
+        return False
     share = 0.5 * work.bounce_share[0]
     if share < _LEAST:
         share = 0.0
     work.bounce_share[0] = share
     raise_floors(model, work, share)
-    return 1
+    return True
 
 
 @kernel
@@ -193,11 +184,9 @@ def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
     return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
 
 
-@late
-def bounce_composites(model_at: Any, work_at: Any, _: int, __: float, ___: float) -> int:
+@late(Late.BOUNCE_COMPOSITES)
+def add_bounce_composites(model: Model, work: Work) -> None:
     """A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]
@@ -211,7 +200,6 @@ def bounce_composites(model_at: Any, work_at: Any, _: int, __: float, ___: float
                 if i >= 0:
                     _add_outer(work.A1[i], f, t, b[1], b[2:8])
                     _add_outer(work.A2[i], f, t, 1.0 - b[1], b[8:14])
-    return 0
 
 
 @kernel
@@ -224,11 +212,9 @@ def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
             A[18 + 6 * r + k] += t[r] * x
 
 
-@late
-def bounce_across(model_at: Any, work_at: Any, _: int, __: float, ___: float) -> int:
+@late(Late.BOUNCE_DERIVATIVES)
+def add_bounce_derivatives(model: Model, work: Work) -> None:
     """dR_dq, dR_dv -= the same across the two bodies of an impact."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     ground = model.contact_height.shape[0]
     for j in range(model.pair_kind.shape[0]):
         b = work.bounce[ground + j]
@@ -244,7 +230,6 @@ def bounce_across(model_at: Any, work_at: Any, _: int, __: float, ___: float) ->
             _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dq)
             _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dv)
             _across(model, work, (i, k), b[1] - 1.0, b[8:14], work.S2, work.dR_dq)
-    return 0
 
 
 @kernel

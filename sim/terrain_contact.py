@@ -16,16 +16,12 @@ Scenes without terrain do not compile these kernels.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
-from sim.contact import contact_kinematics
-from sim.far_impulses import NEARER, bound_changes, keep_motion
-from sim.friction import contact_impulse, start_contact
 from sim.height_field import height_field
-from sim.layout import model_view, work_view
-from sim.model import Model, Vector, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from sim.rotation import Vec3, cross, rotate
-from solvers.jit import kernel, late
+from solvers.jit import kernel
+from solvers.late import late
 
 
 @kernel
@@ -38,50 +34,32 @@ def upright_frame(x: float, y: float, z: float, out: Vector) -> None:
 
 
 @kernel
-def centre(model: Model, work: Work, c: int, configuration: int) -> Vec3:
-    """Centre of the ball of contact c, world axes."""
+def centre(model: Model, work: Work, c: int, third: bool) -> Vec3:
+    """Centre of the ball of contact c at configuration 3 or 2, world axes."""
     i = model.contact_body[c]
     p = model.contact_point[c]
-    if configuration == 1:
-        x, y, z = rotate(work.rot1, i, p[0], p[1], p[2])
-        return x + work.pos1[i, 0], y + work.pos1[i, 1], z + work.pos1[i, 2]
-    if configuration == 2:
-        x, y, z = rotate(work.rot2, i, p[0], p[1], p[2])
-        return x + work.pos2[i, 0], y + work.pos2[i, 1], z + work.pos2[i, 2]
-    x, y, z = rotate(work.rot3, i, p[0], p[1], p[2])
-    return x + work.pos3[i, 0], y + work.pos3[i, 1], z + work.pos3[i, 2]
+    pos = work.pos3 if third else work.pos2
+    x, y, z = rotate(work.rot3 if third else work.rot2, i, p[0], p[1], p[2])
+    return x + pos[i, 0], y + pos[i, 1], z + pos[i, 2]
 
 
-@late
-def terrain_place(model_at: Any, work_at: Any, c: int, _: float, __: float) -> int:
+@late(Late.TERRAIN_PLACE)
+def place_on_terrain(model: Model, work: Work, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
-    model = model_view(model_at)
-    work = work_view(work_at)
-    x, y, z = centre(model, work, c, 3)
+    x, y, z = centre(model, work, c, True)
     F, Fx, Fy, _xx, _xy, _yy = height_field(model, model.contact_terrain[c] - 1, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
     upright_frame(-i * Fx, -i * Fy, i, work.contact_frame[c])
     work.contact_kin[c, 0] = i * (z - F - model.contact_height[c])
-    return 0
 
 
-@late
-def terrain_gap(model_at: Any, work_at: Any, c: int, configuration: float, __: float) -> int:
-    """terrain_gap = lower bound of the distance, gap phi, and m of contact c at a configuration."""
-    model = model_view(model_at)
-    work = work_view(work_at)
+@late(Late.TERRAIN_GAP, 0.0)
+def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
+    """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
-    x, y, z = centre(model, work, c, int(configuration))
-    F, Fx, Fy, Fxx, Fxy, Fyy = height_field(model, k, x, y)
-    i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
-    z -= F + model.contact_height[c]
-    out = work.terrain_gap
-    out[0] = z / model.terrain_place[k, 6]
-    out[1] = i * z
-    out[2] = -i * Fx - i * i * out[1] * (Fxx * Fx + Fxy * Fy)
-    out[3] = -i * Fy - i * i * out[1] * (Fxy * Fx + Fyy * Fy)
-    out[4] = i
-    return 0
+    x, y, z = centre(model, work, c, third)
+    F = height_field(model, k, x, y)[0]
+    return (z - F - model.contact_height[c]) / model.terrain_place[k, 6]
 
 
 @kernel
@@ -102,19 +80,17 @@ def _frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
     return a + s * n[0], b + s * n[1], c + s * n[2]
 
 
-@late
-def terrain_turn(model_at: Any, work_at: Any, c: int, h: float, _: float) -> int:
+@late(Late.TERRAIN_TURN)
+def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
     """contact_turn = Omega, rotation of the frame by the twist about O; (gap, slip) rows of contact_kin on terrain.
 
     gap     m, (c - O) x m
     slip    those of a fixed frame, and  Omega^T (t x u - rho n x (t x omega))
     """
-    model = model_view(model_at)
-    work = work_view(work_at)
     i = model.contact_body[c]
     k = work.contact_kin[c]
     f = work.contact_frame[c]
-    x, y, z = centre(model, work, c, 3)
+    x, y, z = centre(model, work, c, True)
     _F, Fx, Fy, Fxx, Fxy, Fyy = height_field(model, model.contact_terrain[c] - 1, x, y)
     e1, e2 = turn_columns(f[:3], Fxx, Fxy, Fyy)
     ax, ay, az = x - work.origin[0], y - work.origin[1], z - work.origin[2]
@@ -143,72 +119,31 @@ def terrain_turn(model_at: Any, work_at: Any, c: int, h: float, _: float) -> int
         for j in range(3):
             k[18 + 3 * e + j] += s0 * W[j] + s1 * W[6 + j] + s2 * W[12 + j]
             k[9 + 3 * e + j] += s0 * W[3 + j] + s1 * W[9 + j] + s2 * W[15 + j]
-    return 0
 
 
-@late
-def terrain_block(model_at: Any, work_at: Any, c: int, share: float, _: float) -> int:
-    """terrain_block (6 x 6) = d(wrench about O)/d(twist) by the turning of the frame, of a share of the impulse f:
+@late(Late.TERRAIN_MATRIX)
+def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[body] -= d(wrench about O)/d(twist) by the turning of the frame, of the impulse f = n fn + t1 f1 + t2 f2:
 
     (Omega x f,  a x (Omega x f) - rho (Omega x n) x f),   a: from O to where the impulse acts
     """
-    model = model_view(model_at)
-    work = work_view(work_at)
     i = model.contact_body[c]
     k = work.contact_kin[c]
     F = work.contact_frame[c]
     W = work.contact_turn[c]
-    fn, f1, f2 = contact_impulse(model, work, c)
-    f0 = share * (F[0] * fn + F[3] * f1 + F[6] * f2)
-    f1, f2 = share * (F[1] * fn + F[4] * f1 + F[7] * f2), share * (F[2] * fn + F[5] * f1 + F[8] * f2)
+    A = out[i]
+    x = F[0] * fn + F[3] * f1 + F[6] * f2
+    y = F[1] * fn + F[4] * f1 + F[7] * f2
+    z = F[2] * fn + F[5] * f1 + F[8] * f2
     rho = model.contact_radius[c]
     ax = work.pos2[i, 0] - work.origin[0] + k[3]
     ay = work.pos2[i, 1] - work.origin[1] + k[4]
     az = work.pos2[i, 2] - work.origin[2] + k[5]
-    out = work.terrain_block
     for j in range(6):
-        d = cross(W[j], W[6 + j], W[12 + j], f0, f1, f2)
+        d = cross(W[j], W[6 + j], W[12 + j], x, y, z)
         n = cross(W[j], W[6 + j], W[12 + j], F[0], F[1], F[2])
         t = cross(ax, ay, az, d[0], d[1], d[2])
-        s = cross(n[0], n[1], n[2], f0, f1, f2)
+        s = cross(n[0], n[1], n[2], x, y, z)
         for r in range(3):
-            out[6 * r + j] = d[r]
-            out[18 + 6 * r + j] = t[r] - rho * s[r]
-    return 0
-
-
-@late
-def terrain_far(model_at: Any, work_at: Any, c: int, h: float, _: float) -> int:
-    """far[c, 1:4], far[c, 4:24] and the cone variables of a far contact at configuration 3.
-
-    Within 0.2 of the lower bound b of its distance: gaps above 0.8 b, |m| <= 1 + 1.2 (1 + slope^2) b H, and frame
-    and slip change with the second derivatives H of the ground.
-    """
-    model = model_view(model_at)
-    work = work_view(work_at)
-    i = model.contact_body[c]
-    p = model.terrain_place[model.contact_terrain[c] - 1]
-    row = work.far[c]
-    keep_motion(work, h, i, row)
-    contact_kinematics(model, work, h, c, c + 1)
-    start_contact(model, work, c, work.far_law[0], row[0])
-    fn, f1, f2 = contact_impulse(model, work, c)
-    k = work.contact_kin[c]
-    F = work.contact_frame[c]
-    for e in range(3):
-        row[17 + e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-    row[20], row[21], row[22] = cross(k[3], k[4], k[5], row[17], row[18], row[19])
-    row[23] = max(k[0] / p[6], row[0])
-    least = (1.0 - NEARER) * row[23]
-    bound_changes(model, work, c, least)
-    mu = model.contact_friction[c]
-    force = work.far_law[0] / least * (1.0 + mu)
-    speed = sqrt(k[1] * k[1] + k[2] * k[2])
-    turning = sqrt(row[14] * row[14] + row[15] * row[15] + row[16] * row[16])
-    row[1] *= 1.0 + (1.0 + NEARER) * p[6] * p[6] * row[23] * p[7]
-    row[1] += p[7] * (row[2] * (2.0 * speed + model.contact_radius[c] * turning))
-    arm = 1.0 + abs(work.pos2[i, 0] - work.origin[0]) + abs(work.pos2[i, 1] - work.origin[1])
-    arm += abs(work.pos2[i, 2] - work.origin[2]) + model.cluster[c, 4] + model.contact_radius[c]
-    row[1] += 2.0 * p[7] * arm * force
-    row[3] = 2.0 * model.cluster[c, 4] * force
-    return 0
+            A[6 * r + j] -= d[r]
+            A[18 + 6 * r + j] -= t[r] - rho * s[r]
