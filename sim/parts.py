@@ -258,7 +258,7 @@ class Contact:
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
         object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
-        object.__setattr__(self, "restitution", _share(f"{call}, restitution=...)", self.restitution))
+        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
         if self.terrain is not None:
             self._put_on(f"{call}, terrain=...)", self.terrain)
 
@@ -290,7 +290,7 @@ class Contact:
         return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])
 
 
-def _share(call: str, value: Any) -> float:
+def share(call: str, value: Any) -> float:
     """A number from 0 to 1."""
     share = checks.number(call, value, at_least=0.0)
     if share > 1.0:

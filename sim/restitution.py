@@ -9,8 +9,10 @@ the way of one step above the ground. It is the usual law, with a floor that imp
 
     s = phi3 - floor,   s gamma = kappa,      floor = (1 - e) phi2 + e phi1 of an impact, 0 otherwise
 
-so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. With friction
-and several contacts Newton's law may feed energy in (Kane's example). Where the impulses of a step did work in all,
+so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. What comes
+slower than max(2 g h, sqrt(kappa / (m h))) is no impact: it would be back within a few steps, or the forces of the
+central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
+example). Where the impulses of a step did work in all,
 
     sum of 1/2 (gamma (v_n + v_n') + beta (v_t + v_t')) > 0,     ' before,
 
@@ -23,6 +25,8 @@ Scenes without restitution do not compile these kernels.
 """
 
 from __future__ import annotations
+
+from math import sqrt
 
 from sim.contact import contact_jacobian, contact_kinematics
 from sim.friction import contact_impulse
@@ -72,14 +76,24 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
 
 
 @kernel
-def raise_floors(model: Model, work: Work, share: float) -> None:
+def least_closing(model: Model, work: Work, h: float, c: int) -> float:
+    """How much a gap closes in a step, at least, in an impact [m]."""
+    g = model.gravity
+    fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    m = model.body_mass[model.contact_body[c]]
+    return h * sqrt(max(fall, work.far_law[0] / (h * m) if m > 0.0 else 0.0))
+
+
+@kernel
+def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
     """Floors of the impacts of this step, with a share of the restitution."""
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]
             e = share * model.contact_restitution[c]
             floor = (1.0 - e) * b[15] + e * b[14]
-            impact = e > 0.0 and b[15] < b[14] and 2.0 * b[15] < b[14] and floor > 0.0
+            fast = b[14] - b[15] > least_closing(model, work, h, c)
+            impact = e > 0.0 and fast and 2.0 * b[15] < b[14] and floor > 0.0
             b[0] = floor if impact else 0.0
             b[1] = e if impact else 0.0
 
@@ -93,7 +107,7 @@ def find_impacts(model: Model, work: Work, h: float) -> None:
     work.bounce_share[0] = 1.0
     look_back(model, work, h, 1)
     look_back(model, work, h, 2)
-    raise_floors(model, work, 1.0)
+    raise_floors(model, work, h, 1.0)
 
 
 @late(Late.SUBTRACT_FLOORS)
@@ -157,7 +171,7 @@ def gained_energy(model: Model, work: Work, h: float) -> bool:
     if share < _LEAST:
         share = 0.0
     work.bounce_share[0] = share
-    raise_floors(model, work, share)
+    raise_floors(model, work, h, share)
     return True
 
 

@@ -129,3 +129,31 @@ def test_impacts_converge_with_the_time_step():
         hits = np.flatnonzero(t.contacts.normal_force[:, 0] > 5.0 * 9.81)
         errors.append(abs(h * hits[2] - expected))
     assert errors[-1] < 0.01 and order(errors).min() > 0.0, errors
+
+
+def test_balls_exchange_their_momentum():
+    """Newton's law between two bodies in space: relative speeds before and after, and momentum."""
+    e = 0.8
+    two = ball(gravity=(0.0, 0.0, 0.0)).add(ball(mass=3.0, gravity=(0.0, 0.0, 0.0)), (1.0, 0.0, 0.0), "other ")
+    mech = dataclasses.replace(two, contacts=())
+    touch = dojo.Collision("ball", "other ball", dojo.Sphere(0.1), dojo.Sphere(0.1), restitution=e)
+    sim = dojo.Simulator(mech.with_collisions(touch), time_step=0.01, kappa=1e-10, tolerance=1e-11)
+    x = sim.neutral()
+    x[sim.nq] = 2.0
+    last = run(sim, x, 60)[-1, sim.nq :]
+    assert last[0] + 3.0 * last[6] == pytest.approx(2.0, abs=1e-9)
+    assert last[6] - last[0] == pytest.approx(2.0 * e, rel=1e-3)
+
+
+@pytest.mark.parametrize("kappa", [1e-2, 1e-4])
+def test_derivatives_of_an_impact_between_bodies(kappa):
+    """A ball hits the end of a chain; both move, turn, and rub."""
+    links = chain("revolute", 1)
+    mech = dataclasses.replace(ball(gravity=(0.0, 0.0, 0.0)), contacts=()).add(links, (1.0, 0.0, 0.0))
+    touch = dojo.Collision("ball", "body0", dojo.Sphere(0.1), dojo.Box(0.3, 0.3, 0.3), restitution=0.6)
+    sim = dojo.Simulator(mech.with_collisions(touch), time_step=0.01)
+    x = sim.neutral()
+    x[:3] = 1.0 - 0.15 - 0.1 - 0.01, 0.03, 0.02
+    x[sim.nq :] = 2.0, 0.3, -0.2, 0.5, -0.4, 1.0, -0.3, 0.1, 0.2, 0.3, 0.2, -0.1, 0.5
+    result = derivatives_of(sim.mechanism, x, kappa)
+    assert result.x[sim.nq] < 1.0
