@@ -185,3 +185,25 @@ def test_without_friction_energy_stays_in_a_bowl():
         drift.append(np.ptp(sim.energy(rows)))
     assert drift[-1] < 0.02
     assert order(drift).min() > 0.7, drift
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        dojo.Terrain.slope(np.radians(10.0), (1.0, 0.5)),
+        dojo.Terrain.from_function(dojo.Terrain.slope(np.radians(10.0), (1.0, 0.5)).height, GRID, GRID),
+        dojo.Terrain.steps([0.06], start=0.0),
+        dojo.Terrain.steps([0.05, -0.05], start=-0.02, depth=0.15, direction=(0.3, 1.0)),
+    ],
+    ids=["slope", "inclined grid", "step", "curb"],
+)
+def test_a_quadruped_stands(terrain):
+    """Springs in its joints hold it; it neither creeps nor sinks in."""
+    mech = dojo.models.quadruped(spring=80.0, damper=2.0, stance=(0.9, -1.425)).on(terrain)
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
+    t = sim.rollout(sim.neutral(), np.zeros((300, sim.nu)), throw=True)
+    assert t.contacts.gap.min() > -1e-8
+    z = sim.maximal(t.x)[:, mech.body_names.index("trunk"), :3]
+    assert np.linalg.norm(z[-1] - z[200]) < 1e-4
+    assert (t.contacts.normal_force[-1] > 1.0).sum() >= 3
+    assert z[-1, 2] - terrain.height(*z[-1, :2]) > 0.2
