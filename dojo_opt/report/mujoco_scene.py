@@ -5,8 +5,8 @@ have the same layout and, but for the convention of v (mean over the last interv
 Contacts become spheres paired with the plane of their half-space, and with nothing else.
 
 What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones.
-With `hinges=True` an orbital joint becomes two hinges one after the other, which has as many coordinates and moves as it
-does near zero: to be timed beside, not to be compared with.
+With `hinges=True` an orbital joint becomes two hinges one after the other, which has as many coordinates and moves as
+it does near zero: to be timed beside, not to be compared with.
 What it says otherwise: contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
 """
 

@@ -5,7 +5,7 @@ maker's motors can do: with all of it an A1 turns its joints five times faster t
 and differentiates it where it ends (`Simulator.linearize_rollout`); MuJoCo takes `mjd_transitionFD`, one-sided, and a
 step. Its humanoid has two hinges where ours has an orbital joint.
 
-Dojo's figures were measured by its authors (arXiv 2203.00806v5, Table V, an Intel i9-10885H), with 12 contacts on the A1.
+Dojo's figures were measured by its authors (arXiv 2203.00806v5, Table V, Intel i9-10885H), with 12 contacts on the A1.
 """
 
 from __future__ import annotations
