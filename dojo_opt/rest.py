@@ -59,7 +59,7 @@ def _down(feet: Feet, state: Array) -> Array:
     return np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
 
 
-def _pressed(sim: Simulator, feet: Feet, state: Array, free: Array) -> tuple[Array, Array]:
+def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
     """The state moved until the forces kappa / (h gap) of all contacts balance the free degrees of freedom; the forces.
 
     Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so the
@@ -94,8 +94,9 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     feet, B = Feet(sim, mech.contact_names), input_map(sim)
     state = np.array(sim.neutral() if x is None else x, dtype=float)
     state[sim.nq :] = 0.0
-    free = ~B.any(axis=1)
-    u, left = np.zeros(sim.nu), np.zeros(sim.nv)
+    free = np.asarray(~B.any(axis=1))
+    u: Array = np.zeros(sim.nu)
+    left: Array = np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
         down = _down(feet, state)
