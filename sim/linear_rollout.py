@@ -1,6 +1,4 @@
 """A rollout with the derivatives of its steps, in one pass: each step is solved once, and differentiated where it ends.
-
-Compiled by the first scene that asks for it.
 """
 
 from __future__ import annotations
@@ -19,9 +17,7 @@ _SINGULAR = int(Status.SINGULAR)
 
 
 @kernel
-def roll_linear(
-    model_at: Table, work_at: Table, settings: Vector, line: Linearized, hard: int | None, smooth: int | None
-) -> int:
+def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized) -> int:
     """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from line.xs[0]; returns the number of solved steps.
 
     line.xs: (T + 1, nx), of which the first row is given; x_next is not used.
@@ -34,9 +30,9 @@ def roll_linear(
         x = line.xs[t]
         report = line.reports[t]
         guess = Guess(x[nq:], t > 0)
-        if step(model, work, options, x, line.us[t], guess, line.xs[t + 1], report, hard, smooth) != _SOLVED:
+        if step(model, work, options, x, line.us[t], guess, line.xs[t + 1], report) != _SOLVED:
             return t
-        if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], line.A[t], line.B[t], hard):
+        if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], line.A[t], line.B[t]):
             report[0] = _SINGULAR
             return t
     return line.us.shape[0]
