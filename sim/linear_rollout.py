@@ -1,5 +1,4 @@
-"""A rollout with the derivatives of its steps, in one pass: each step is solved once, and differentiated where it ends.
-"""
+"""A rollout with the derivatives of its steps in one pass: a step is solved once, and differentiated where it ends."""
 
 from __future__ import annotations
 
