@@ -107,7 +107,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         rows = np.concatenate([(down[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
         force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
         left = load - down.T @ force
-        u = np.linalg.lstsq(B, left, rcond=None)[0]
+        u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * force[loaded])
         error = wanted - gap[loaded]
@@ -118,7 +118,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         state = sim.integrate(state, move)
     state, force = _pressed(sim, feet, state, free)
     left = potential_gradient(sim, state) - stop_torques(sim, state) - _down(feet, state).T @ force
-    u = np.linalg.lstsq(B, left, rcond=None)[0]
+    u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
     if np.abs(left[free]).max() > 1e-3 * weight:
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(
