@@ -58,7 +58,7 @@ def test_it_rests_in_the_end(e):
 @pytest.mark.parametrize("e", [0.5, 1.0])
 @pytest.mark.parametrize("friction", [0.0, 0.8])
 def test_impacts_give_no_energy(e, friction, rng):
-    """Tumbling blocks and chains: what an impact adds to the energy is of first order in the time step, 1 % here."""
+    """Tumbling blocks and chains: no impact adds energy; elastic ones without friction do, of first order in the step."""
     chains = chain("revolute", 2, gravity=(0.0, 0.0, -9.81))
     tips = [dojo.Contact(f"body{k}", (0.2, 0.1, -0.2), 0.05, friction=friction) for k in range(3)]
     for mech in (block(0.4, friction=friction), dataclasses.replace(chains, contacts=tips)):
@@ -67,7 +67,7 @@ def test_impacts_give_no_energy(e, friction, rng):
             x = random_state(sim, rng, 2.0, 0.7)
             x[2] = 1.0
             energy = sim.energy(run(sim, x, 1500))
-            assert (energy - energy[0]).max() < 0.01 * abs(sim.kinetic_energy(x) + 9.81 * x[2])
+            assert (energy - energy[0]).max() < (0.04 if e == 1.0 and friction == 0.0 else 0.002) * energy[0]
 
 
 def test_kane_s_double_pendulum_does_not_gain():
