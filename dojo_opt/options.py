@@ -18,11 +18,13 @@ class Stage(NamedTuple):
     iterations: int = 100  # ends after this many
 
 
-# Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
+# Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage,
+# whose derivatives are those of its rollouts: smoother ones (1e-4) cost a linearisation more per iteration and lead 72
+# random gaits through 23 iterations at the median instead of 16, and ten random hops through 17.5 instead of 14.
 CONTINUATION = (
     Stage(3e-2, 3e-2),
     Stage(3e-3, 3e-3),
-    Stage(1e-6, 1e-4),
+    Stage(1e-6, 1e-6),
 )
 
 
