@@ -50,6 +50,7 @@ def load(model: Model, time_step: float, approximation: str = "") -> Plant:
     builder = DiagramBuilder()
     plant, graph = AddMultibodyPlantSceneGraph(builder, time_step if approximation else 0.0)
     if approximation:
+        plant.SetUseSampledOutputPorts(False)  # a step is then an update of the discrete state alone
         plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation}"))
     plant.mutable_gravity_field().set_gravity_vector(model.gravity)
     count = len(model.body_mass)
