@@ -45,6 +45,7 @@ __all__ = [
     "Sphere",
     "Status",
     "String",
+    "Terrain",
     "Trajectory",
     "UrdfError",
     "UrdfMechanism",
@@ -62,6 +63,7 @@ __all__ = [
     "plots",
     "problems",
     "tasks",
+    "tracking_gains",
     "viewer",
 ]
 
@@ -94,6 +96,7 @@ _HOME: dict[str, str | None] = {
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "String": "sim.shapes",
+    "Terrain": "sim.terrain",
     "Trajectory": "sim.results",
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
@@ -111,6 +114,7 @@ _HOME: dict[str, str | None] = {
     "plots": None,
     "problems": None,
     "tasks": None,
+    "tracking_gains": "dojo_opt.tracking",
     "viewer": None,
 }
 
@@ -127,6 +131,7 @@ if TYPE_CHECKING:
     from dojo_opt.plant.study import monte_carlo
     from dojo_opt.problem import Problem
     from dojo_opt.rest import equilibrium
+    from dojo_opt.tracking import tracking_gains
     from sim.collisions import Collision
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
@@ -134,6 +139,7 @@ if TYPE_CHECKING:
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
+    from sim.terrain import Terrain
     from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status
 
