@@ -21,14 +21,14 @@ from sim.elimination import project
 from sim.joints import relative_to_rest
 from sim.kinematics import tree_poses
 from sim.mass import solve_mass
-from sim.model import InputKind, Integers, Late, Matrix, Model, Vector, Work
-from sim.rotation import cross, quat_mul, rotate
+from sim.model import InputKind, Integers, Late, Model, Vector, Work
+from sim.outer import outer_wrenches
+from sim.rotation import cross, quat_mul
 from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import call_late
 
 _JOINT = int(InputKind.JOINT)
-_BODY = int(InputKind.BODY)
 _SWING_CURVATURE = int(Late.SWING_CURVATURE)
 
 
@@ -103,48 +103,6 @@ def velocity_of_momenta(model: Model, work: Work, free: Integers, momenta: Vecto
         return False
     subtree_momenta(model, work)
     return True
-
-
-@kernel
-def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
-    """out[:6] = wrench about O per unit of the WORLD or BODY input j, at the configuration in `work`."""
-    i = model.input_index[j]
-    w = model.input_wrench[j]
-    f = (w[0], w[1], w[2])
-    t = (w[3], w[4], w[5])
-    if model.input_kind[j] == _BODY:
-        f = rotate(work.rot2, i, f[0], f[1], f[2])
-        t = rotate(work.rot2, i, t[0], t[1], t[2])
-    o = work.origin
-    x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
-    c = cross(x, y, z, f[0], f[1], f[2])
-    for k in range(3):
-        out[k] = f[k]
-        out[3 + k] = t[k] + c[k]
-
-
-@kernel
-def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
-    """out[i] = wrench of gravity and of WORLD and BODY inputs on the subtree of body i.   (nbody, 6)"""
-    n = model.body_parent.shape[0]
-    o, g = work.origin, model.gravity
-    for i in range(n):
-        m = model.body_mass[i]
-        F = out[i]
-        F[0], F[1], F[2] = m * g[0], m * g[1], m * g[2]
-        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
-        F[3], F[4], F[5] = cross(x, y, z, F[0], F[1], F[2])
-    for j in range(u.shape[0]):
-        if model.input_kind[j] != _JOINT:
-            w = work.wrench[0]
-            input_wrench(model, work, j, w)
-            for k in range(6):
-                out[model.input_index[j], k] += u[j] * w[k]
-    for i in range(n - 1, -1, -1):
-        p = model.body_parent[i]
-        if p >= 0:
-            for k in range(6):
-                out[p, k] += out[i, k]
 
 
 @kernel

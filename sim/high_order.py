@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 
 from sim import bodies, coordinates, runge_kutta
-from sim.calls import REPORT, Calls, Floats, Settings
+from sim.calls import BOUND, CONE, REPORT, Calls, Floats, Settings
+from sim.hamilton_gradient import Slopes
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
+from sim.policy import Path, Policy
+from sim.rollout import Linearized
+from sim.tangents import Tangents
 from solvers.status import Status
 
 
@@ -149,13 +153,55 @@ class HighOrder(Calls):
         columns = np.concatenate([z[..., 3:6], z[..., 10:]], axis=2)
         return columns.reshape(len(z), -1), np.concatenate([linear, angular], axis=2).reshape(len(z), -1)
 
-    def linearize(self, *_: Any, **__: Any) -> NoReturn:
-        """Refused."""
-        self._refuse("derivatives are")
+    def _tangents(self) -> Tangents:
+        """Scratch of derivatives."""
+        nv, nq, s = self.sizes.nv, self.sizes.nq, len(tableau(self.settings.order)[1])
+        n = 2 * nv + self.nu
+        slopes = Slopes(*(np.zeros((nv, m)) for m in (nv, nv, nv, nv, self.nu, 42)))
+        shapes = ((nq, n), (nv, n), (nq, n), (nv, n), (nv, n), (s, nq, n), (s, nv, n))
+        return Tangents(slopes, *(np.zeros(shape) for shape in shapes))
 
-    def closed_loop(self, *_: Any, **__: Any) -> NoReturn:
-        """Refused."""
-        self._refuse("feedback is")
+    def linearize(
+        self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
+    ) -> tuple[Floats, ...]:
+        """As Calls.linearize, on one core; there is no kappa and nothing to guess."""
+        swings = np.flatnonzero(self.model.joint_nrot == 2)
+        if len(swings):
+            raise ValueError(
+                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
+                "(orbital), are those of order 2; use replace(order=2)"
+            )
+        n = len(us)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        line = Linearized(xs, us, A, B, x_next, reports)
+        h = self.settings.time_step
+        runge_kutta.linearize(self._model, self._work(), h, self._scheme(), substeps, line, self._tangents())
+        unsolved = reports[:, 0] != Status.SOLVED
+        for array in (A, B, x_next):
+            array[unsolved] = 0.0
+        return A, B, x_next, reports
+
+    def closed_loop(
+        self,
+        x: Vector,
+        policy: Policy,
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """As Calls.closed_loop."""
+        knots = len(policy.us)
+        kept = np.zeros((knots if keep else 0, 0, CONE)), np.zeros((knots if keep else 0, 0, BOUND))
+        path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
+        h = self.settings.time_step
+        knot = runge_kutta.closed_loop(
+            self._model, self._work(), h, self._scheme(), x, policy, alpha, limits, substeps, path
+        )
+        return int(knot), path
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
         """Refused."""

@@ -16,6 +16,11 @@ from sim.dynamics import joints_below_turn
 from sim.hamilton import coordinate_rates, momenta_of_velocity, momentum_rates, place, velocity_of_momenta
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.policy import Path, Policy
+from sim.rollout import Linearized
+from sim.state import integrate_state, state_difference
+from sim.tangents import Tangents, first_tangents, keep_tangents, last_tangents, move_tangents, tangent_rates
+from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -63,7 +68,7 @@ def _add_rates(h: float, weights: Vector, count: int, rates: Matrix, out: Vector
 
 
 @kernel
-def _move(work: Work, scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> None:
+def _move(scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> None:
     """stage = node + h sum of weights[j] times the rates of stage j, j < count."""
     for k in range(q.shape[0]):
         scheme.stage_q[k] = q[k]
@@ -74,8 +79,11 @@ def _move(work: Work, scheme: Scheme, h: float, weights: Vector, count: int, q: 
 
 
 @kernel
-def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Vector) -> int:
-    """x one step later, in place, with its evaluation in `work` before and after; returns the Status."""
+def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Vector, tangents: Tangents | None) -> int:
+    """x one step later, in place, with its evaluation in `work` before and after; returns the Status.
+
+    tangents: of the node, moved along; without them nothing of them is compiled.
+    """
     nq = work.theta1.shape[0]
     q, v = x[:nq], x[nq:]
     s = scheme.b.shape[0]
@@ -83,16 +91,24 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
         return _ANGULAR_STEP
     for i in range(s):
         if i > 0:
-            _move(work, scheme, h, scheme.a[i], i, q)
+            _move(scheme, h, scheme.a[i], i, q)
             place(model, work, scheme.stage_q)
             if not velocity_of_momenta(model, work, scheme.free, scheme.stage_p):
                 return _SINGULAR
         momentum_rates(model, work, scheme.free, u, scheme.rates_p[i])
-        coordinate_rates(model, q if i == 0 else scheme.stage_q, work.nu, scheme.rates_q[i])
-    _move(work, scheme, h, scheme.b, s, q)
+        stage_q = q if i == 0 else scheme.stage_q
+        coordinate_rates(model, stage_q, work.nu, scheme.rates_q[i])
+        if tangents is not None:
+            move_tangents(tangents, h, scheme.a[i], i)
+            if not tangent_rates(model, work, scheme.free, u, stage_q, tangents, i):
+                return _SINGULAR
+    _move(scheme, h, scheme.b, s, q)
     place(model, work, scheme.stage_q)
     if not velocity_of_momenta(model, work, scheme.free, scheme.stage_p):
         return _SINGULAR
+    if tangents is not None:
+        move_tangents(tangents, h, scheme.b, s)
+        keep_tangents(model, scheme.stage_q, work.theta1, tangents)
     total = 0.0
     for k in range(nq):
         q[k] = work.theta1[k]
@@ -118,10 +134,73 @@ def roll(
     for t in range(us.shape[0]):
         for k in range(xs.shape[1]):
             xs[t + 1, k] = xs[t, k]
-        status = advance(model, work, scheme, h, us[t], xs[t + 1])
+        status = advance(model, work, scheme, h, us[t], xs[t + 1], None)
         reports[t, 0] = status
         reports[t, 1] = scheme.b.shape[0]
         reports[t, 4] = -1.0
         if status != _SOLVED:
             return t
     return us.shape[0]
+
+
+@kernel
+def linearize(
+    model_at: Table, work_at: Table, h: float, scheme: Scheme, substeps: int, line: Linearized, tangents: Tangents
+) -> None:
+    """Derivatives of all knots of `substeps` steps each, carried through every stage."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    for t in range(line.us.shape[0]):
+        x, report = line.x_next[t], line.reports[t]
+        for k in range(x.shape[0]):
+            x[k] = line.xs[t, k]
+        begin(model, work, scheme, x)
+        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], x, tangents) else _SINGULAR
+        for _ in range(substeps):
+            if status == _SOLVED:
+                status = advance(model, work, scheme, h, line.us[t], x, tangents)
+        if status == _SOLVED and not last_tangents(model, work, scheme.free, line.us[t], tangents):
+            status = _SINGULAR
+        report[0], report[1], report[4] = status, substeps * scheme.b.shape[0], -1.0
+        nv = work.nu.shape[0]
+        for d in range(nv):
+            for k in range(2 * nv):
+                line.A[t, d, k], line.A[t, nv + d, k] = tangents.turn[d, k], work.columns[d, k]
+            for k in range(line.us.shape[1]):
+                line.B[t, d, k], line.B[t, nv + d, k] = tangents.turn[d, 2 * nv + k], work.columns[d, 2 * nv + k]
+
+
+@kernel
+def closed_loop(
+    model_at: Table, work_at: Table, h: float, scheme: Scheme, x: Vector, policy: Policy, alpha: float,
+    limits: tuple[Vector, Vector], substeps: int, path: Path,
+) -> int:  # fmt: skip
+    """As sim/policy.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    low, high = limits
+    ndx = policy.gaps.shape[1]
+    dx = work.chain[0][:ndx]
+    for k in range(x.shape[0]):
+        path.xs[0, k] = x[k]
+    for t in range(path.us.shape[0]):
+        u, b = path.us[t], path.xs[t + 1]
+        state_difference(model, policy.xs[t], path.xs[t], dx)
+        for j in range(u.shape[0]):
+            f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
+            u[j] = min(max(f, low[j]), high[j])
+        for k in range(x.shape[0]):
+            b[k] = path.xs[t, k]
+        begin(model, work, scheme, b)
+        for _ in range(substeps):
+            path.report[0] = advance(model, work, scheme, h, u, b, None)
+            path.report[1] += scheme.b.shape[0]
+            if path.report[0] != _SOLVED:
+                return t
+        if alpha < 1.0:
+            for k in range(ndx):
+                dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
+            for k in range(x.shape[0]):
+                work.step_x[0, k] = b[k]
+            integrate_state(model, work.step_x[0], dx, b)
+    return path.us.shape[0]
