@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import NoReturn
 
 import numpy as np
@@ -14,56 +13,9 @@ from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
 from sim.policy import Path, Policy
 from sim.rollout import Linearized
+from sim.tableau import stable, tableau
 from sim.tangents import Tangents
 from solvers.status import Status
-
-
-@cache
-def tableau(order: int) -> tuple[Floats, Floats]:
-    """(a (s, s), b (s,)) of the method of an order.
-
-    4  the classical one, of 4 stages (Kutta 1901)
-    6  Butcher's, of 7 (J. Austral. Math. Soc. 4, 1964)
-    8  Dormand and Prince's, of 12, as in DOP853 (Hairer, Norsett, Wanner, Solving ODEs I, 1993), read from SciPy
-
-    Tried and slower by a factor of 3 to 4 for the same error: compositions of the variational step (5, 9, 15
-    intervals) and Gauss methods, both of which bound the energy over any time instead.
-    """
-    if order == 8:
-        from scipy.integrate import DOP853
-
-        return np.ascontiguousarray(DOP853.A[:12, :12]), np.array(DOP853.B)
-    if order == 4:
-        return _filled((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), np.array([1 / 6, 1 / 3, 1 / 3, 1 / 6])
-    a = _filled(
-        (),
-        (1 / 3,),
-        (0.0, 2 / 3),
-        (1 / 12, 1 / 3, -1 / 12),
-        (-1 / 16, 9 / 8, -3 / 16, -3 / 8),
-        (0.0, 9 / 8, -3 / 8, -3 / 4, 1 / 2),
-        (9 / 44, -9 / 11, 63 / 44, 18 / 11, 0.0, -16 / 11),
-    )
-    return a, np.array([11 / 120, 0.0, 27 / 40, 27 / 40, -4 / 15, -4 / 15, 11 / 120])
-
-
-def _filled(*rows: tuple[float, ...]) -> Floats:
-    """The square matrix with these beginnings of its rows."""
-    return np.array([[*row, *[0.0] * (len(rows) - len(row))] for row in rows])
-
-
-@cache
-def stable(order: int) -> float:
-    """How far along the negative real and the imaginary axis |h lambda| may go: |1 + z b (I - z a)^-1 1| <= 1."""
-    a, b = tableau(order)
-    one, far = np.ones(len(b)), np.inf
-    for direction in (-1.0, 1j):
-        for size in np.arange(0.05, 20.0, 0.05):
-            z = direction * size
-            if abs(1.0 + z * (b @ np.linalg.solve(np.eye(len(b)) - z * a, one))) > 1.0 + 1e-4:
-                far = min(far, size)
-                break
-    return float(far)
 
 
 def free_roots(model: Model) -> Integers:

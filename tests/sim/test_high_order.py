@@ -12,9 +12,9 @@ import pytest
 from mechanisms import random_body, random_state, unit_quaternion
 
 import dojo_opt as dojo
-from sim.high_order import tableau
 from sim.mechanism import Mechanism
 from sim.parts import KINDS, Input, Joint
+from sim.tableau import stable, tableau
 
 ORDERS = (4, 6, 8)
 
@@ -197,6 +197,19 @@ def test_a_body_that_turns_too_far_is_reported() -> None:
     result = sim.step(sim.start([0.0], [300.0]))
     assert not result.success
     assert result.status in (dojo.Status.ANGULAR_STEP, dojo.Status.NO_PROGRESS)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_springs_and_dampers_are_refused_where_they_would_be_unstable(order: int) -> None:
+    bodies = [dojo.Body("cart", 2.0, (0.1, 0.1, 0.1))]
+    for field, rate in (("spring", np.sqrt(500.0 / 2.0)), ("damper", 500.0 / 2.0)):
+        joint = dojo.Joint("prismatic", None, "cart", axis=(1, 0, 0), **{field: 500.0})
+        mech = dojo.Mechanism(bodies, [joint], gravity=(0, 0, 0))
+        with pytest.raises(ValueError, match=rf"joint .*: its {field} acts at .* use a time step below"):
+            dojo.Simulator(mech, time_step=1.02 * stable(order) / rate, order=order)
+        sim = dojo.Simulator(mech, time_step=0.98 * stable(order) / rate, order=order)
+        x = sim.rollout(sim.start([0.1], [0.1]), np.zeros((2000, sim.nu)), throw=True).x
+        assert np.abs(x).max() < 10.0 and np.abs(x[-1]).max() < 2.0
 
 
 @pytest.mark.parametrize(
