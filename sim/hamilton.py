@@ -23,7 +23,7 @@ from sim.kinematics import tree_poses
 from sim.mass import solve_mass
 from sim.model import InputKind, Integers, Late, Model, Vector, Work
 from sim.outer import outer_wrenches
-from sim.rotation import cross, quat_mul
+from sim.rotation import cross, inverse_right_jacobian
 from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import call_late
@@ -33,18 +33,10 @@ _SWING_CURVATURE = int(Late.SWING_CURVATURE)
 
 
 @kernel
-def place(model: Model, work: Work, q: Vector) -> None:
-    """Configuration 2 at q, whose quaternions may have any length."""
-    p = work.theta1
-    for k in range(q.shape[0]):
-        p[k] = q[k]
-    for i in range(model.body_parent.shape[0]):
-        if model.joint_nrot[i] == 3:
-            a = model.body_qadr[i + 1] - 4
-            n = 1.0 / (p[a] * p[a] + p[a + 1] * p[a + 1] + p[a + 2] * p[a + 2] + p[a + 3] * p[a + 3]) ** 0.5
-            for k in range(a, a + 4):
-                p[k] *= n
-    tree_poses(model, p, p, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
+def place(model: Model, work: Work) -> None:
+    """Configuration 2 at the coordinates work.theta1."""
+    q = work.theta1
+    tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
     world_inertia(model, work.rot2, work.inertia_world)
 
 
@@ -174,15 +166,13 @@ def _add_swing(model: Model, work: Work, i: int, out: Vector) -> None:
 
 
 @kernel
-def coordinate_rates(model: Model, q: Vector, v: Vector, out: Vector) -> None:
-    """out = q': v for scalars, q (0, w)/2 for quaternions, of the length that q has."""
+def coordinate_rates(model: Model, shift: Vector, v: Vector, out: Vector) -> None:
+    """out = rate of the shift r of the coordinates q (+) r: v for scalars, J^-1(r) w for quaternions q exp(r)."""
+    for d in range(v.shape[0]):
+        out[d] = v[d]
     for i in range(model.body_parent.shape[0]):
-        a, d = model.body_qadr[i], model.body_vadr[i]
-        n = model.body_vadr[i + 1] - d - (3 if model.joint_nrot[i] == 3 else 0)
-        for k in range(n):
-            out[a + k] = v[d + k]
         if model.joint_nrot[i] == 3:
-            a, d = a + n, d + n
-            r = quat_mul(q[a], q[a + 1], q[a + 2], q[a + 3], 0.0, 0.5 * v[d], 0.5 * v[d + 1], 0.5 * v[d + 2])
-            for k in range(4):
-                out[a + k] = r[k]
+            d = model.body_vadr[i + 1] - 3
+            J = inverse_right_jacobian(shift[d], shift[d + 1], shift[d + 2])
+            for k in range(3):
+                out[d + k] = J[3 * k] * v[d] + J[3 * k + 1] * v[d + 1] + J[3 * k + 2] * v[d + 2]

@@ -33,8 +33,8 @@ class HighOrder(Calls):
     def _scheme(self) -> runge_kutta.Scheme:
         """The method with scratch of its own."""
         a, b = tableau(self.settings.order)
-        s, nq, nv = len(b), self.sizes.nq, self.sizes.nv
-        scratch = (np.zeros(nv), np.zeros(nq), np.zeros(nv), np.zeros((s, nq)), np.zeros((s, nv)))
+        s, nv = len(b), self.sizes.nv
+        scratch = (*(np.zeros(nv) for _ in range(3)), *(np.zeros((s, nv)) for _ in range(2)))
         return runge_kutta.Scheme(a, b, free_roots(self.model), *scratch)
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
@@ -107,11 +107,11 @@ class HighOrder(Calls):
 
     def _tangents(self) -> Tangents:
         """Scratch of derivatives."""
-        nv, nq, s = self.sizes.nv, self.sizes.nq, len(tableau(self.settings.order)[1])
+        nv, s = self.sizes.nv, len(tableau(self.settings.order)[1])
         n = 2 * nv + self.nu
         slopes = Slopes(*(np.zeros((nv, m)) for m in (nv, nv, nv, nv, self.nu, 42)))
-        shapes = ((nq, n), (nv, n), (nq, n), (nv, n), (nv, n), (s, nq, n), (s, nv, n))
-        return Tangents(slopes, *(np.zeros(shape) for shape in shapes))
+        one, all_stages = (np.zeros((nv, n)) for _ in range(5)), (np.zeros((s, nv, n)) for _ in range(2))
+        return Tangents(slopes, *one, *all_stages)
 
     def linearize(
         self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None

@@ -1,7 +1,9 @@
 """Steps of higher order: explicit Runge-Kutta methods for Hamilton's equations of a tree (hamilton.py).
 
-    Y_i = y + h sum_j a_ij f(Y_j),    y+ = y + h sum_i b_i f(Y_i),       y = (q, momenta)
+    Y_i = y + h sum_j a_ij f(Y_j),    y+ = y + h sum_i b_i f(Y_i),       y = (r, momenta)
 
+r is the shift of the coordinates from the node, q (+) r; for quaternions a rotation vector, so that their length is no
+variable and rotation about a fixed axis is exact (Munthe-Kaas, Appl. Numer. Math. 29, 1999).
 The momentum of a tree that floats freely is part of y, so it is exact; energy is as good as the order. The evaluation
 at the end of a step, which its velocity needs, is the first one of the next: s stages cost s evaluations.
 
@@ -14,6 +16,7 @@ from typing import NamedTuple
 
 from sim.dynamics import joints_below_turn
 from sim.hamilton import coordinate_rates, momenta_of_velocity, momentum_rates, place, velocity_of_momenta
+from sim.kinematics import displace
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Model, Vector, Work
 from sim.policy import Path, Policy
@@ -38,9 +41,9 @@ class Scheme(NamedTuple):
     b: Vector  # (s,)
     free: Integers  # (nbody,) 1 for roots that float without springs, dampers and inputs on their coordinates
     momenta: Vector  # (nv,) at the node
-    stage_q: Vector  # (nq,)
+    shift: Vector  # (nv,) of the stage
     stage_p: Vector  # (nv,)
-    rates_q: Matrix  # (s, nq)
+    rates_r: Matrix  # (s, nv)
     rates_p: Matrix  # (s, nv)
 
 
@@ -50,7 +53,9 @@ def begin(model: Model, work: Work, scheme: Scheme, x: Vector) -> None:
     nq = work.theta1.shape[0]
     for k in range(3):
         work.origin[k] = x[k] if model.joint_ntrans[0] == 3 else model.joint_parent_point[0, k]
-    place(model, work, x[:nq])
+    for k in range(nq):
+        work.theta1[k] = x[k]
+    place(model, work)
     momenta_of_velocity(model, work, scheme.free, x[nq:], scheme.momenta)
     for d in range(work.nu.shape[0]):
         work.nu[d] = x[nq + d]
@@ -68,14 +73,16 @@ def _add_rates(h: float, weights: Vector, count: int, rates: Matrix, out: Vector
 
 
 @kernel
-def _move(scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> None:
-    """stage = node + h sum of weights[j] times the rates of stage j, j < count."""
-    for k in range(q.shape[0]):
-        scheme.stage_q[k] = q[k]
+def _evaluate(model: Model, work: Work, scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> bool:
+    """Velocity and momenta of the bodies at the node + h sum of weights[j] times the rates of stage j, j < count."""
     for d in range(scheme.momenta.shape[0]):
+        scheme.shift[d] = 0.0
         scheme.stage_p[d] = scheme.momenta[d]
-    _add_rates(h, weights, count, scheme.rates_q, scheme.stage_q)
+    _add_rates(h, weights, count, scheme.rates_r, scheme.shift)
     _add_rates(h, weights, count, scheme.rates_p, scheme.stage_p)
+    displace(model, q, scheme.shift, 1.0, work.theta1)
+    place(model, work)
+    return velocity_of_momenta(model, work, scheme.free, scheme.stage_p)
 
 
 @kernel
@@ -89,26 +96,22 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
     s = scheme.b.shape[0]
     if not joints_below_turn(model, v, h):
         return _ANGULAR_STEP
+    for d in range(v.shape[0]):
+        scheme.shift[d] = 0.0
     for i in range(s):
-        if i > 0:
-            _move(scheme, h, scheme.a[i], i, q)
-            place(model, work, scheme.stage_q)
-            if not velocity_of_momenta(model, work, scheme.free, scheme.stage_p):
-                return _SINGULAR
+        if i > 0 and not _evaluate(model, work, scheme, h, scheme.a[i], i, q):
+            return _SINGULAR
         momentum_rates(model, work, scheme.free, u, scheme.rates_p[i])
-        stage_q = q if i == 0 else scheme.stage_q
-        coordinate_rates(model, stage_q, work.nu, scheme.rates_q[i])
+        coordinate_rates(model, scheme.shift, work.nu, scheme.rates_r[i])
         if tangents is not None:
-            move_tangents(tangents, h, scheme.a[i], i)
-            if not tangent_rates(model, work, scheme.free, u, stage_q, tangents, i):
+            move_tangents(model, scheme.shift, tangents, h, scheme.a[i], i)
+            if not tangent_rates(model, work, scheme.free, u, scheme.shift, tangents, i):
                 return _SINGULAR
-    _move(scheme, h, scheme.b, s, q)
-    place(model, work, scheme.stage_q)
-    if not velocity_of_momenta(model, work, scheme.free, scheme.stage_p):
+    if not _evaluate(model, work, scheme, h, scheme.b, s, q):
         return _SINGULAR
     if tangents is not None:
-        move_tangents(tangents, h, scheme.b, s)
-        keep_tangents(model, scheme.stage_q, work.theta1, tangents)
+        move_tangents(model, scheme.shift, tangents, h, scheme.b, s)
+        keep_tangents(tangents)
     total = 0.0
     for k in range(nq):
         q[k] = work.theta1[k]
@@ -155,7 +158,7 @@ def linearize(
         for k in range(x.shape[0]):
             x[k] = line.xs[t, k]
         begin(model, work, scheme, x)
-        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], x, tangents) else _SINGULAR
+        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
         for _ in range(substeps):
             if status == _SOLVED:
                 status = advance(model, work, scheme, h, line.us[t], x, tangents)
@@ -165,9 +168,9 @@ def linearize(
         nv = work.nu.shape[0]
         for d in range(nv):
             for k in range(2 * nv):
-                line.A[t, d, k], line.A[t, nv + d, k] = tangents.turn[d, k], work.columns[d, k]
+                line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], work.columns[d, k]
             for k in range(line.us.shape[1]):
-                line.B[t, d, k], line.B[t, nv + d, k] = tangents.turn[d, 2 * nv + k], work.columns[d, 2 * nv + k]
+                line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], work.columns[d, 2 * nv + k]
 
 
 @kernel
