@@ -16,20 +16,19 @@ O stays where it is while these momenta are in use. All wrenches and momenta of 
 
 from __future__ import annotations
 
+from sim.ball_spring import relative_to_rest
 from sim.dynamics import world_inertia
 from sim.elimination import project
-from sim.joints import relative_to_rest
 from sim.kinematics import tree_poses
 from sim.mass import solve_mass
-from sim.model import InputKind, Integers, Late, Model, Vector, Work
+from sim.model import InputKind, Integers, Model, Vector, Work
 from sim.outer import outer_wrenches
 from sim.rotation import cross, inverse_right_jacobian
+from sim.swing import swing_curvature
 from sim.velocity import joint_twists
 from solvers.jit import kernel
-from solvers.record import call_late
 
 _JOINT = int(InputKind.JOINT)
-_SWING_CURVATURE = int(Late.SWING_CURVATURE)
 
 
 @kernel
@@ -160,7 +159,7 @@ def _add_swing(model: Model, work: Work, i: int, out: Vector) -> None:
     R, v = work.dR_dq, work.nu
     for k in range(2):
         R[d + k, d] = R[d + k, d + 1] = 0.0
-    call_late(model.late[_SWING_CURVATURE], model, work, i, work.theta1[a], work.theta1[a + 1])
+    swing_curvature(model, work, i, work.theta1[a], work.theta1[a + 1])
     for k in range(2):
         out[d + k] += R[d + k, d] * v[d] + R[d + k, d + 1] * v[d + 1]
 

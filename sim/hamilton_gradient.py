@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.ball_spring import relative_to_rest
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
 from sim.energy import armature_blocks, spatial_inertia
 from sim.hamilton import column_rate
-from sim.joints import relative_to_rest
 from sim.model import Integers, Matrix, Model, Vector, Work
 from sim.outer import input_slopes, outer_slopes
 from sim.rotation import cross

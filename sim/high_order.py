@@ -7,6 +7,7 @@ from typing import NoReturn
 import numpy as np
 
 from sim import bodies, coordinates, runge_kutta
+from sim.bind import bind_smooth
 from sim.calls import BOUND, CONE, REPORT, Calls, Floats, Settings
 from sim.hamilton_gradient import Slopes
 from sim.mechanism import Mechanism
@@ -42,7 +43,9 @@ class HighOrder(Calls):
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         xs[0] = x
-        knot = runge_kutta.roll(self._model, self._work(), self.settings.time_step, self._scheme(), us, xs, reports)
+        knot = runge_kutta.roll(
+            self._table(bind_smooth), self._work(), self.settings.time_step, self._scheme(), us, xs, reports
+        )
         return int(knot), xs, reports, np.zeros((steps, 0, 8))
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
@@ -151,7 +154,7 @@ class HighOrder(Calls):
         path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
         h = self.settings.time_step
         knot = runge_kutta.closed_loop(
-            self._model, self._work(), h, self._scheme(), x, policy, alpha, limits, substeps, path
+            self._table(bind_smooth), self._work(), h, self._scheme(), x, policy, alpha, limits, substeps, path
         )
         return int(knot), path
 
