@@ -100,7 +100,8 @@ def _compare(report: Report, scene: Scene, measured: Curves) -> None:
     if scene.floating:
         for name, points in measured.items():
             if name.startswith("dojo-opt"):
-                drift = max(max(p.errors["momentum"], p.errors["angular"]) for p in points)
+                good = [p.errors for p in points if np.isfinite(p.errors["energy"])]
+                drift = max(max(errors["momentum"], errors["angular"]) for errors in good)
                 report.rows.append(Row(f"{scene.name}: drift of momentum, {name}", drift, "", _MOMENTUM))
 
 
