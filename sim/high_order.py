@@ -137,6 +137,12 @@ class HighOrder(Calls):
             array[unsolved] = 0.0
         return A, B, x_next, reports
 
+    def roll_linear(self, x: Vector, us: Floats, kappa: float | None) -> tuple[int, Floats, Floats, Floats, Floats]:
+        """As Calls.roll_linear, in two passes."""
+        knot, xs, reports, _ = self.roll(x, us)
+        A, B, *_ = self.linearize(xs[:-1], us, 1, kappa)
+        return knot, xs, A, B, reports
+
     def closed_loop(
         self,
         x: Vector,
