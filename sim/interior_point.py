@@ -25,6 +25,7 @@ from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
+from sim.pairs import begin_pairs
 from solvers.jit import inlined, kernel
 from solvers.status import Status
 
@@ -116,6 +117,7 @@ def interior_point(
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     choose_far(model, work, options)
+    begin_pairs(model, work)
     while True:
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):

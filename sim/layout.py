@@ -43,7 +43,7 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground")
+WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground, pair_sides npair")
 
 WORK_FLOATS = _shapes(
     """

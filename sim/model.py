@@ -155,6 +155,7 @@ class Work(NamedTuple):
     counts: Integers  # (3,) runs of near contacts with the ground, far clusters, runs with that of the pairs
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     far_first: Integers  # (nground,) first contacts of the far clusters
+    pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     far: Matrix  # (nground, 24) see far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.collide import arrange, collide_arranged
-from sim.model import Model, Vector, Work
+from sim.collision.collide import arrange, collide_arranged, open_sides
+from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
 from solvers.record import rich
@@ -25,8 +25,8 @@ _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point n
 
 
 @kernel
-def place_shape(model: Model, work: Work, row: int, i: int) -> None:
-    """World pose at configuration 3 of shape `row` on body i, -1 for the world."""
+def place_shape(model: Model, work: Work, row: int, i: int, pos: Matrix, rot: Matrix) -> None:
+    """World pose of shape `row` on body i, -1 for the world, at the poses pos (nbody, 3), rot (nbody, 9) of bodies."""
     c = model.pair_place[row]
     p = work.shape_pos[row]
     R = work.shape_rot[row]
@@ -36,12 +36,12 @@ def place_shape(model: Model, work: Work, row: int, i: int) -> None:
         for k in range(9):
             R[k] = c[3 + k]
         return
-    x, y, z = rotate(work.rot3, i, c[0], c[1], c[2])
-    p[0] = work.pos3[i, 0] + x
-    p[1] = work.pos3[i, 1] + y
-    p[2] = work.pos3[i, 2] + z
+    x, y, z = rotate(rot, i, c[0], c[1], c[2])
+    p[0] = pos[i, 0] + x
+    p[1] = pos[i, 1] + y
+    p[2] = pos[i, 2] + z
     for k in range(3):
-        x, y, z = rotate(work.rot3, i, c[3 + k], c[6 + k], c[9 + k])
+        x, y, z = rotate(rot, i, c[3 + k], c[6 + k], c[9 + k])
         R[k] = x
         R[3 + k] = y
         R[6 + k] = z
@@ -85,16 +85,32 @@ def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -
 
 
 @kernel
+def place_shapes(model: Model, work: Work, first: int, pos: Matrix, rot: Matrix) -> None:
+    """World and relative poses of the shapes of the collision whose first pair this is."""
+    k = model.pair_coupling[first]
+    place_shape(model, work, 2 * first, model.coupling_body[k, 0], pos, rot)
+    place_shape(model, work, 2 * first + 1, model.coupling_body[k, 1], pos, rot)
+    relative_pose(work, first)
+
+
+@rich()
+def begin_pairs(model: Model, work: Work) -> None:
+    """pair_sides: the axes that separate shapes at configuration 2, where the step begins."""
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0:
+            place_shapes(model, work, j, work.pos2, work.rot2)
+            pose = work.pair_relative[j]
+            work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:])
+
+
+@kernel
 def collide_shapes(model: Model, work: Work, first: int) -> int:
     """pair_out of all points of the collision whose first pair this is; returns one past the last."""
-    k = model.pair_coupling[first]
-    place_shape(model, work, 2 * first, model.coupling_body[k, 0])
-    place_shape(model, work, 2 * first + 1, model.coupling_body[k, 1])
-    relative_pose(work, first)
+    place_shapes(model, work, first, work.pos3, work.rot3)
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    faces = arrange(kind, sizes, pose[:9], pose[9:])
+    faces = arrange(kind, sizes, pose[:9], pose[9:], work.pair_sides[first])
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
         collide_arranged(kind, end - first, faces, sizes, pose[:9], pose[9:], work.pair_out[end])

@@ -28,7 +28,7 @@ from sim.collision.box import (
     vertex_under_box,
 )
 from sim.collision.box_axes import facing
-from sim.collision.clip import BORDER, clip, common_normal, crossing, on_edges
+from sim.collision.clip import BORDER, clip, crossing, edge_normal, on_edges
 from sim.collision.witness import FACE, NOWHERE, TIE, absent, along, axis, dot, edges, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
@@ -41,15 +41,15 @@ _RADII = (0.0, 0.0)
 def box_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact point `feature` of two boxes."""
     ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
-    face, edge, s = arrangement
-    i, top, j, bottom = facing(face, R, r)
+    face, edge, s, up, over = arrangement
+    i, top, j, bottom = facing(face, up, R)
     if feature < 8:
         found = put_clipped(feature, i, top, j, bottom, ha, hb, R, r, out)
     elif feature < 12:
         found = put_corner(feature - 8, (i, top), (j, bottom), ha, hb, R, r, out)
     else:
         found = False
-        if edge >= 0 and put_edges(edge, s, ha, hb, R, r, out):
+        if edge >= 0 and put_edges(edge, s, over, ha, hb, R, r, out):
             found = not clipped_has(edge, i, top, j, bottom, ha, hb, R, r, out)
         elif s > 0.0:
             found = put_vertex(ha, hb, R, r, out)
@@ -112,11 +112,11 @@ def put_corner(
 
 
 @inner_kernel
-def put_edges(edge: int, s: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
+def put_edges(edge: int, s: float, over: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
     """The two edges that the separating direction points to; False where they pass each other."""
     i, j = edge // 3, edge % 3
     ua, ub = column(R, j), axis(i, 1.0)
-    n = common_normal(ua, ub, (r[0], r[1], r[2]))
+    n = edge_normal(ub, ua, over)
     w = to_a(R, n)
     x = to_b(R, support((-w[0], -w[1], -w[2]), j, ha))
     x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])

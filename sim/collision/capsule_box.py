@@ -12,9 +12,21 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.axes import PARALLEL, Arrangement, deepest, edge_must_exceed, side_of, support
+from sim.collision.axes import (
+    OPEN,
+    PARALLEL,
+    SWINGS,
+    Arrangement,
+    deepest,
+    edge_must_exceed,
+    opened,
+    separates_from,
+    side,
+    side_of,
+    support,
+)
 from sim.collision.box import corner, distance_squared, nearest, vertex_on_box
-from sim.collision.clip import clip, common_normal, crossing, on_edges
+from sim.collision.clip import clip, crossing, edge_normal, on_edges
 from sim.collision.witness import (
     FACE,
     LINE,
@@ -40,8 +52,7 @@ def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector
     """Contact point `feature` of a capsule along the z axis of its frame against a box."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
     radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
-    face, edge, s = arrangement
-    top = 1.0 if c[face] >= 0.0 else -1.0
+    face, edge, s, top, over = arrangement
     x, y = along(c, -half, u), along(c, half, u)
     m, o = (face + 1) % 3, (face + 2) % 3
     codes = clip((x[m], x[o]), (y[m], y[o]), (h[m], h[o]))
@@ -56,7 +67,7 @@ def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector
             vertex_a(x, axis(face, top), NOWHERE, top * x[face] - h[face], (radius, 0.0), NOWHERE, FACE, out)
         if code == 0 or out[0] + radius < deepest(s, h):
             absent(out)
-    elif edge >= 0 and put_edge(edge, c, u, half, h, s, radius, out):
+    elif edge >= 0 and put_edge(edge, c, u, half, h, s, over, radius, out):
         side = side_of(edge, (out[1], out[2], out[3]), face, top)
         if side >= 0 and (codes[0] == 2 + side or codes[1] == 2 + side):
             absent(out)
@@ -65,31 +76,64 @@ def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector
 
 
 @inner_kernel
-def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> Arrangement:
-    """(face, edge, s): axis of the face that separates the segment c + t u most, |t| <= half, that of the edge of the
-    box, or -1 where the face does better, and the separation s along the better one, negative inside.
-    """
-    face, edge, s = 0, -1, -1e300
-    for i in range(3):
-        d = abs(c[i]) - h[i] - half * abs(u[i])
-        if d > s:
-            face, s = i, d
-    least = edge_must_exceed(s, h)
-    for i in range(3):
-        k, l = (i + 1) % 3, (i + 2) % 3
-        q = sqrt(u[k] * u[k] + u[l] * u[l])
-        if q > PARALLEL:
-            d = (abs(c[l] * u[k] - c[k] * u[l]) - h[k] * abs(u[l]) - h[l] * abs(u[k])) / q
-            if d > least:
-                edge, s, least = i, d, d
-    return face, edge, s
+def across(i: int, c: Vec3, u: Vec3, h: Vec3) -> tuple[float, float, float]:
+    """(x, reach, length) along n = e_i x u: n.c, the reach of the box, and |n|."""
+    k, l = (i + 1) % 3, (i + 2) % 3
+    x = c[l] * u[k] - c[k] * u[l]
+    return x, h[k] * abs(u[l]) + h[l] * abs(u[k]), sqrt(u[k] * u[k] + u[l] * u[l])
 
 
 @inner_kernel
-def put_edge(i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, radius: float, out: Vector) -> bool:
+def separation(c: Vec3, u: Vec3, half: float, h: Vec3, sides: int) -> Arrangement:
+    """(face, edge, s, side of the face, side of the edge) of the open sides, or of all faces where none is open.
+
+    face: axis of the face that separates the segment c + t u most, |t| <= half; edge: that of the edge of the box, or
+    -1 where the face does better; s: the separation along the better one, negative inside. Axis 3 + i is e_i x u.
+    """
+    if sides & 63 == 0:
+        sides |= 63
+    face, edge, s, top, over = 0, -1, -1e300, 1.0, 1.0
+    for i in range(3):
+        t = side(c[i], sides, i)
+        if t == 0.0:
+            continue
+        d = t * c[i] - h[i] - half * abs(u[i])
+        if d > s:
+            face, s, top = i, d, t
+    least = edge_must_exceed(s, h)
+    for i in range(3):
+        x, reach, q = across(i, c, u, h)
+        t = side(x, sides, 3 + i)
+        if q > PARALLEL and t != 0.0:
+            d = (t * x - reach) / q
+            if d > least:
+                edge, s, least, over = i, d, d, t
+    return face, edge, s, top, over
+
+
+@inner_kernel
+def open_sides(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
+    """The axes, with their sides, that separate the segment from the box."""
+    best = separates_from(separation(c, u, half, h, OPEN)[2], h)
+    found = 0
+    for i in range(3):
+        if abs(c[i]) - h[i] - half * abs(u[i]) >= best:
+            found |= opened(i, c[i])
+        x, reach, q = across(i, c, u, h)
+        if q < SWINGS:
+            found |= 3 << (2 * (3 + i))
+        elif abs(x) - reach >= best * q:
+            found |= opened(3 + i, x)
+    return found
+
+
+@inner_kernel
+def put_edge(
+    i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, over: float, radius: float, out: Vector
+) -> bool:
     """Segment against the edge along e_i that its separating direction points to; False where they pass each other."""
     b = axis(i, 1.0)
-    n = common_normal(u, b, c)
+    n = edge_normal(b, u, over)
     y = support(n, i, h)
     if s > 0.0 and not on_edges(c, u, half, y, b, h[i], TIE):
         return False

@@ -72,6 +72,14 @@ def on_edges(x: Vec3, ua: Vec3, la: float, y: Vec3, ub: Vec3, lb: float, past: f
 
 
 @inner_kernel
+def edge_normal(ub: Vec3, ua: Vec3, over: float) -> Vec3:
+    """Unit vector along `over` ub x ua (over = 1, -1)."""
+    n = cross(ub[0], ub[1], ub[2], ua[0], ua[1], ua[2])
+    k = over * dot(n, n) ** 0.5
+    return n[0] / k, n[1] / k, n[2] / k
+
+
+@inner_kernel
 def common_normal(ua: Vec3, ub: Vec3, out_of: Vec3) -> Vec3:
     """Unit vector along ua x ub, on the side of `out_of`."""
     n = cross(ua[0], ua[1], ua[2], ub[0], ub[1], ub[2])

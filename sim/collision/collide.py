@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.collision import box_axes, capsule_box
-from sim.collision.axes import Arrangement
+from sim.collision.axes import OPEN, Arrangement
 from sim.collision.box_box import box_box
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
@@ -29,22 +29,38 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
-    collide_arranged(kind, feature, arrange(kind, sizes, R, r), sizes, R, r, out)
+    collide_arranged(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, R, r, out)
 
 
 @kernel
-def arrange(kind: int, sizes: Vector, R: Vector, r: Vector) -> Arrangement:
-    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+def open_sides(kind: int, sizes: Vector, R: Vector, r: Vector) -> int:
+    """Which axes separate the shapes at this pose, and on which side: what `arrange` may choose from a step later.
 
-    Once per pair and pose, where it saves most of the time of `collide`. It may be kept while the pose changes little:
-    what `collide_arranged` then returns is smooth where `collide` would change over to another face.
+    Of the axes that separate shapes at the end of a step, one that did so at its beginning is the one that was there
+    all the time; the others mean that a body has gone around a corner of the other one, or through it, and a contact
+    along them would push it on its way: it would gain energy.
     """
     if kind == Pair.BOX_BOX:
-        return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
+        return box_axes.open_sides((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
     if kind == Pair.CAPSULE_BOX:
         h = (sizes[4], sizes[5], sizes[6])
-        return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h)
-    return 0, -1, 0.0
+        return capsule_box.open_sides((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h)
+    return OPEN
+
+
+@kernel
+def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
+    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+
+    Once per pair and pose, where it saves most of the time of `collide`. sides: of the axes, those to choose from
+    (`open_sides`); OPEN for all.
+    """
+    if kind == Pair.BOX_BOX:
+        return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r, sides)
+    if kind == Pair.CAPSULE_BOX:
+        h = (sizes[4], sizes[5], sizes[6])
+        return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h, sides)
+    return 0, -1, 0.0, 1.0, 1.0
 
 
 @kernel
