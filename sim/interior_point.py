@@ -16,7 +16,7 @@ Six things decide (60,000 random extreme states, `benchmarks/robustness.py`, see
 
 from __future__ import annotations
 
-from sim.central_path import first_attempt, start
+from sim.central_path import AGAIN, first_attempt, start
 from sim.direction import direction, linearize_step
 from sim.far import came_near, choose_far
 from sim.friction import slip_noise
@@ -25,7 +25,7 @@ from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
-from sim.pairs import begin_pairs
+from sim.pair_choice import begin_pairs, overlapping
 from solvers.jit import inlined, kernel
 from solvers.status import Status
 
@@ -38,6 +38,7 @@ _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of pos
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
 _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
+_CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -71,7 +72,7 @@ def try_from(
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     smoothing = kappa
-    if attempt > 0:
+    if attempt != 0:
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
@@ -122,7 +123,15 @@ def interior_point(
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
-            if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
+            apart = not (out.status == _SOLVED and overlapping(model, work))
+            for _ in range(_CHOICES):
+                if apart:
+                    break
+                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
+                apart = not (out.status == _SOLVED and overlapping(model, work))
+            if apart and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
+            out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
+            work.pair_free[0] = (attempt + 1) // 2 % 2
         if not came_near(model, work):
             return out

@@ -43,7 +43,7 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground, pair_sides npair")
+WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_free 1")
 
 WORK_FLOATS = _shapes(
     """
@@ -55,7 +55,8 @@ WORK_FLOATS = _shapes(
     contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
-    pair_frame npair 12,
+    pair_frame npair 12, pair_trial 1 43,
+    pair_before npair 13,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 1,

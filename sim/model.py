@@ -156,6 +156,8 @@ class Work(NamedTuple):
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     far_first: Integers  # (nground,) first contacts of the far clusters
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
+    pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
+    pair_free: Integers  # (1,) 1: elements are chosen anew at every pose
     far: Matrix  # (nground, 24) see far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
@@ -171,6 +173,8 @@ class Work(NamedTuple):
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
     pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
+    pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
     pair_shift: Matrix  # (npair, 18) displacement of the contact point by the relative twist

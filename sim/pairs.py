@@ -15,51 +15,15 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.collide import arrange, collide_arranged, open_sides
-from sim.model import Matrix, Model, Vector, Work
+from sim.collision.collide import collide_chosen
+from sim.model import Model, Vector, Work
+from sim.pair_choice import choose_shapes
+from sim.pair_pose import place_shapes
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
 from solvers.record import rich
 
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
-
-
-@kernel
-def place_shape(model: Model, work: Work, row: int, i: int, pos: Matrix, rot: Matrix) -> None:
-    """World pose of shape `row` on body i, -1 for the world, at the poses pos (nbody, 3), rot (nbody, 9) of bodies."""
-    c = model.pair_place[row]
-    p = work.shape_pos[row]
-    R = work.shape_rot[row]
-    if i < 0:
-        for k in range(3):
-            p[k] = c[k]
-        for k in range(9):
-            R[k] = c[3 + k]
-        return
-    x, y, z = rotate(rot, i, c[0], c[1], c[2])
-    p[0] = pos[i, 0] + x
-    p[1] = pos[i, 1] + y
-    p[2] = pos[i, 2] + z
-    for k in range(3):
-        x, y, z = rotate(rot, i, c[3 + k], c[6 + k], c[9 + k])
-        R[k] = x
-        R[3 + k] = y
-        R[6 + k] = z
-
-
-@kernel
-def relative_pose(work: Work, j: int) -> None:
-    """pair_relative[j] = (R_b^T R_a, R_b^T (o_a - o_b)): shape a in the frame of shape b."""
-    A = work.shape_rot[2 * j]
-    B = work.shape_rot[2 * j + 1]
-    out = work.pair_relative[j]
-    x = work.shape_pos[2 * j, 0] - work.shape_pos[2 * j + 1, 0]
-    y = work.shape_pos[2 * j, 1] - work.shape_pos[2 * j + 1, 1]
-    z = work.shape_pos[2 * j, 2] - work.shape_pos[2 * j + 1, 2]
-    for r in range(3):
-        for c in range(3):
-            out[3 * r + c] = B[r] * A[c] + B[3 + r] * A[3 + c] + B[6 + r] * A[6 + c]
-        out[9 + r] = B[r] * x + B[3 + r] * y + B[6 + r] * z
 
 
 @kernel
@@ -85,35 +49,18 @@ def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -
 
 
 @kernel
-def place_shapes(model: Model, work: Work, first: int, pos: Matrix, rot: Matrix) -> None:
-    """World and relative poses of the shapes of the collision whose first pair this is."""
-    k = model.pair_coupling[first]
-    place_shape(model, work, 2 * first, model.coupling_body[k, 0], pos, rot)
-    place_shape(model, work, 2 * first + 1, model.coupling_body[k, 1], pos, rot)
-    relative_pose(work, first)
-
-
-@rich()
-def begin_pairs(model: Model, work: Work) -> None:
-    """pair_sides: the axes that separate shapes at configuration 2, where the step begins."""
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0:
-            place_shapes(model, work, j, work.pos2, work.rot2)
-            pose = work.pair_relative[j]
-            work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:])
-
-
-@kernel
 def collide_shapes(model: Model, work: Work, first: int) -> int:
     """pair_out of all points of the collision whose first pair this is; returns one past the last."""
     place_shapes(model, work, first, work.pos3, work.rot3)
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    faces = arrange(kind, sizes, pose[:9], pose[9:], work.pair_sides[first])
+    if work.pair_free[0] == 1:
+        choose_shapes(model, work, first)
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        collide_arranged(kind, end - first, faces, sizes, pose[:9], pose[9:], work.pair_out[end])
+        if work.pair_free[0] == 0:
+            collide_chosen(kind, end - first, work.pair_code[end], sizes, pose[:9], pose[9:], work.pair_out[end])
         end += 1
     return end
 

@@ -54,16 +54,6 @@ def deepest(s: float, h: Vec3) -> float:
 
 
 @inner_kernel
-def support(n: Vec3, i: int, h: Vec3) -> Vec3:
-    """Centre of the edge along e_i that lies farthest along n."""
-    return (
-        0.0 if i == 0 else (h[0] if n[0] >= 0.0 else -h[0]),
-        0.0 if i == 1 else (h[1] if n[1] >= 0.0 else -h[1]),
-        0.0 if i == 2 else (h[2] if n[2] >= 0.0 else -h[2]),
-    )
-
-
-@inner_kernel
 def side_of(i: int, n: Vec3, face: int, top: float) -> int:
     """Which side (clip.py) of the face `top` e_face is the edge along e_i farthest along n, or -1 for none."""
     if i == face or n[face] * top < 0.0:

@@ -23,10 +23,10 @@ from sim.collision.axes import (
     separates_from,
     side,
     side_of,
-    support,
 )
-from sim.collision.box import corner, distance_squared, nearest, vertex_on_box
-from sim.collision.clip import clip, crossing, edge_normal, on_edges
+from sim.collision.box import bits, corner, distance_squared, nearest, vertex_on_box
+from sim.collision.box_elements import CROSSING, code_of, edge_of, faces_of
+from sim.collision.clip import PAST, clip, common_normal, edge_normal, on_edges, side_edge
 from sim.collision.witness import (
     FACE,
     LINE,
@@ -46,33 +46,68 @@ from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
+# kinds of elements, beside the CROSSING of the segment and a side of the face
+END_FACE, EDGES, END_BOX, SEGMENT_CORNER = 1, 3, 5, 6
+
 
 @inner_kernel
-def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
-    """Contact point `feature` of a capsule along the z axis of its frame against a box."""
+def choose_elements(
+    feature: int, arrangement: Arrangement, radius: float, half: float, h: Vec3, R: Vector, r: Vector, out: Vector
+) -> int:
+    """The elements that are contact point `feature` of a capsule along the z axis of its frame; writes it, too."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
-    radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
     face, edge, s, top, over = arrangement
+    faces = (face, top, 0, 1.0)
     x, y = along(c, -half, u), along(c, half, u)
     m, o = (face + 1) % 3, (face + 2) % 3
     codes = clip((x[m], x[o]), (y[m], y[o]), (h[m], h[o]))
+    code = 0
     if feature < 2:
-        code = codes[feature]
-        if feature == 1:
-            x = y
-        if code > 1:
-            if not crossing(c, u, half, code - 2, face, top, h, radius, out):
-                code = 0
-        elif code == 1:
-            vertex_a(x, axis(face, top), NOWHERE, top * x[face] - h[face], (radius, 0.0), NOWHERE, FACE, out)
-        if code == 0 or out[0] + radius < deepest(s, h):
-            absent(out)
-    elif edge >= 0 and put_edge(edge, c, u, half, h, s, over, radius, out):
-        side = side_of(edge, (out[1], out[2], out[3]), face, top)
-        if side >= 0 and (codes[0] == 2 + side or codes[1] == 2 + side):
-            absent(out)
-    elif s <= 0.0 or not put_vertex(c, u, half, h, radius, out):
-        absent(out)
+        where = codes[feature]
+        if where == 1:
+            code = code_of(END_FACE, faces, feature, 0)
+        elif where > 1:
+            z, ub, lb = side_edge(where - 2, face, top, h)
+            code = code_of(CROSSING, faces, 0, where - 2) if on_edges(c, u, half, z, ub, lb, PAST) else 0
+    elif edge >= 0 and two_edges(edge, s, over, c, u, half, h):
+        n = edge_normal(axis(edge, 1.0), u, over)
+        side = side_of(edge, n, face, top)
+        if side < 0 or (codes[0] != 2 + side and codes[1] != 2 + side):
+            code = code_of(EDGES, (edge, over, 0, 1.0), 0, bits(n))
+    elif s > 0.0:
+        code = nearest_corner(c, u, half, h)
+    if code != 0:
+        put_elements(code, radius, half, h, R, r, out)
+        if feature == 2:
+            if code & 7 < END_BOX or separates(c, u, half, h, radius, out):
+                return code
+        elif out[0] + radius >= deepest(s, h):
+            return code
+    absent(out)
+    return 0
+
+
+@inner_kernel
+def put_elements(code: int, radius: float, half: float, h: Vec3, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact of the two elements `code`, which is not 0."""
+    c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
+    kind, other = code & 7, (code >> 12) & 7
+    i, top, _, _ = faces_of(code)
+    end = along(c, half if code & 512 else -half, u)
+    if kind == END_FACE:
+        vertex_a(end, axis(i, top), NOWHERE, top * end[i] - h[i], (radius, 0.0), NOWHERE, FACE, out)
+    elif kind == CROSSING:
+        y, ub, _ = side_edge(other, i, top, h)
+        edges(c, u, y, ub, common_normal(u, ub, axis(i, top)), (radius, 0.0), out)
+    elif kind == EDGES:
+        b = axis(i, 1.0)
+        edges(c, u, edge_of(other, i, h), b, edge_normal(b, u, top), (radius, 0.0), out)
+    elif kind == END_BOX:
+        vertex_on_box(end, h, radius, out)
+    else:
+        y = corner(other, h)
+        n, d = direction(along(c, dot(u, y) - dot(u, c), u), y, u)
+        vertex_b(y, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
 
 
 @inner_kernel
@@ -128,31 +163,26 @@ def open_sides(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
 
 
 @inner_kernel
-def put_edge(
-    i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, over: float, radius: float, out: Vector
-) -> bool:
-    """Segment against the edge along e_i that its separating direction points to; False where they pass each other."""
+def two_edges(i: int, s: float, over: float, c: Vec3, u: Vec3, half: float, h: Vec3) -> bool:
+    """Whether the segment and the edge along e_i that their separating direction points to do not pass each other."""
     b = axis(i, 1.0)
-    n = edge_normal(b, u, over)
-    y = support(n, i, h)
-    if s > 0.0 and not on_edges(c, u, half, y, b, h[i], TIE):
-        return False
-    edges(c, u, y, b, n, (radius, 0.0), out)
-    return True
+    y = edge_of(bits(edge_normal(b, u, over)), i, h)
+    return s <= 0.0 or on_edges(c, u, half, y, b, h[i], TIE)
 
 
 @inner_kernel
-def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
+def nearest_corner(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
     """An end of the segment against an edge or corner of the box, or a corner of the box against the segment.
 
-    False where neither is the nearest pair: the direction between them does not separate the two.
+    0 where the nearest end is nearest to a face.
     """
     x, y = along(c, -half, u), along(c, half, u)
     d2 = distance_squared(x, h)
     e2 = distance_squared(y, h)
+    end = 0
     if e2 < d2:
-        x, d2 = y, e2
-    near, at, at_end = x, 0.0, True
+        x, d2, end = y, e2, 1
+    near = -1
     for k in range(8):
         y = corner(k, h)
         t = dot(u, y) - dot(u, c)
@@ -161,14 +191,15 @@ def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vecto
             e = (z[0] - y[0], z[1] - y[1], z[2] - y[2])
             e2 = dot(e, e)
             if e2 < d2 * (1.0 - TIE):
-                near, at, at_end, d2 = y, t, False, e2
-    if at_end:
-        if nearest(x, h)[3] == 1:
-            return False
-        vertex_on_box(x, h, radius, out)
-    else:
-        n, d = direction(along(c, at, u), near, u)
-        vertex_b(near, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
+                near, d2 = k, e2
+    if near >= 0:
+        return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, near)
+    return 0 if nearest(x, h)[3] == 1 else code_of(END_BOX, (0, 1.0, 0, 1.0), end, 0)
+
+
+@inner_kernel
+def separates(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
+    """Whether the normal in `out` separates segment and box by the distance there: the two points are the nearest."""
     n = (out[1], out[2], out[3])
     reach = half * abs(dot(n, u)) + abs(n[0]) * h[0] + abs(n[1]) * h[1] + abs(n[2]) * h[2]
     return dot(n, c) - reach >= out[0] + radius - TIE * (half + h[0] + h[1] + h[2])

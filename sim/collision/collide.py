@@ -1,15 +1,19 @@
-"""`collide`: one contact point of a pair of shapes. `arrange`: what all points of the pair have in common."""
+"""`collide`: one contact point of a pair of shapes, in two halves.
+
+choose           which elements of the shapes make it: a discrete choice, after that of `arrange` for all points
+collide_chosen   the contact of those elements: smooth in the pose
+"""
 
 from __future__ import annotations
 
-from sim.collision import box_axes, capsule_box
+from sim.collision import box_axes, box_box, capsule_box
 from sim.collision.axes import OPEN, Arrangement
-from sim.collision.box_box import box_box
+from sim.collision.box_elements import put_elements
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.collision.kinds import Pair
-from sim.collision.segment import capsule_capsule
+from sim.collision.segment import choose_points, put_points
 from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
-from sim.collision.witness import absent
+from sim.collision.witness import ABSENT, absent
 from sim.model import Vector
 from solvers.jit import kernel
 
@@ -29,7 +33,7 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
-    collide_arranged(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, R, r, out)
+    choose(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, R, r, out)
 
 
 @kernel
@@ -64,11 +68,25 @@ def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arran
 
 
 @kernel
-def collide_arranged(
-    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector
-) -> None:
-    """`collide`, with what `arrange` returns."""
-    if kind == Pair.SPHERE_SPHERE:
+def choose(kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> int:
+    """`collide`, with what `arrange` returns; and which elements of the shapes it found: a number, 0 for none."""
+    if kind == Pair.BOX_BOX:
+        ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
+        return box_box.choose_elements(feature, arrangement, ha, hb, R, r, out)
+    if kind == Pair.CAPSULE_BOX:
+        h = (sizes[4], sizes[5], sizes[6])
+        return capsule_box.choose_elements(feature, arrangement, sizes[0], sizes[1], h, R, r, out)
+    code = choose_points(feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
+    collide_chosen(kind, feature, code, sizes, R, r, out)
+    return code if out[0] < ABSENT else 0
+
+
+@kernel
+def collide_chosen(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact of the elements that `choose` found: smooth, wherever the shapes have moved to since then."""
+    if code == 0:
+        absent(out)
+    elif kind == Pair.SPHERE_SPHERE:
         sphere_sphere(sizes, r, out)
     elif kind == Pair.SPHERE_CAPSULE:
         sphere_capsule(sizes, r, out)
@@ -79,13 +97,13 @@ def collide_arranged(
     elif kind == Pair.SPHERE_HALFSPACE:
         sphere_halfspace(sizes, r, out)
     elif kind == Pair.CAPSULE_CAPSULE:
-        capsule_capsule(feature, sizes, R, r, out)
+        put_points(code, sizes, R, r, out)
     elif kind == Pair.CAPSULE_BOX:
-        capsule_box.capsule_box(feature, arrangement, sizes, R, r, out)
+        capsule_box.put_elements(code, sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6]), R, r, out)
     elif kind == Pair.CAPSULE_HALFSPACE:
         capsule_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.BOX_BOX:
-        box_box(feature, arrangement, sizes, R, r, out)
+        put_elements(code, (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r, out)
     elif kind == Pair.BOX_HALFSPACE:
         box_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.CYLINDER_HALFSPACE:

@@ -10,8 +10,9 @@ from jacobians import differences
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
+from sim.collision.axes import OPEN
 from sim.collision.broad import bounding_radius, far
-from sim.collision.collide import arrange, collide, collide_arranged
+from sim.collision.collide import arrange, choose, collide, collide_chosen, open_sides
 from sim.collision.kinds import OUT, SIZES, Pair, Shape, count, pair
 
 Array = np.ndarray
@@ -171,15 +172,32 @@ def test_distance_and_normal_are_those_of_mujoco(kind: Pair, rng: np.random.Gene
 # -- what pairs need ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("kind", Pair, ids=NAMES.get)
+def test_what_is_chosen_at_a_pose_makes_the_contact_there(kind: Pair, rng: np.random.Generator) -> None:
+    for trial in range(10):
+        sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
+        R, r = random_pose(rng, kind, sizes, 0.04 * rng.normal(), aligned=trial % 2 == 0)
+        arrangement = arrange(int(kind), sizes, R.ravel(), r, OPEN)
+        for feature in range(count(kind)):
+            one, other = np.empty(OUT), np.empty(OUT)
+            code = choose(int(kind), feature, arrangement, sizes, R.ravel(), r, one)
+            collide_chosen(int(kind), feature, code, sizes, R.ravel(), r, other)
+            np.testing.assert_array_equal(one, touch(kind, feature, sizes, R, r))
+            np.testing.assert_array_equal(other, one)
+            assert (code == 0) == (one[0] == 1e9)
+
+
 @pytest.mark.parametrize("kind", [Pair.CAPSULE_BOX, Pair.BOX_BOX], ids=NAMES.get)
-def test_an_arrangement_serves_all_features(kind: Pair, rng: np.random.Generator) -> None:
-    sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
-    R, r = random_pose(rng, kind, sizes, 0.02)
-    arrangement = arrange(int(kind), sizes, R.ravel(), r)
-    for feature in range(count(kind)):
-        out = np.empty(OUT)
-        collide_arranged(int(kind), feature, arrangement, sizes, R.ravel(), r, out)
-        np.testing.assert_array_equal(out, touch(kind, feature, sizes, R, r))
+def test_the_side_that_separates_stays_open_and_the_others_are_closed(kind: Pair, rng: np.random.Generator) -> None:
+    """Shapes apart: the same arrangement as without sides. Then a moved through b to its other side: they overlap."""
+    for _ in range(50):
+        sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
+        R, r = random_pose(rng, kind, sizes, -0.05)
+        sides = open_sides(int(kind), sizes, R.ravel(), r)
+        assert arrange(int(kind), sizes, R.ravel(), r, sides) == arrange(int(kind), sizes, R.ravel(), r, OPEN)
+        assert arrange(int(kind), sizes, R.ravel(), -r, OPEN)[2] > 0.0
+        if kind == Pair.BOX_BOX:
+            assert arrange(int(kind), sizes, R.ravel(), -r, sides)[2] < 0.0
 
 
 @pytest.mark.parametrize("kind", [p for p in CORE if p != Pair.SPHERE_SPHERE], ids=NAMES.get)
