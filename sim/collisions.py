@@ -47,8 +47,9 @@ class Collision:
         call = f"Collision({self.name!r}"
         if self.a == self.b:
             raise ValueError(f"{call}): a body cannot collide with itself")
-        if self.b == WORLD and self.shape_b is None:
-            raise ValueError(f"{call}): give shape_b=..., the shape of the obstacle")
+        for body, field in ((self.a, "shape_a"), (self.b, "shape_b")):
+            if body == WORLD and getattr(self, field) is None:
+                raise ValueError(f"{call}): give {field}=..., the shape of the obstacle")
         for field in ("shape_a", "shape_b"):
             shape = getattr(self, field)
             if shape is not None and not isinstance(shape, Solid):
@@ -93,22 +94,22 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
         names = " and ".join(type(shape).__name__ for _, shape, _ in ends)
         raise ValueError(f"{call}: there is no collision of {names}")
     kind, swapped = match
+    code, number = int(kind), kinds.count(kind)
     if swapped:
         ends.reverse()
-    if ends[0][0] < 0:  # the world is b
-        names = " with a fixed ".join(type(shape).__name__ for _, shape, _ in reversed(ends))
-        raise ValueError(f"{call}: no collision of a {names}; give the obstacle another shape")
     sizes = np.zeros(8)
     for k, (_, shape, _) in enumerate(ends):
         values = _sizes(shape)
         sizes[4 * k : 4 * k + len(values)] = values
+    if ends[0][0] < 0:  # the world is always b
+        ends.reverse()
+        code += kinds.SWAPPED
     places = np.array([_place(shape) for _, shape, _ in ends])
-    number = kinds.count(kind)
     return [
         Touch(
             collision.name if number == 1 else f"{collision.name}_{feature}",
             (ends[0][0], ends[1][0]),
-            int(kind),
+            code,
             feature,
             sizes,
             places,

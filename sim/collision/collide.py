@@ -9,20 +9,22 @@ from __future__ import annotations
 from sim.collision import box_axes, box_box, capsule_box
 from sim.collision.axes import OPEN, Arrangement
 from sim.collision.box_elements import put_elements
+from sim.collision.exchange import exchange
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
-from sim.collision.kinds import Pair
+from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.segment import choose_points, put_points
 from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.collision.witness import ABSENT, absent
 from sim.model import Vector
-from solvers.jit import kernel
+from solvers.jit import inner_kernel, kernel
 
 
 @kernel
 def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
 
-    kind     a Pair; feature: 0 to kinds.count(kind) - 1
+    kind     a Pair; feature: 0 to kinds.count(kind) - 1. Pair + SWAPPED: out is then that of b against a, in the frame
+             of a, by the twist of b
     sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of kinds.Shape
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
@@ -44,6 +46,7 @@ def open_sides(kind: int, sizes: Vector, R: Vector, r: Vector) -> int:
     all the time; the others mean that a body has gone around a corner of the other one, or through it, and a contact
     along them would push it on its way: it would gain energy.
     """
+    kind %= SWAPPED
     if kind == Pair.BOX_BOX:
         return box_axes.open_sides((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
     if kind == Pair.CAPSULE_BOX:
@@ -59,6 +62,7 @@ def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arran
     Once per pair and pose, where it saves most of the time of `collide`. sides: of the axes, those to choose from
     (`open_sides`); OPEN for all.
     """
+    kind %= SWAPPED
     if kind == Pair.BOX_BOX:
         return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r, sides)
     if kind == Pair.CAPSULE_BOX:
@@ -77,13 +81,20 @@ def choose(kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: 
         h = (sizes[4], sizes[5], sizes[6])
         return capsule_box.choose_elements(feature, arrangement, sizes[0], sizes[1], h, R, r, out)
     code = choose_points(feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
-    collide_chosen(kind, feature, code, sizes, R, r, out)
+    _put(kind, feature, code, sizes, R, r, out)
     return code if out[0] < ABSENT else 0
 
 
 @kernel
 def collide_chosen(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the elements that `choose` found: smooth, wherever the shapes have moved to since then."""
+    _put(kind % SWAPPED, feature, code, sizes, R, r, out)
+    if kind >= SWAPPED and code != 0:
+        exchange(R, r, out)
+
+
+@inner_kernel
+def _put(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     if code == 0:
         absent(out)
     elif kind == Pair.SPHERE_SPHERE:

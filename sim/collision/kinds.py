@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
+SWAPPED = 64  # added to a Pair: the two have changed places
 OUT = 43  # length of what `collide` writes
 
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from sim.collision.axes import OPEN
 from sim.collision.broad import bounding_radius, far
 from sim.collision.collide import arrange, choose, collide, collide_chosen, open_sides
-from sim.collision.kinds import OUT, SIZES, Pair, Shape, count, pair
+from sim.collision.kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
 
 Array = np.ndarray
 ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are a radius around the core
@@ -91,6 +91,38 @@ def test_derivatives_are_central_differences(kind: Pair, depth: float, rng: np.r
             assert np.abs(J - expected).max() <= 1e-6 * max(1.0, np.abs(expected).max()), (feature, doubt)
             seen.add(feature)
     assert len(seen) >= min(8, count(kind))
+
+
+@pytest.mark.parametrize("kind", [p for p in Pair if p != Pair.STRING], ids=NAMES.get)
+def test_pairs_that_have_changed_places(kind: Pair, rng: np.random.Generator) -> None:
+    """The same contact from the other side, with derivatives by the motion of b in the frame of a."""
+    for trial in range(4):
+        sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
+        R, r = random_pose(rng, kind, sizes, 0.02, aligned=trial % 2 == 1)
+        for feature in range(count(kind)):
+
+            def exchanged(R: Array, r: Array, feature: int = feature, sizes: Array = sizes) -> Array:
+                out = np.empty(OUT)
+                collide(int(kind) + SWAPPED, feature, sizes, np.ascontiguousarray(R).ravel(), r, out)
+                return out
+
+            def moved(twist: Array, R: Array = R, r: Array = r) -> Array:
+                """b turned and shifted in the frame of a: seen from b, a moves the other way."""
+                turn = Rotation.from_rotvec(twist[3:]).as_matrix()
+                B, b = turn @ R.T, twist[:3] - turn @ R.T @ r
+                out = exchanged(B.T, -B.T @ b)
+                return out[:7] if out[0] < 1e8 else np.full(7, np.nan)
+
+            out, before = exchanged(R, r), touch(kind, feature, sizes, R, r)
+            if out[0] > 1e8:
+                continue
+            np.testing.assert_allclose(
+                out[:7], [before[0], *(-R.T @ before[1:4]), *(R.T @ (before[4:7] - r))], atol=1e-12
+            )
+            expected, _ = differences(moved, 6)
+            n, p = out[1:4], out[4:7]
+            J = np.vstack([np.append(n, np.cross(p, n)), out[7:].reshape(6, 6)])
+            assert np.abs(J - expected).max() <= 1e-6 * max(1.0, np.abs(expected).max()), feature
 
 
 # -- distances ---------------------------------------------------------------------------------------------------------
