@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from sim import checks
 from sim.collision import kinds
+from sim.collision.broad import bounding_radius
 from sim.model import Law, Model
 from sim.parts import LAWS, WORLD
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
@@ -68,6 +70,7 @@ class Touch:
     kind: int
     feature: int
     sizes: Floats  # (8,)
+    radii: tuple[float, float]  # of the balls around the shapes of a and b; infinite where there is none
     places: Floats  # (2, 12) centre and rotation of the shapes in their bodies
     friction: float
     law: str
@@ -101,8 +104,10 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
     for k, (_, shape, _) in enumerate(ends):
         values = _sizes(shape)
         sizes[4 * k : 4 * k + len(values)] = values
+    radii = tuple(bounding_radius(code, sizes[4 * k :]) for k, (_, _, code) in enumerate(ends))
     if ends[0][0] < 0:  # the world is always b
         ends.reverse()
+        radii = radii[::-1]
         code += kinds.SWAPPED
     places = np.array([_place(shape) for _, shape, _ in ends])
     return [
@@ -112,6 +117,7 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
             code,
             feature,
             sizes,
+            radii,
             places,
             collision.friction,
             collision.law,
@@ -165,6 +171,28 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.pair_kind[j], model.pair_feature[j] = touch.kind, touch.feature
         model.pair_sizes[j] = touch.sizes
         model.pair_place[2 * j : 2 * j + 2] = touch.places
+    _pack_far(found, model)
     for k, (a, b) in enumerate(bodies):
         model.coupling_body[k] = a, b
         model.coupling_row[k + 1] = model.coupling_row[k] + 6
+
+
+def _pack_far(found: Sequence[Touch], model: Model) -> None:
+    """pair_far and body_reach."""
+    firsts = [j for j, touch in enumerate(found) if touch.feature == 0]
+    degree = Counter(i for j in firsts for i in found[j].bodies)
+    for j, end in zip(firsts, [*firsts[1:], len(found)], strict=True):
+        touch = found[j]
+        arms, mobility, turning = [0.0, 0.0], 0.0, 0.0
+        for side, i in enumerate(touch.bodies):
+            if i < 0:
+                continue
+            arm = float(np.linalg.norm(touch.places[side, :3])) + touch.radii[side]
+            least = float(np.linalg.eigvalsh(model.body_inertia[i].reshape(3, 3))[0])
+            free = model.body_mass[i] > 0.0 and arm < np.inf
+            arms[side] = arm
+            mobility += 1.0 / model.body_mass[i] + arm**2 / least if free else np.inf
+            turning += arm / least if free else np.inf
+            model.body_reach[i] = max(model.body_reach[i], arm)
+        most = max(degree[i] for i in touch.bodies if i >= 0)
+        model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j

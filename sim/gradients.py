@@ -15,6 +15,7 @@ from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import add_limit_blocks, add_limit_derivatives
 from sim.model import InputKind, Matrix, Model, Vector, Work
+from sim.pair_far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
 from solvers.jit import inlined, kernel
@@ -35,6 +36,7 @@ def gradient(
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     joint_blocks(model, work, h, q, v)
     if hard is not None:
+        all_near(model, work)
         condense_into(model, work, h, kappa, 1.0, work.A3)
         add_slip_jacobians(model, work, h)
         add_limit_blocks(model, work, h)

@@ -25,7 +25,8 @@ from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import Guess, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
-from sim.pair_choice import begin_pairs, overlapping
+from sim.pair_choice import overlapping
+from sim.pair_far import begin_pairs
 from solvers.jit import inlined, kernel
 from solvers.status import Status
 
@@ -117,8 +118,8 @@ def interior_point(
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    begin_pairs(model, work, options)
     choose_far(model, work, options)
-    begin_pairs(model, work)
     while True:
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):

@@ -34,19 +34,18 @@ def least_size(model: Model, j: int) -> float:
     return least
 
 
-@rich()
-def begin_pairs(model: Model, work: Work) -> None:
-    """Configuration 2, where the step begins: pair_before, the poses; pair_sides, the axes that separate shapes."""
-    work.pair_free[0] = 0
-    for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] > 0:
-            continue
-        place_shapes(model, work, j, work.pos2, work.rot2)
-        for k in range(12):
-            work.pair_before[j, k] = work.pair_relative[j, k]
-        pose = work.pair_before[j]
-        work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:])
-        work.pair_before[j, 12] = min(distance(model, work, j), 0.0) - _BEFORE * least_size(model, j)
+@kernel
+def open_pairs(model: Model, work: Work, j: int) -> float:
+    """Where a collision begins: pair_before, the pose at configuration 2 now in pair_relative, and pair_sides, the axes
+    that separate the shapes; returns their distance.
+    """
+    for k in range(12):
+        work.pair_before[j, k] = work.pair_relative[j, k]
+    pose = work.pair_before[j]
+    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:12])
+    apart = distance(model, work, j)
+    work.pair_before[j, 12] = min(apart, 0.0) - _BEFORE * least_size(model, j)
+    return apart
 
 
 @kernel
@@ -88,9 +87,9 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
 
 @rich()
 def choose_pairs(model: Model, work: Work) -> None:
-    """`choose_shapes` of all collisions, at configuration 3."""
+    """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0:
+        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
             place_shapes(model, work, j, work.pos3, work.rot3)
             choose_shapes(model, work, j)
 
@@ -99,7 +98,7 @@ def choose_pairs(model: Model, work: Work) -> None:
 def overlapping(model: Model, work: Work) -> bool:
     """Whether shapes overlap at configuration 3, in elements that were not chosen."""
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_free[0] == 0:
+        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0 and work.pair_free[0] == 0:
             place_shapes(model, work, j, work.pos3, work.rot3)
             if distance(model, work, j) < -_OVERLAP * least_size(model, j):
                 return True

@@ -1,8 +1,9 @@
 """Capsule against box: a segment with a radius around it.
 
     feature 0, 1    begin and end of the part of the segment above the nearest face of the box: an end of the segment,
-                    or where it crosses an edge of the face
-    feature 2       elsewhere: the nearest edge or corner of the box
+                    or where it crosses an edge of the face; an end that is not above it against what is nearest to it
+    feature 2       the segment across an edge of the box, or against the corner nearest to it
+    feature 3, 4    the two corners of the edge of the box that the segment is most parallel to
 
 The normal of a face, of an edge across the segment, or between two points, each exact for its pair of elements. Deep
 inside, where the segment itself cuts the box, the face or edge of least penetration decides.
@@ -24,7 +25,7 @@ from sim.collision.axes import (
     side,
     side_of,
 )
-from sim.collision.box import bits, corner, distance_squared, nearest, vertex_on_box
+from sim.collision.box import bits, corner, distance_squared, vertex_on_box
 from sim.collision.box_elements import CROSSING, code_of, edge_of, faces_of
 from sim.collision.clip import PAST, clip, common_normal, edge_normal, on_edges, side_edge
 from sim.collision.witness import (
@@ -62,13 +63,17 @@ def choose_elements(
     m, o = (face + 1) % 3, (face + 2) % 3
     codes = clip((x[m], x[o]), (y[m], y[o]), (h[m], h[o]))
     code = 0
-    if feature < 2:
+    if feature > 2:
+        code = edge_end(feature - 3, c, u, half, h) if s > 0.0 else 0
+    elif feature < 2:
         where = codes[feature]
         if where == 1:
             code = code_of(END_FACE, faces, feature, 0)
         elif where > 1:
             z, ub, lb = side_edge(where - 2, face, top, h)
             code = code_of(CROSSING, faces, 0, where - 2) if on_edges(c, u, half, z, ub, lb, PAST) else 0
+        if code == 0 and s > 0.0:
+            code = code_of(END_BOX, (0, 1.0, 0, 1.0), feature, 0)
     elif edge >= 0 and two_edges(edge, s, over, c, u, half, h):
         n = edge_normal(axis(edge, 1.0), u, over)
         side = side_of(edge, n, face, top)
@@ -76,11 +81,12 @@ def choose_elements(
             code = code_of(EDGES, (edge, over, 0, 1.0), 0, bits(n))
     elif s > 0.0:
         code = nearest_corner(c, u, half, h)
+        if code == edge_end(0, c, u, half, h) or code == edge_end(1, c, u, half, h):
+            code = 0
     if code != 0:
         put_elements(code, radius, half, h, R, r, out)
-        if feature == 2:
-            if code & 7 < END_BOX or separates(c, u, half, h, radius, out):
-                return code
+        if feature > 1:
+            return code
         elif out[0] + radius >= deepest(s, h):
             return code
     absent(out)
@@ -172,16 +178,8 @@ def two_edges(i: int, s: float, over: float, c: Vec3, u: Vec3, half: float, h: V
 
 @inner_kernel
 def nearest_corner(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
-    """An end of the segment against an edge or corner of the box, or a corner of the box against the segment.
-
-    0 where the nearest end is nearest to a face.
-    """
-    x, y = along(c, -half, u), along(c, half, u)
-    d2 = distance_squared(x, h)
-    e2 = distance_squared(y, h)
-    end = 0
-    if e2 < d2:
-        x, d2, end = y, e2, 1
+    """The corner of the box nearest to the segment; 0 where an end of the segment is nearer to the box."""
+    d2 = min(distance_squared(along(c, -half, u), h), distance_squared(along(c, half, u), h))
     near = -1
     for k in range(8):
         y = corner(k, h)
@@ -192,14 +190,15 @@ def nearest_corner(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
             e2 = dot(e, e)
             if e2 < d2 * (1.0 - TIE):
                 near, d2 = k, e2
-    if near >= 0:
-        return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, near)
-    return 0 if nearest(x, h)[3] == 1 else code_of(END_BOX, (0, 1.0, 0, 1.0), end, 0)
+    return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, near) if near >= 0 else 0
 
 
 @inner_kernel
-def separates(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
-    """Whether the normal in `out` separates segment and box by the distance there: the two points are the nearest."""
-    n = (out[1], out[2], out[3])
-    reach = half * abs(dot(n, u)) + abs(n[0]) * h[0] + abs(n[1]) * h[1] + abs(n[2]) * h[2]
-    return dot(n, c) - reach >= out[0] + radius - TIE * (half + h[0] + h[1] + h[2])
+def edge_end(k: int, c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
+    """Corner k = 0, 1 of the edge most parallel to the segment, on its side of the box; 0 where it is past its ends."""
+    i = 0 if abs(u[0]) >= abs(u[1]) and abs(u[0]) >= abs(u[2]) else (1 if abs(u[1]) >= abs(u[2]) else 2)
+    other = bits(c) & (7 - (1 << i))
+    if k == 1:
+        other |= 1 << i
+    y = corner(other, h)
+    return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, other) if abs(dot(u, y) - dot(u, c)) < half else 0

@@ -54,7 +54,7 @@ _PAIRS = {
 
 _COUNT = {
     Pair.CAPSULE_CAPSULE: 3,  # ends of the overlap, crossing
-    Pair.CAPSULE_BOX: 3,  # ends of the part above the face, closest point elsewhere
+    Pair.CAPSULE_BOX: 5,  # ends of the part above the face, crossing of an edge, corners of an edge
     Pair.CAPSULE_HALFSPACE: 2,  # ends
     Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
     Pair.BOX_HALFSPACE: 8,  # corners
