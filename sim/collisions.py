@@ -16,22 +16,28 @@ from sim.collision import kinds
 from sim.collision.broad import bounding_radius
 from sim.model import Law, Model
 from sim.parts import LAWS, WORLD
+from sim.polytope import Polytope
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
 
 if TYPE_CHECKING:
     from sim.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
+End = tuple[int, Solid]  # body, -1 for the world, and shape
 
 
 @dataclass(frozen=True)
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, or HalfSpace of b; left out, that of the body. With String on
-                       both sides the bodies are tied together instead: their points keep within its length.
+    shape_a, shape_b   Sphere, Capsule, Box, HalfSpace; Cylinder against Sphere and HalfSpace, Polytope against
+                       HalfSpace; left out, that of the body. With String on both sides the bodies are tied together
+                       instead: their points keep within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law      as in Contact
+
+    A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
+    time step, and adds the energy that this takes.
     """
 
     a: str
@@ -52,6 +58,11 @@ class Collision:
         for body, field in ((self.a, "shape_a"), (self.b, "shape_b")):
             if body == WORLD and getattr(self, field) is None:
                 raise ValueError(f"{call}): give {field}=..., the shape of the obstacle")
+        if self.a == WORLD:  # the obstacle is b
+            for one, other in (("a", "b"), ("shape_a", "shape_b")):
+                first, second = getattr(self, one), getattr(self, other)
+                object.__setattr__(self, one, second)
+                object.__setattr__(self, other, first)
         for field in ("shape_a", "shape_b"):
             shape = getattr(self, field)
             if shape is not None and not isinstance(shape, Solid):
@@ -85,31 +96,39 @@ def touches(mech: Mechanism) -> list[Touch]:
 
 def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
     call = f"Mechanism({mech.name!r}): collision {collision.name!r}"
-    ends = []
+    solids: list[End] = []
     for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
         index = -1 if body == WORLD else mech.body_names.index(body)
         shape = given if given is not None else mech.bodies[index].shape
         if shape is None:
             raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
-        ends.append((index, shape, _CODES[type(shape)]))
-    match = kinds.pair(ends[0][2], ends[1][2])
+        solids.append((index, shape))
+    (a, first), (b, second) = solids
+    if isinstance(first, Polytope) and isinstance(second, HalfSpace):
+        return _corners(collision, (a, first), (b, second))
+    if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
+        return _corners(collision, (b, second), (a, first))
+    codes = [_CODES.get(type(first)), _CODES.get(type(second))]
+    match = None if codes[0] is None or codes[1] is None else kinds.pair(codes[0], codes[1])
     if match is None:
-        names = " and ".join(type(shape).__name__ for _, shape, _ in ends)
-        raise ValueError(f"{call}: there is no collision of {names}")
+        names = f"{type(first).__name__} and {type(second).__name__}"
+        raise ValueError(f"{call}: there is no collision of {names}: {_REASON}")
     kind, swapped = match
+    return _features(collision, kind, solids[::-1] if swapped else solids)
+
+
+def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[Touch]:
+    """The contact points of two shapes in the order of their pair."""
     code, number = int(kind), kinds.count(kind)
-    if swapped:
-        ends.reverse()
     sizes = np.zeros(8)
-    for k, (_, shape, _) in enumerate(ends):
+    around = []
+    for k, (_, shape) in enumerate(ends):
         values = _sizes(shape)
         sizes[4 * k : 4 * k + len(values)] = values
-    radii = tuple(bounding_radius(code, sizes[4 * k :]) for k, (_, _, code) in enumerate(ends))
+        around.append(bounding_radius(_CODES[type(shape)], values))
     if ends[0][0] < 0:  # the world is always b
-        ends.reverse()
-        radii = radii[::-1]
-        code += kinds.SWAPPED
-    places = np.array([_place(shape) for _, shape, _ in ends])
+        ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
+    places = np.array([_place(shape) for _, shape in ends])
     return [
         Touch(
             collision.name if number == 1 else f"{collision.name}_{feature}",
@@ -117,7 +136,7 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
             code,
             feature,
             sizes,
-            radii,
+            (around[0], around[1]),
             places,
             collision.friction,
             collision.law,
@@ -126,7 +145,27 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
     ]
 
 
-_CODES = {
+_REASON = (
+    "cylinders touch spheres and half-spaces, polytopes half-spaces, where their distance is known with its "
+    "derivatives; give one of the two another shape, such as a capsule or a box"
+)
+
+
+def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> list[Touch]:
+    """A polytope above a half-space touches it with its corners: points, each a ball without radius."""
+    body, shape = solid
+    places = np.array([_place(shape), _place(ground[1])])
+    kind, bodies = int(kinds.Pair.SPHERE_HALFSPACE), (body, ground[0])
+    out = []
+    for k, point in enumerate(np.asarray(shape.vertices) @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
+        where = places.copy()
+        where[0, :3] = point
+        law = (collision.friction, collision.law)
+        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (0.0, np.inf), where, *law))
+    return out
+
+
+_CODES: dict[type, kinds.Shape] = {
     Sphere: kinds.Shape.SPHERE,
     Capsule: kinds.Shape.CAPSULE,
     Box: kinds.Shape.BOX,
