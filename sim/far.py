@@ -77,6 +77,7 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         if a == 0.0 or not known:
             work.far[c, 23] = 0.0
         _enlist(model, work, c)
+    work.counts[2] = work.counts[0]
     enlist_pairs(model, work)
     work.far_law[1] = options.tolerance / max(1, work.counts[1])
 
@@ -130,5 +131,6 @@ def came_near(model: Model, work: Work) -> bool:
         for c in range(model.contact_height.shape[0]):
             if model.cluster_end[c] > 0:
                 _enlist(model, work, c)
+        work.counts[2] = work.counts[0]
         enlist_pairs(model, work)
     return found

@@ -15,10 +15,10 @@ from __future__ import annotations
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, open_sides
 from sim.collision.witness import absent
-from sim.model import Model, Work
+from sim.model import Late, Model, Work
 from sim.pair_pose import place_shapes
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _BEFORE = 1e-3  # part of the smallest size by which elements may overlap at its beginning
@@ -85,7 +85,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
         j += 1
 
 
-@rich()
+@late(Late.CHOOSE_PAIRS)
 def choose_pairs(model: Model, work: Work) -> None:
     """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
@@ -94,7 +94,7 @@ def choose_pairs(model: Model, work: Work) -> None:
             choose_shapes(model, work, j)
 
 
-@rich("False")
+@late(Late.OVERLAPPING, False)
 def overlapping(model: Model, work: Work) -> bool:
     """Whether shapes overlap at configuration 3, in elements that were not chosen."""
     for j in range(model.pair_kind.shape[0]):

@@ -6,7 +6,7 @@ wherever the motion of the bodies may have changed it by more than the tolerance
 
 A collision is far when its stiffness, in units of the inertia behind it, does not slow Newton's method down:
 
-    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) d <= 1e-3
+    e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) d <= 1e-2
 
 for its n points, a: half the gap ahead; M and T as in far.py, of both bodies; d: the collisions that one of its bodies
 has, so that the sum over them holds. A gap below a at the solution makes the collision near, and the step is solved
@@ -22,18 +22,18 @@ from __future__ import annotations
 
 from sim.collision.axes import OPEN
 from sim.friction import contact_impulse, start_contact
-from sim.model import Model, Options, Work
+from sim.model import Late, Model, Options, Work
 from sim.pair_choice import choose_shapes, open_pairs
 from sim.pair_pose import place_shapes
 from sim.pairs import add_pair_wrench, is_absent, point_kinematics
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
-COUPLED = 1e-3  # largest sum of e over the far collisions of a body
+COUPLED = 1e-2  # largest sum of e over the far collisions of a body
 _ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
-@kernel
+@late(Late.ENLIST_PAIRS)
 def enlist_pairs(model: Model, work: Work) -> None:
     """Runs of near for the near collisions, after those of the ground; coupling_live, the bodies that they couple."""
     ground = model.contact_height.shape[0]
@@ -58,7 +58,7 @@ def enlist_pairs(model: Model, work: Work) -> None:
     work.counts[2] = runs
 
 
-@rich()
+@late(Late.BEGIN_PAIRS)
 def begin_pairs(model: Model, work: Work, options: Options) -> None:
     """Which collisions are near, and what the shapes of these are at configuration 2, where the step begins."""
     work.pair_free[0] = 0
@@ -125,7 +125,7 @@ def _change(model: Model, work: Work, options: Options, j: int, a: float) -> flo
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a)
 
 
-@rich()
+@late(Late.FAR_PAIR_IMPULSES)
 def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
     """Wrenches of the far collisions at configuration 3, evaluated again where they may have changed."""
     if work.pair_far_state[2] == 0.0 or not _moved(model, work):
@@ -193,7 +193,7 @@ def add_far_pairs(work: Work) -> None:
             work.wrench[i, k] += work.far_wrench[i, k]
 
 
-@rich("False")
+@late(Late.PAIRS_CAME_NEAR, False)
 def pairs_came_near(model: Model, work: Work) -> bool:
     """Whether a far collision is not, at configuration 3; it is near from now on."""
     found = False
@@ -213,7 +213,7 @@ def pairs_came_near(model: Model, work: Work) -> bool:
     return found
 
 
-@rich()
+@late(Late.ALL_NEAR)
 def all_near(model: Model, work: Work) -> None:
     """All collisions taken as near ones, for the derivatives of a step that has been solved."""
     for j in range(model.pair_kind.shape[0]):
