@@ -8,22 +8,21 @@ Nothing acts from outside: what the debris loses of its momentum the chaser gain
 import numpy as np
 from _common import QUICK, finish
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 import dojo_opt as dojo
 
-DURATION = 8.0 if QUICK else 16.0
+DURATION = 10.0 if QUICK else 20.0
 OPEN, CLOSED = np.tile([0.9, -0.3], 3), np.tile([0.0, -1.1], 3)  # angles of the claws: upper and lower links [rad]
+LINK = {"child_point": (0, 0, -0.25), "axis": (0, 1, 0), "damper": 1.0}
 
-bodies = [dojo.Body("chaser", 60.0, shape=dojo.Box(0.6, 0.6, 0.6))]
-joints = [dojo.Joint("floating", None, "chaser")]
-for k in range(3):
+bodies, joints = [dojo.Body("chaser", 60.0, shape=dojo.Box(0.6, 0.6, 0.6))], [dojo.Joint("floating", None, "chaser")]
+for k in range(3):  # a third of a turn about the x axis of the chaser per claw; z of a link leads away from it
     c, s = np.cos(np.pi * k / 3), np.sin(np.pi * k / 3)
-    outward = (0.3, 0.3 * (c * c - s * s), 0.6 * s * c)  # a third of a turn about the x axis of the chaser per claw
-    frame = (0.5 * (c - s), 0.5 * (c + s), 0.5 * (c - s), 0.5 * (c + s))  # z of a link leads away from the chaser
-    for name, parent, point, at in ((f"upper{k}", "chaser", outward, frame), (f"lower{k}", f"upper{k}", (0, 0, 0.25), (1, 0, 0, 0))):
-        bodies.append(dojo.Body(name, 2.0, shape=dojo.Capsule(0.03, 0.5)))
-        hinge = {"parent_point": point, "child_point": (0, 0, -0.25), "axis": (0, 1, 0), "orientation": at}
-        joints.append(dojo.Joint("revolute", parent, name, damper=1.0, **hinge))
+    root, frame = (0.3, 0.3 * (c * c - s * s), 0.6 * s * c), (c - s, c + s, c - s, c + s) / np.sqrt(4.0)
+    bodies += [dojo.Body(f"{name}{k}", 2.0, shape=dojo.Capsule(0.03, 0.5)) for name in ("upper", "lower")]
+    joints += [dojo.Joint("revolute", "chaser", f"upper{k}", parent_point=root, orientation=frame, **LINK)]
+    joints += [dojo.Joint("revolute", f"upper{k}", f"lower{k}", parent_point=(0, 0, 0.25), **LINK)]
 hands = [dojo.Collision("debris", body.name, friction=0.6) for body in bodies]
 bodies.append(dojo.Body("debris", 12.0, shape=dojo.Box(0.4, 0.3, 0.3)))
 joints.append(dojo.Joint("floating", None, "debris"))
@@ -31,18 +30,41 @@ mech = dojo.Mechanism(bodies, joints, collisions=hands, gravity=(0, 0, 0), name=
 sim = dojo.Simulator(mech, time_step=0.02, kappa=1e-8, tolerance=1e-10)
 
 x = sim.neutral()
-claws = slice(7, 13)
-x[claws] = OPEN
-debris = mech.q_slice("debris")
-x[debris] = [1.1, 0.02, -0.03, *np.array([0.9, 0.3, -0.2, 0.2]) / np.sqrt(0.98)]
+x[7:13] = OPEN
+x[mech.q_slice("debris")] = [1.1, 0.02, -0.03, 0.9, 0.3, -0.2, 0.2]
+x[13 + 3 : 20] /= np.linalg.norm(x[13 + 3 : 20])
 x[sim.nq + mech.v_slice("debris").start :] = [-0.1, 0.0, 0.02, 0.5, -0.3, 0.4]
 states, pushes = [x], []
-for k in range(round(DURATION / sim.time_step)):
-    share = np.clip((k * sim.time_step - 0.5) / 3.0, 0.0, 1.0)
-    target = OPEN + share * (CLOSED - OPEN)
-    u = np.clip(40.0 * (target - x[claws]) - 8.0 * x[sim.nq + 6 : sim.nq + 12], -5.0, 5.0)
-    step = sim.step(x, u)
-    assert step.success, step.message
+for time in np.arange(round(DURATION / sim.time_step)) * sim.time_step:
+    target = OPEN + np.clip((time - 0.5) / 3.0, 0.0, 1.0) * (CLOSED - OPEN)
+    step = sim.step(x, np.clip(40.0 * (target - x[7:13]) - 8.0 * x[sim.nq + 6 : sim.nq + 12], -5.0, 5.0), throw=True)
     x = step.x
     states.append(x)
-    pushes.append(step.contacts.normal_force.sum())
+    pushes.append(np.linalg.norm(step.contacts.force, axis=1).sum())
+
+time = np.arange(len(states)) * sim.time_step
+linear, angular = sim.momentum(np.array(states))
+drift = max(np.abs(linear - linear[0]).max(), np.abs(angular - angular[0]).max())
+z = sim.maximal(np.array(states))
+chaser, debris = z[:, 0], z[:, -1]
+spins = [Rotation.from_quat(b[:, 6:10], scalar_first=True).apply(b[:, 10:]) for b in (chaser, debris)]
+spin = np.linalg.norm(spins[1] - spins[0], axis=1)
+apart = np.linalg.norm(debris[:, :3] - chaser[:, :3], axis=1)
+print(f"momentum {drift:.1e} off; debris against chaser: spin {spin[0]:.2f} -> {spin[-1]:.4f} rad/s")
+
+figure = Figure(figsize=(8, 7), layout="constrained")
+top, middle, bottom = figure.subplots(3, 1, sharex=True)
+top.plot(time, spin, label="spin of the debris against the chaser [rad/s]")
+top.plot(time, apart, label="distance of the centres [m]")
+middle.plot(time[1:], pushes, label="contact forces of all claws [N]")
+bottom.plot(time, 12.0 * debris[:, 3], label="momentum of the debris, x [N s]")
+bottom.plot(time, linear[:, 0] - 12.0 * debris[:, 3], label="of the chaser and its claws")
+bottom.plot(time, linear[:, 0], "k--", label="of all")
+for ax in (top, middle, bottom):
+    ax.legend(loc="center right")
+bottom.set_xlabel("time [s]")
+
+assert drift < 1e-6, drift
+assert spin[-1] < 0.05 * spin[0], spin[-1]
+assert np.ptp(apart[-25:]) < 1e-3, "not held"
+finish(figure, __file__)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ import dojo_opt as dojo
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Contact, Joint
+from sim.polytope import Polytope
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
 
 SHAPES: dict[str, Solid] = {
@@ -223,6 +224,19 @@ def test_the_ground_as_a_collision_is_the_ground_as_a_contact() -> None:
     runs = [dojo.Simulator(m, time_step=0.01, kappa=1e-8).rollout(x, np.zeros((60, 0))) for m in (a, b)]
     np.testing.assert_allclose(runs[0].x, runs[1].x, atol=1e-5)
     np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-5)
+
+
+def test_a_polytope_falls_as_the_box_that_it_is() -> None:
+    corners = np.array(list(product((-0.2, 0.2), (-0.15, 0.15), (-0.25, 0.25))))
+    runs = []
+    for shape in (SHAPES["box"], Polytope(corners)):
+        slope = HalfSpace(orientation=(np.cos(0.05), 0.0, np.sin(0.05), 0.0))
+        mech = Mechanism([Body("a", 1.0, shape=shape)], [Joint("floating", None, "a")], collisions=[
+            Collision("a", shape_b=slope, friction=0.3)])  # fmt: skip
+        sim = dojo.Simulator(mech, time_step=0.01)
+        x = np.concatenate([[0, 0, 0.5, 0.8, 0.4, -0.2, 0.4], [0.5, 0.0, -1.0, 2.0, -1.0, 0.5]])
+        runs.append(sim.rollout(x, np.zeros((80, sim.nu)), throw=True).x)
+    np.testing.assert_allclose(runs[0], runs[1], atol=1e-5)
 
 
 def test_a_string_holds_and_does_not_push() -> None:
