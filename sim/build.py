@@ -34,6 +34,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ncoupling=npairs + len(mech.loops),
         nrow=6 * npairs + sum(6 - j.nv for j in mech.loops),
         nloop=len(mech.loops),
+        nhull=max(1, sum(len(table) for touch in mech.touches for table in touch.hulls)),
     )
 
 

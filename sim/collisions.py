@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from sim import checks
 from sim.collision import kinds
 from sim.collision.broad import bounding_radius
+from sim.collision.polytope import EDGES
 from sim.model import Law, Model
 from sim.parts import LAWS, WORLD
-from sim.polytope import Polytope
+from sim.polytope import Polytope, hull_table
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
 
 if TYPE_CHECKING:
@@ -30,9 +31,9 @@ End = tuple[int, Solid]  # body, -1 for the world, and shape
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, HalfSpace; Cylinder against Sphere and HalfSpace, Polytope against
-                       HalfSpace; left out, that of the body. With String on both sides the bodies are tied together
-                       instead: their points keep within its length.
+    shape_a, shape_b   Sphere, Capsule, Box, Polytope, HalfSpace; Cylinder against Sphere and HalfSpace; left out, that
+                       of the body. With String on both sides the bodies are tied together instead: their points keep
+                       within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law      as in Contact
 
@@ -81,6 +82,7 @@ class Touch:
     kind: int
     feature: int
     sizes: Floats  # (8,)
+    hulls: tuple[Floats, ...]  # tables of polytopes a and b, in the order of the pair, at the first point
     radii: tuple[float, float]  # of the balls around the shapes of a and b; infinite where there is none
     places: Floats  # (2, 12) centre and rotation of the shapes in their bodies
     friction: float
@@ -108,6 +110,8 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
         return _corners(collision, (a, first), (b, second))
     if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
         return _corners(collision, (b, second), (a, first))
+    if Polytope in (type(first), type(second)) and {type(first), type(second)} <= _CONVEX:
+        return _polytopes(collision, solids if isinstance(second, Polytope) else solids[::-1])
     codes = [_CODES.get(type(first)), _CODES.get(type(second))]
     match = None if codes[0] is None or codes[1] is None else kinds.pair(codes[0], codes[1])
     if match is None:
@@ -136,6 +140,7 @@ def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[T
             code,
             feature,
             sizes,
+            (),
             (around[0], around[1]),
             places,
             collision.friction,
@@ -146,8 +151,8 @@ def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[T
 
 
 _REASON = (
-    "cylinders touch spheres and half-spaces, polytopes half-spaces, where their distance is known with its "
-    "derivatives; give one of the two another shape, such as a capsule or a box"
+    "a cylinder touches spheres and half-spaces, where its distance is known with its derivatives; "
+    "give one of the two another shape, such as a capsule, a box or a polytope"
 )
 
 
@@ -161,8 +166,31 @@ def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> 
         where = places.copy()
         where[0, :3] = point
         law = (collision.friction, collision.law)
-        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (0.0, np.inf), where, *law))
+        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
     return out
+
+
+_CONVEX: set[type] = {Polytope, Box, Capsule, Sphere}
+
+
+def _polytopes(collision: Collision, ends: list[End]) -> list[Touch]:
+    """The contact points of a shape and a polytope: corners, and crossings of edges."""
+    tables, radii = zip(*(hull_table(shape) for _, shape in ends), strict=True)
+    corners = [table[1 : 1 + int(table[0, 0]), :3] for table in tables]
+    around = [float(np.linalg.norm(c, axis=1).max()) + r for c, r in zip(corners, radii, strict=True)]
+    thick = [r if len(c) < 4 else float(np.ptp(c, axis=0).min()) for c, r in zip(corners, radii, strict=True)]
+    sizes = np.array([0.0, radii[0], thick[0], 0.0, 0.0, radii[1], thick[1], 0.0])
+    code, number = int(kinds.Pair.POLYTOPE_POLYTOPE), len(corners[0]) + len(corners[1])
+    number += EDGES if tables[0][0, 1] > 0 else 0
+    if ends[0][0] < 0:  # the world is always b
+        ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
+    places = np.array([_place(shape) for _, shape in ends])
+    bodies, circles = (ends[0][0], ends[1][0]), (around[0], around[1])
+    law = (collision.friction, collision.law)
+    return [
+        Touch(f"{collision.name}_{k}", bodies, code, k, sizes, tables if k == 0 else (), circles, places, *law)
+        for k in range(number)
+    ]
 
 
 _CODES: dict[type, kinds.Shape] = {
@@ -211,6 +239,7 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.pair_sizes[j] = touch.sizes
         model.pair_place[2 * j : 2 * j + 2] = touch.places
     _pack_far(found, model)
+    _pack_hulls(found, model)
     for k, (a, b) in enumerate(bodies):
         model.coupling_body[k] = a, b
         model.coupling_row[k + 1] = model.coupling_row[k] + 6
@@ -219,6 +248,8 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
 def _pack_far(found: Sequence[Touch], model: Model) -> None:
     """pair_far and body_reach."""
     firsts = [j for j, touch in enumerate(found) if touch.feature == 0]
+    if not firsts:
+        return
     degree = Counter(i for j in firsts for i in found[j].bodies)
     for j, end in zip(firsts, [*firsts[1:], len(found)], strict=True):
         touch = found[j]
@@ -235,3 +266,15 @@ def _pack_far(found: Sequence[Touch], model: Model) -> None:
             model.body_reach[i] = max(model.body_reach[i], arm)
         most = max(degree[i] for i in touch.bodies if i >= 0)
         model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j
+
+
+def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
+    """hull, and where in it the polytopes of every point are."""
+    end, rows = 0, [0, 0]
+    for j, touch in enumerate(found):
+        for k, table in enumerate(touch.hulls):
+            rows[k] = end
+            model.hull[end : end + len(table)] = table
+            end += len(table)
+        if touch.kind % kinds.SWAPPED == kinds.Pair.POLYTOPE_POLYTOPE:
+            model.pair_sizes[j, [0, 4]] = rows

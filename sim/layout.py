@@ -38,7 +38,7 @@ MODEL_FLOATS = _shapes(
     dof_damper nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_frame nground 9,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
-    body_reach nbody, loop_point nloop 6,
+    body_reach nbody, hull nhull 4, loop_point nloop 6,
     loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9, limit_sign nlimit, limit_bound nlimit,
     input_wrench nu 6, gravity 3
     """
@@ -91,6 +91,7 @@ class Sizes(NamedTuple):
     ncoupling: int = 0  # two bodies with pairs, and closed loops
     nrow: int = 0  # unknown forces of the couplings
     nloop: int = 0
+    nhull: int = 1  # rows of the tables of polytopes
 
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
@@ -147,6 +148,7 @@ def sizes_of(model: Model) -> Sizes:
         ncoupling=len(model.coupling_body),
         nrow=int(model.coupling_row[-1]),
         nloop=len(model.loop_ntrans),
+        nhull=len(model.hull),
     )
 
 

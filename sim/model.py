@@ -150,6 +150,7 @@ class Model(NamedTuple):
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_far: Matrix  # (npair, 7) what says that a collision is far (pair_far.py), at its first pair
+    hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/hull.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
     loop_point: Matrix  # (nloop, 6) joint frame on b, joint point on a, from their centres of mass [m]

@@ -58,7 +58,7 @@ def distance(model: Model, work: Work, first: int) -> float:
     least = 1e300
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        choose(kind, j - first, faces, model.pair_sizes[j], pose[:9], pose[9:], g)
+        choose(kind, j - first, faces, model.pair_sizes[j], model.hull, pose[:9], pose[9:], g)
         least = min(least, g[0])
         j += 1
     return least
@@ -75,9 +75,9 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         sizes = model.pair_sizes[j]
-        code = choose(kind, j - first, faces, sizes, pose[:9], pose[9:], work.pair_out[j])
-        if code > 1:  # a choice
-            collide_chosen(kind, j - first, code, sizes, before[:9], before[9:12], g)
+        code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
+        if code > 1 or code < 0:  # a choice
+            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             if g[0] < before[12]:
                 code = 0
                 absent(work.pair_out[j])

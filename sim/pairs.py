@@ -60,7 +60,9 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
         if work.pair_free[0] == 0:
-            collide_chosen(kind, end - first, work.pair_code[end], sizes, pose[:9], pose[9:], work.pair_out[end])
+            collide_chosen(
+                kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
+            )
         end += 1
 
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.shapes import Solid, rotation_matrix
+from sim.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
 
+_PARALLEL = 1e-9  # difference of the normals of two facets in one plane
 _FLAT = 1e-9  # volume, relative to that of the box around the points, below which they span no body
 
 
@@ -89,3 +91,37 @@ class Polytope(Solid):
         """Principal moments of inertia about the centroid, ascending [kg m^2]."""
         a, b, c = np.linalg.eigvalsh(self.inertia(mass))
         return float(a), float(b), float(c)
+
+
+def hull_table(shape: Solid) -> tuple[Floats, float]:
+    """The table of sim/collision/hull.py, (n, 4), of a shape without what is around it, and the radius of that [m]."""
+    if isinstance(shape, Sphere):
+        return np.array([[1.0, 0.0, 0.0, 0.0], np.zeros(4)]), shape.radius
+    if isinstance(shape, Capsule):
+        half = 0.5 * shape.length
+        return np.array([[2.0, 1, 0, 0], [0, 0, -half, 0], [0, 0, half, 0], [0, 1, -1, -1]]), shape.radius
+    if isinstance(shape, Box):
+        return _table(0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))), 0.0
+    assert isinstance(shape, Polytope)
+    return _table(np.asarray(shape.vertices)), 0.0
+
+
+def _table(points: Floats) -> Floats:
+    """Rows of a polytope with these corners; facets in one plane are one face."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    faces: list[Floats] = []
+    face_of = []
+    for plane in hull.equations:
+        same = [k for k, f in enumerate(faces) if np.abs(f - plane)[:3].max() < _PARALLEL]
+        face_of.append(same[0] if same else len(faces))
+        if not same:
+            faces.append(plane)
+    edges: dict[tuple[int, int], set[int]] = {}
+    for corners, face in zip(hull.simplices, face_of, strict=True):
+        for a, b in combinations(sorted(int(c) for c in corners), 2):
+            edges.setdefault((a, b), set()).add(face)
+    sharp = [[a, b, *sorted(pair)] for (a, b), pair in edges.items() if len(pair) == 2]
+    rows = [[len(points), len(sharp), len(faces), 0], *([*p, 0] for p in points), *sharp]
+    return np.array([*rows, *([*f[:3], -f[3]] for f in faces)], dtype=np.float64)

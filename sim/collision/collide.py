@@ -6,7 +6,7 @@ collide_chosen   the contact of those elements: smooth in the pose
 
 from __future__ import annotations
 
-from sim.collision import box_axes, box_box, capsule_box
+from sim.collision import box_axes, box_box, capsule_box, polytope
 from sim.collision.axes import OPEN, Arrangement
 from sim.collision.box_elements import put_elements
 from sim.collision.exchange import exchange
@@ -15,17 +15,18 @@ from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.segment import choose_points, put_points
 from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.collision.witness import ABSENT, absent
-from sim.model import Vector
+from sim.model import Matrix, Vector
 from solvers.jit import inner_kernel, kernel
 
 
 @kernel
-def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
 
     kind     a Pair; feature: 0 to kinds.count(kind) - 1. Pair + SWAPPED: out is then that of b against a, in the frame
              of a, by the twist of b
     sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of kinds.Shape
+    hull     tables of polytopes (hull.py); one row will do where there are none
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
              0       phi, signed distance [m], negative inside; 1e9 where there is no such point now
@@ -35,7 +36,7 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
-    choose(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, R, r, out)
+    choose(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, hull, R, r, out)
 
 
 @kernel
@@ -72,29 +73,45 @@ def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arran
 
 
 @kernel
-def choose(kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> int:
+def choose(
+    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> int:
     """`collide`, with what `arrange` returns; and which elements of the shapes it found: a number, 0 for none."""
+    code = _choose(kind % SWAPPED, feature, arrangement, sizes, hull, R, r, out)
+    if kind >= SWAPPED and code != 0:
+        exchange(R, r, out)
+    return code
+
+
+@inner_kernel
+def _choose(
+    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> int:
     if kind == Pair.BOX_BOX:
         ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
         return box_box.choose_elements(feature, arrangement, ha, hb, R, r, out)
     if kind == Pair.CAPSULE_BOX:
         h = (sizes[4], sizes[5], sizes[6])
         return capsule_box.choose_elements(feature, arrangement, sizes[0], sizes[1], h, R, r, out)
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return polytope.choose_elements(feature, sizes, hull, R, r, out)
     code = choose_points(feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
-    _put(kind, feature, code, sizes, R, r, out)
+    _put(kind, feature, code, sizes, hull, R, r, out)
     return code if out[0] < ABSENT else 0
 
 
 @kernel
-def collide_chosen(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+def collide_chosen(
+    kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> None:
     """Contact of the elements that `choose` found: smooth, wherever the shapes have moved to since then."""
-    _put(kind % SWAPPED, feature, code, sizes, R, r, out)
+    _put(kind % SWAPPED, feature, code, sizes, hull, R, r, out)
     if kind >= SWAPPED and code != 0:
         exchange(R, r, out)
 
 
 @inner_kernel
-def _put(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+def _put(kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     if code == 0:
         absent(out)
     elif kind == Pair.SPHERE_SPHERE:
@@ -121,5 +138,7 @@ def _put(kind: int, feature: int, code: int, sizes: Vector, R: Vector, r: Vector
         cylinder_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.STRING:
         string(sizes, r, out)
+    elif kind == Pair.POLYTOPE_POLYTOPE:
+        polytope.put_elements(feature, code, sizes, hull, R, r, out)
     else:
         absent(out)

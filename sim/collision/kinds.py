@@ -17,6 +17,7 @@ class Shape(IntEnum):
     BOX = 2  # half extents along x, y, z
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
+    POLYTOPE = 6  # row of its table (hull.py), radius around it; as other shapes are against a POLYTOPE
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
@@ -35,6 +36,7 @@ class Pair(IntEnum):
     BOX_HALFSPACE = 9
     CYLINDER_HALFSPACE = 10
     STRING = 11
+    POLYTOPE_POLYTOPE = 12
 
 
 _PAIRS = {
@@ -50,6 +52,7 @@ _PAIRS = {
     (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
     (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
     (Shape.STRING, Shape.STRING): Pair.STRING,
+    (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
 }
 
 _COUNT = {
@@ -72,5 +75,5 @@ def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
 
 
 def count(kind: Pair) -> int:
-    """How many contact points the pair may have: features 0 to count - 1 of `collide`."""
+    """How many contact points the pair may have: features 0 to count - 1 of `collide`; of polytopes see polytope.py."""
     return _COUNT.get(kind, 1)

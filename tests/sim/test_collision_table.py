@@ -10,13 +10,16 @@ from benchmark import loaded
 
 from sim.collision.kinds import Pair
 
+POLYTOPES = ["sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope"]
+NAMES = [*(p.name.lower() for p in Pair if p != Pair.POLYTOPE_POLYTOPE), *POLYTOPES]
+
 
 @pytest.fixture(scope="module")
 def table() -> Iterator[ModuleType]:
     yield from loaded("collision_pairs")
 
 
-@pytest.mark.parametrize("name", [p.name.lower() for p in Pair])
+@pytest.mark.parametrize("name", NAMES)
 def test_distance_frame_and_derivatives(table: ModuleType, name: str) -> None:
     errors = table.check(name)
     assert len(errors) == 9
@@ -27,4 +30,4 @@ def test_distance_frame_and_derivatives(table: ModuleType, name: str) -> None:
 
 
 def test_all_pairs_are_in_the_table(table: ModuleType) -> None:
-    assert [p.name.lower() for p in Pair] == table.PAIRS
+    assert table.PAIRS == NAMES
