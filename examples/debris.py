@@ -44,19 +44,17 @@ time = np.arange(len(states)) * sim.time_step
 linear, angular = sim.momentum(np.array(states))
 drift = max(np.abs(linear - linear[0]).max(), np.abs(angular - angular[0]).max())
 z = sim.maximal(np.array(states))
-chaser, debris = z[:, 0], z[:, -1]
-spins = [Rotation.from_quat(b[:, 6:10], scalar_first=True).apply(b[:, 10:]) for b in (chaser, debris)]
-spin = np.linalg.norm(spins[1] - spins[0], axis=1)
-apart = np.linalg.norm(debris[:, :3] - chaser[:, :3], axis=1)
+spins = [Rotation.from_quat(z[:, i, 6:10], scalar_first=True).apply(z[:, i, 10:]) for i in (0, -1)]
+spin, apart = (np.linalg.norm(pair, axis=1) for pair in (spins[1] - spins[0], z[:, -1, :3] - z[:, 0, :3]))
+p = 12.0 * z[:, -1, 3]
 print(f"momentum {drift:.1e} off; debris against chaser: spin {spin[0]:.2f} -> {spin[-1]:.4f} rad/s")
 
 figure = Figure(figsize=(8, 6), layout="constrained")
 top, bottom = figure.subplots(2, 1, sharex=True)
 top.plot(time, spin, label="spin of the debris against the chaser [rad/s]")
 top.plot(time, apart, label="distance of the centres [m]")
-bottom.plot(time, 12.0 * debris[:, 3], label="momentum of the debris, x [N s]")
-bottom.plot(time, linear[:, 0] - 12.0 * debris[:, 3], label="of the chaser and its claws")
-bottom.plot(time, linear[:, 0], "k--", label="of all")
+for part, name in ((p, "the debris"), (linear[:, 0] - p, "the chaser and its claws"), (linear[:, 0], "all")):
+    bottom.plot(time, part, label=f"momentum of {name} along x [N s]")
 for ax in (top, bottom):
     ax.legend(loc="center right")
 bottom.set_xlabel("time [s]")

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.collisions import couples, pack_collisions
+from sim.collisions import pack_collisions
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law, Model
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
+from sim.touch import couples
 
 Floats = NDArray[np.float64]
 
