@@ -1,6 +1,6 @@
 """The interior point of a step: Newton's method on the joint velocities, contacts and limits held on the central path.
 
-Six things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
+Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
   beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
@@ -10,6 +10,8 @@ Six things decide (60,000 random extreme states, `benchmarks/robustness.py`, see
 * The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
 * No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
+* Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
+  overlap is none (pair_choice.py).
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0.
 """

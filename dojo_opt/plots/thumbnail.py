@@ -78,7 +78,7 @@ def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
     return out
 
 
-def _surface(shape: Shape) -> Floats:
+def _surface(shape: Shape | Polytope) -> Floats:
     """Points whose hull is the shape, body axes (n, 3)."""
     turn, centre = rotation_matrix(shape.orientation), np.asarray(shape.center)
     angles = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
