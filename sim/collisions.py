@@ -12,7 +12,7 @@ import numpy as np
 from sim import checks
 from sim.collision import kinds
 from sim.model import Law, Model
-from sim.parts import LAWS, WORLD
+from sim.parts import LAWS, WORLD, share
 from sim.shapes import Solid
 from sim.touch import Touch, couples
 
@@ -28,7 +28,7 @@ class Collision:
                        of the body. With String on both sides the bodies are tied together instead: their points keep
                        within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
-    friction, law      as in Contact
+    friction, law, restitution     as in Contact
 
     A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
     time step, and adds the energy that this takes.
@@ -41,6 +41,7 @@ class Collision:
     friction: float = 0.5
     law: str = "nonlinear"
     name: str = ""  # default: a-b
+    restitution: float = 0.0
 
     def __post_init__(self) -> None:
         checks.name("Collision(a=...)", self.a)
@@ -64,6 +65,7 @@ class Collision:
         friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
         object.__setattr__(self, "friction", friction)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
+        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
 
 
 def pack_collisions(mech: Mechanism, model: Model) -> None:
@@ -76,6 +78,7 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.contact_body[c] = touch.bodies[0]
         model.contact_law[c] = Law[touch.law.upper()] if touch.friction > 0.0 else Law.IMPACT
         model.contact_friction[c] = touch.friction
+        model.contact_restitution[c] = touch.restitution
         model.pair_coupling[j] = bodies.index(touch.bodies)
         model.pair_kind[j], model.pair_feature[j] = touch.kind, touch.feature
         model.pair_sizes[j] = touch.sizes

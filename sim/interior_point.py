@@ -29,6 +29,7 @@ from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
 from sim.pair_choice import overlapping
 from sim.pair_far import begin_pairs
+from sim.restitution import find_impacts, gained_energy
 from solvers.jit import inlined, kernel
 from solvers.late import late
 from solvers.status import Status
@@ -123,7 +124,9 @@ def interior_point(
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     begin_pairs(model, work, options)
     choose_far(model, work, options)
+    find_impacts(model, work, options.h)
     while True:
+        work.pair_free[0] = 0
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
@@ -137,5 +140,7 @@ def interior_point(
                 break
             out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
             work.pair_free[0] = (attempt + 1) // 2 % 2
-        if not came_near(model, work):
+        if came_near(model, work):
+            continue
+        if out.status != _SOLVED or not gained_energy(model, work, options.h):
             return out

@@ -61,7 +61,6 @@ def enlist_pairs(model: Model, work: Work) -> None:
 @late(Late.BEGIN_PAIRS)
 def begin_pairs(model: Model, work: Work, options: Options) -> None:
     """Which collisions are near, and what the shapes of these are at configuration 2, where the step begins."""
-    work.pair_free[0] = 0
     change = 0.0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] > 0:
