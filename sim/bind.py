@@ -13,6 +13,8 @@ from sim import (
     coupling,
     coupling_gradient,
     loops,
+    pair_choice,
+    pair_far,
     pair_stiffness,
     pairs,
     pyramid,
@@ -46,6 +48,12 @@ _PAIRS = (
     pair_stiffness.apply_pairs,
     pair_stiffness.pair_constants,
     report_pairs,
+    pair_choice.choose_pairs,
+    pair_choice.overlapping,
+    pair_far.begin_pairs,
+    pair_far.enlist_pairs,
+    pair_far.far_pair_impulses,
+    pair_far.pairs_came_near,
 )
 _PYRAMIDS = (
     pyramid.start_pyramid,
@@ -132,6 +140,8 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
     if len(model.coupling_body):
         _bind(model, _COUPLING_GRADIENT)
+    if len(model.pair_kind):
+        _bind(model, (pair_far.all_near,))
     if np.any(model.contact_restitution):
         _bind(model, (restitution.add_bounce_composites,))
         if len(model.pair_kind):

@@ -11,7 +11,8 @@ zeta_0 answers the right-hand side and Z the unit forces:
 
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
-so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
+so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row; couple_live names those
+that the dense system has: not those of far pairs, nor those without stiffness. Constraints that say nothing
 new (a planar loop in space) are found by the pivots, and their forces set to zero.
 """
 
@@ -59,7 +60,7 @@ def take_apart(work: Work, k: int, row: int) -> None:
             B[c] = 0.0
             R[c] = 0.0
             R[6 + c] = 0.0
-        work.couple_E[r] = 1.0
+        work.couple_E[r] = 0.0  # no row, and none after it
         if not abs(best) > _ROUNDING * first:
             continue
         work.couple_E[r] = 1.0 / best
@@ -100,41 +101,50 @@ def response(model: Model, work: Work, k: int, row: int) -> float:
 
 
 @kernel
-def _row_scale(work: Work, row: int) -> float:
+def _row_scale(T: Matrix, row: int) -> float:
     """1 over the largest entry of a row of the dense system."""
     largest = 0.0
-    for col in range(work.couple_T.shape[1]):
-        largest = max(largest, abs(work.couple_T[row, col]))
+    for col in range(T.shape[1]):
+        largest = max(largest, abs(T[row, col]))
     return 1.0 / largest if largest > 0.0 else 1.0
 
 
 @late(Late.FACTOR_COUPLING, True)
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
-    pairs = 0
+    n = 0
     for k in range(model.coupling_body.shape[0]):
         if not is_loop(model, k):
+            if work.coupling_live[k] == 0:
+                continue
             take_apart(work, k, model.coupling_row[k])
-    for k in range(model.coupling_body.shape[0]):
-        for col in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            for d in range(work.rhs.shape[0]):
-                work.rhs[d] = 0.0
-            add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
-            add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
-            solve(model, work, work.rhs, work.couple_Y[col])
-            for m in range(model.coupling_body.shape[0]):
-                for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
-                    work.couple_T[row, col] = -response(model, work, m, row)
-            if not is_loop(model, k):
-                work.couple_T[col, col] += work.couple_E[col]
-                pairs += 1
-    for row in range(work.couple_T.shape[0]):
-        work.couple_scale[row] = _row_scale(work, row)
-        for col in range(work.couple_T.shape[1]):
-            work.couple_T[row, col] *= work.couple_scale[row]
+        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            if is_loop(model, k) or work.couple_E[row] > 0.0 or work.couple_E[row] < 0.0:
+                work.couple_live[n, 0] = row
+                work.couple_live[n, 1] = k
+                n += 1
+    T = work.couple_T[:n, :n]
+    pairs = 0
+    for q in range(n):
+        col, k = work.couple_live[q, 0], work.couple_live[q, 1]
+        for d in range(work.rhs.shape[0]):
+            work.rhs[d] = 0.0
+        add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
+        add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
+        solve(model, work, work.rhs, work.couple_Y[col])
+        for p in range(n):
+            T[p, q] = -response(model, work, work.couple_live[p, 1], work.couple_live[p, 0])
+        if not is_loop(model, k):
+            T[q, q] += work.couple_E[col]
+            pairs += 1
+    for p in range(n):
+        work.couple_scale[p] = _row_scale(T, p)
+        for q in range(n):
+            T[p, q] *= work.couple_scale[p]
     least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
-    rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
+    rank = full_lu_factor(T, work.couple_pivots, least)
     work.couple_rank[0] = rank
+    work.couple_rank[1] = n
     return rank >= pairs
 
 
@@ -144,13 +154,19 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
 
     share: part of the loop gaps to close.
     """
-    x = work.couple_x
-    for k in range(model.coupling_body.shape[0]):
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + response(model, work, k, row))
-    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), x)
-    for row in range(x.shape[0]):
-        f = x[row, 0]
+    n = int(work.couple_rank[1])
+    x = work.couple_x[:n]
+    for p in range(n):
+        row = work.couple_live[p, 0]
+        x[p, 0] = work.couple_scale[p] * (
+            share * work.couple_gap[row] + response(model, work, work.couple_live[p, 1], row)
+        )
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), x)
+    for row in range(work.couple_step.shape[0]):
+        work.couple_step[row] = 0.0
+    for p in range(n):
+        f = x[p, 0]
+        row = work.couple_live[p, 0]
         work.couple_step[row] = f
         Y = work.couple_Y[row]
         for d in range(out.shape[0]):
@@ -174,26 +190,30 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
 @late(Late.SOLVE_COUPLING_PANEL)
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
-    X = work.couple_panel
-    for k in range(model.coupling_body.shape[0]):
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            for side in range(2):
-                i = model.coupling_body[k, side]
-                if i < 0:
-                    continue
-                for c in range(6):
-                    f = work.couple_R[row, 6 * side + c]
-                    z = work.panel[6 * i + c]
-                    for m in range(X.shape[1]):
-                        X[row, m] += f * z[m]
-            for m in range(X.shape[1]):
-                X[row, m] *= work.couple_scale[row]
-    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), X)
-    for row in range(X.shape[0]):
+    n = int(work.couple_rank[1])
+    X = work.couple_panel[:n]
+    for p in range(n):
+        row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+        for m in range(X.shape[1]):
+            X[p, m] = work.couple_panel[row, m]  # p <= row
+        for side in range(2):
+            i = model.coupling_body[k, side]
+            if i < 0:
+                continue
+            for c in range(6):
+                f = work.couple_R[row, 6 * side + c]
+                z = work.panel[6 * i + c]
+                for m in range(X.shape[1]):
+                    X[p, m] += f * z[m]
+        for m in range(X.shape[1]):
+            X[p, m] *= work.couple_scale[p]
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X)
+    for p in range(n):
+        Y = work.couple_Y[work.couple_live[p, 0]]
         for d in range(work.columns.shape[0]):
-            f = work.couple_Y[row, d]
+            f = Y[d]
             for m in range(X.shape[1]):
-                work.columns[d, m] += f * X[row, m]
+                work.columns[d, m] += f * X[p, m]
 
 
 @kernel

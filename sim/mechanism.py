@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.collisions import Collision, Touch, touches
+from sim.collisions import Collision
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
 from sim.terrain import Terrain
+from sim.touch import Touch, touches
 
 
 @dataclass(frozen=True)
