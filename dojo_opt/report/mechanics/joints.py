@@ -155,8 +155,8 @@ def spring(kind: str) -> float:
         q = sim.rollout(sim.neutral(), np.tile(u, (400, 1)), throw=True).x[-1, : sim.nq]
         turned = nrot == 3 and d >= ntrans
         held = np.sin(2.0 * np.arcsin(np.linalg.norm(q[ntrans + 1 :]))) if turned else q[d]
-        worst = max(worst, abs(SPRING * held / 4.0 - 1.0))
-    return float(worst)
+        worst = max(worst, abs(SPRING * float(held) / 4.0 - 1.0))
+    return worst
 
 
 def damper(kind: str) -> float:
@@ -169,8 +169,8 @@ def damper(kind: str) -> float:
         x = sim.rollout(sim.start(sim.neutral()[: sim.nq], v), np.zeros((400, sim.nu)), throw=True).x[-1]
         way = np.linalg.norm(sim.difference(x, sim.neutral())[: sim.nv])
         mass = 1.0 if d < ntrans else INERTIA
-        worst = max(worst, abs(way * DAMPER / (0.7 * mass) - 1.0))
-    return float(worst)
+        worst = max(worst, abs(float(way) * DAMPER / (0.7 * mass) - 1.0))
+    return worst
 
 
 def push(kind: str) -> float:
@@ -182,8 +182,8 @@ def push(kind: str) -> float:
         linear, angular = sim.momentum(sim.rollout(sim.neutral(), us, throw=True).x[-1])
         gained = np.linalg.norm(linear if d < KINDS[kind][0] else angular)
         start = np.linalg.norm(sim.momentum(sim.neutral())[1])
-        worst = max(worst, abs((gained - start) / 0.5 - 1.0))
-    return float(worst)
+        worst = max(worst, abs((float(gained) - float(start)) / 0.5 - 1.0))
+    return worst
 
 
 def derivatives(kind: str) -> float:

@@ -32,8 +32,8 @@ class Mechanics:
         report.tables.append(Table("Joint kinds", ("", *joints.BARS), lines, note))
         report.details["joints"] = found
         for name, bar in joints.BARS.items():
-            values = {kind: v[name] for kind, v in found.items() if v[name] is not None}
+            values = {kind: value for kind, v in found.items() if (value := v[name]) is not None}
             least = name == "energy"
             worst = (min if least else max)(values, key=lambda kind: values[kind])
             text = f"worst of {len(values)}: {worst}"
-            report.rows.append(Row(f"joints: {name}", float(values[worst] or 0.0), "", bar, at_least=least, note=text))
+            report.rows.append(Row(f"joints: {name}", values[worst], "", bar, at_least=least, note=text))
