@@ -69,7 +69,10 @@ class States:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
 
         The velocity of a state is the mean one of the interval before it; this one has the momentum M(q) v at its end,
-        so that a simulation started with it is right to second order from its first step.
+        so that a simulation started with it is right to second order from its first step. That takes the motion to be
+        free of contacts: start(q, 0) on the ground has the velocity g h/2 that gravity alone would take away, a little
+        hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as that of
+        `neutral` and of `equilibrium`.
         """
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
