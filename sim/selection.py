@@ -1,0 +1,206 @@
+"""Selection of parameters by name, and the mechanism with other values of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.mechanism import Mechanism
+from sim.parameters import INERTIA, KINDS, Parameter, Parameters, Plan, all_parameters
+
+Floats = NDArray[np.float64]
+COMMON = "*"
+
+
+def chosen(call: str, known: Sequence[Parameter], name: str) -> list[Parameter]:
+    """The parameters that a name stands for; `kind:*` is one for all parts, of the mean of their values."""
+    kind = name.split(":")[0].split("[")[0] if isinstance(name, str) else name
+    checks.one_of(f"{call}: parameter", kind, KINDS)
+    of_kind = [p for p in known if p.kind == kind]
+    if name.startswith(f"{kind}:{COMMON}"):
+        found = [p for p in _common(of_kind) if name in (f"{kind}:{COMMON}", p.name)]
+    else:
+        found = [p for p in of_kind if name in (kind, f"{kind}:{p.part}", p.name)]
+    if not found:
+        parts = ", ".join(dict.fromkeys(f"{p.kind}:{p.part}" if p.part else p.name for p in of_kind))
+        raise ValueError(f"{call}: no parameter {name!r}; of this kind there are: {parts or 'none'}")
+    return found
+
+
+def _common(parameters: Sequence[Parameter]) -> list[Parameter]:
+    """One parameter per component, for all parts that have it."""
+    found = []
+    for component in dict.fromkeys(p.component for p in parameters):
+        same = [p for p in parameters if p.component == component]
+        value = float(np.mean([p.value for p in same]))
+        terms = tuple(term for p in same for term in p.terms)
+        found.append(Parameter(same[0].kind, COMMON, component, value, terms))
+    return found
+
+
+def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple[Parameters, Plan]:
+    """The parameters of the names, in their order, and the terms of their columns."""
+    found: list[Parameter] = []
+    rows: dict[str, slice] = {}
+    for name in (names,) if isinstance(names, str) else names:
+        some = chosen(call, known, name)
+        rows[name] = slice(len(found), len(found) + len(some))
+        found += some
+    terms = [(int(e), i, k, column) for column, p in enumerate(found) for e, i, k, _ in p.terms]
+    weights = [term[3] for p in found for term in p.terms]
+    plan = Plan(
+        np.array(terms, dtype=np.int64).reshape(-1, 4), np.array(weights, dtype=np.float64), len(found)
+    )
+    return Parameters(tuple(p.name for p in found), np.array([p.value for p in found]), rows), plan
+
+
+def with_values(
+    call: str, mech: Mechanism, time_step: float, values: Mapping[str, ArrayLike]
+) -> tuple[Mechanism, float]:
+    """The mechanism and the time step with other values of the named parameters."""
+    known = all_parameters(mech, time_step)
+    by_place = {(p.kind, p.part, p.component): p for p in known}
+    changes: dict[tuple[str, str, str], float] = {}
+    for name, given in values.items():
+        found = chosen(call, known, name)
+        numbers = np.atleast_1d(checks.array(f"{call}: {name!r}", np.atleast_1d(given), (len(found),)))
+        for p, value in zip(found, numbers, strict=True):
+            if p.part != COMMON:
+                changes[p.kind, p.part, p.component] = float(value)
+                continue
+            for place, q in by_place.items():
+                if q.kind == p.kind and q.component == p.component:
+                    changes[place] = q.value + float(value) - p.value
+    draft = _Draft(mech)
+    # the centre of mass last: it moves the points that the others put in their places
+    for (kind, part, component), value in sorted(changes.items(), key=lambda item: item[0][0] == "com"):
+        if kind == "time_step":
+            time_step = value
+        else:
+            draft.change(kind, part, component, value)
+    return draft.finish(), time_step
+
+
+class _Draft:
+    """A mechanism whose parts are being changed."""
+
+    def __init__(self, mech: Mechanism) -> None:
+        self.mech = mech
+        self.bodies = {b.name: b for b in mech.bodies}
+        self.joints = {j.name: j for j in (*mech.joints, *mech.loops)}
+        self.contacts = {c.name: c for c in mech.contacts}
+        self.collisions = {c.name: c for c in mech.collisions}
+        self.gravity = np.array(mech.gravity, dtype=np.float64)
+
+    def change(self, kind: str, part: str, component: str, value: float) -> None:
+        """Give one parameter its value."""
+        if kind == "gravity":
+            self.gravity[int(component)] = value
+        elif kind == "com":
+            self._move_centre(part, int(component), value)
+        elif kind in ("mass", "inertia"):
+            self._change_body(kind, part, component, value)
+        elif kind in ("shape_a", "shape_b"):
+            self._move_shape(part, kind, int(component), value)
+        elif kind == "friction" or kind.startswith("contact_"):
+            field = kind.removeprefix("contact_")
+            parts: dict[str, Any] = self.contacts if part in self.contacts else self.collisions
+            parts[part] = replace(parts[part], **{field: _entry(getattr(parts[part], field), component, value)})
+        else:
+            self._change_joint(kind, part, component, value)
+
+    def _change_body(self, kind: str, name: str, component: str, value: float) -> None:
+        body = self.bodies[name]
+        if kind == "mass":
+            self.bodies[name] = replace(body, mass=value)
+            return
+        J = np.array(body.inertia)
+        a, b = ("xyz".index(letter) for letter in INERTIA[INERTIA.index(component)])
+        J[a, b] = J[b, a] = value
+        self.bodies[name] = replace(body, inertia=J)
+
+    def _change_joint(self, kind: str, name: str, component: str, value: float) -> None:
+        joint = self.joints[name]
+        if kind in ("lower", "upper"):
+            limits = [list(pair) for pair in joint.limits or ()]
+            limits[int(component or 0)][kind == "upper"] = value
+            changed = replace(joint, limits=limits)
+        elif kind == "orientation":
+            turn = np.zeros(3)
+            turn[int(component)] = value
+            changed = replace(joint, orientation=_turned(np.asarray(joint.orientation), turn))
+        elif kind == "spring" and joint.nrot == 3 and int(component or 0) == joint.ntrans:
+            springs = np.array(joint.spring)
+            springs[joint.ntrans :] = value
+            changed = replace(joint, spring=springs)
+        else:
+            changed = replace(joint, **{kind: _entry(getattr(joint, kind), component, value)})
+        self.joints[name] = changed
+
+    def _move_centre(self, name: str, k: int, distance: float) -> None:
+        """The centre of mass moves along axis k of the body; what is on the body stays where it is."""
+        body = self.bodies[name]
+        if body.shape is not None:
+            self.bodies[name] = replace(body, shape=_moved(body.shape, k, -distance))
+        for label, joint in self.joints.items():
+            for side, field in ((joint.parent, "parent_point"), (joint.child, "child_point")):
+                if side == name:
+                    self.joints[label] = _moved(self.joints[label], k, -distance, field)
+        for label, contact in self.contacts.items():
+            if contact.body == name:
+                self.contacts[label] = _moved(contact, k, -distance, "point")
+        for label, collision in self.collisions.items():
+            for side, field in ((collision.a, "shape_a"), (collision.b, "shape_b")):
+                shape = getattr(collision, field)
+                if side == name and shape is not None:
+                    self.collisions[label] = replace(self.collisions[label], **{field: _moved(shape, k, -distance)})
+
+    def _move_shape(self, name: str, field: str, k: int, value: float) -> None:
+        """The shape of a collision sits elsewhere in its body; other collisions keep theirs."""
+        collision = self.collisions[name]
+        body = self.bodies.get((collision.a if field == "shape_a" else collision.b) or "")
+        shape = getattr(collision, field) or (body.shape if body else None)
+        center = _entry(shape.center, str(k), value)
+        self.collisions[name] = replace(collision, **{field: replace(shape, center=center)})
+
+    def finish(self) -> Mechanism:
+        """The changed mechanism."""
+        mech = self.mech
+        return replace(
+            mech,
+            bodies=tuple(self.bodies.values()),
+            joints=tuple(self.joints[j.name] for j in mech.joints),
+            loops=tuple(self.joints[j.name] for j in mech.loops),
+            contacts=tuple(self.contacts.values()),
+            collisions=tuple(self.collisions.values()),
+            gravity=self.gravity,
+        )
+
+
+def _entry(values: Any, component: str, value: float) -> Any:
+    """The number, or the vector with one of its components, replaced."""
+    if np.ndim(values) == 0:
+        return value
+    out = np.array(values, dtype=np.float64)
+    out[int(component or 0)] = value
+    return out
+
+
+def _moved(part: Any, k: int, distance: float, field: str = "center") -> Any:
+    """The part with its point shifted along axis k."""
+    point = np.array(getattr(part, field), dtype=np.float64)
+    point[k] += distance
+    return replace(part, **{field: point})
+
+
+def _turned(quat: Floats, turn: Floats) -> Floats:
+    """quat exp(turn)"""
+    angle = float(np.linalg.norm(turn))
+    w, v = np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * turn
+    scalar = quat[0] * w - quat[1:] @ v
+    return np.concatenate([[scalar], quat[0] * v + w * quat[1:] + np.cross(quat[1:], v)])
