@@ -133,9 +133,7 @@ def _residual_gradient(model: Model, work: Work, w: Vector, y: Vector) -> None:
 
 
 @kernel
-def _add_parameters(
-    model: Model, work: Work, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector
-) -> None:
+def _add_parameters(model: Model, work: Work, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
     """parameters += what this step adds."""
     costate, w, y = line.costate[0], line.w, line.y
     nv = w.shape[0]

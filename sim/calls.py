@@ -190,7 +190,7 @@ class Calls:
         """Which contacts were far in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         work = work_view(self._work())
-        for first, last in work.near[: work.counts[0]]:
+        for first, last in work.near[: work.counts[2]]:
             out[first:last] = False
         return out
 

@@ -1,4 +1,4 @@
-"""Derivatives of the steps of a simulator: by state, input and parameters, forward and backward. A part of Simulator."""
+"""Derivatives of the steps of a simulator by state, input and parameters, forward and backward: part of Simulator."""
 
 from __future__ import annotations
 

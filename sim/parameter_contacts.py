@@ -152,7 +152,7 @@ def add_ground_geometry(model: Model, work: Work, h: float, effect: int, c: int,
 def add_normal(model: Model, work: Work, h: float, c: int, k: int, w: float, col: int) -> None:
     """The half-space of contact c turns by e = e_k about the origin:
 
-    dn = e x n, dt = e x t;   dr = -radius dn;   gap dn.(x3 + R3 p);   slip dt.u + t.(omega x dr);   df = F^T W d + e x f
+    dn = e x n, dt = e x t, dr = -radius dn    gap dn.(x3 + R3 p)    slip dt.u + t.(omega x dr)    df = F^T W d + e x f
     """
     if not is_near(work, c):
         return
@@ -248,5 +248,3 @@ def add_shapes_shift(model: Model, work: Work, at: At, first: int, k: int, w: fl
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         add_shape_shift(model, work, at, j, k, w, col)
         j += 1
-
-

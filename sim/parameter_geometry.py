@@ -59,7 +59,16 @@ def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: M
 
 @kernel
 def _joint_twist(
-    model: Model, work: Work, effect: int, i: int, k: int, q: Vector, pos: Matrix, quat: Matrix, rot: Matrix, out: Matrix
+    model: Model,
+    work: Work,
+    effect: int,
+    i: int,
+    k: int,
+    q: Vector,
+    pos: Matrix,
+    quat: Matrix,
+    rot: Matrix,
+    out: Matrix,
 ) -> None:
     """out[0] = T at one configuration, out[1], out[2] = B of the translation and the rotation columns of joint i."""
     for r in range(3):

@@ -37,7 +37,7 @@ def add_time_rates(work: Work, at: At, A: Matrix, w: float, m: int) -> None:
 
 @kernel
 def coordinate_rows(model: Model, work: Work, h: float, first: int, count: int, out: Matrix) -> None:
-    """out[:nv] = h dv25, h J(h w)^T dw of quaternions; out[nv:] = dv25.   out: (2 nv, nparameter), columns from first on."""
+    """out[:nv] = h dv25, h J(h w)^T dw of quaternions; out[nv:] = dv25; columns from `first` on."""
     nv = work.columns.shape[0]
     X = work.columns
     for d in range(nv):

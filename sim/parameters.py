@@ -66,7 +66,7 @@ class Plan(NamedTuple):
 
     terms: Integers  # (m, 4)
     weights: Vector  # (m,)
-    count: int
+    size: int
 
 
 def all_parameters(mech: Mechanism, time_step: float) -> list[Parameter]:
@@ -194,7 +194,9 @@ def _joint_space(joint: Joint, d: int) -> list[Parameter]:
         *_vector("spring", joint.name, springs, lambda k: [(Effect.SPRING, d + k, 0, 1.0)]),
         *_vector("damper", joint.name, joint.damper, lambda k: [(Effect.DAMPER, d + k, 0, 1.0)]),
         *_vector("rest", joint.name, joint.rest, lambda k: [(Effect.REST, d + min(k, plain), max(k - plain, 0), 1.0)]),
-        *_vector("armature", joint.name, np.asarray(joint.armature)[:plain], lambda k: [(Effect.ARMATURE, d + k, 0, 1.0)]),
+        *_vector(
+            "armature", joint.name, np.asarray(joint.armature)[:plain], lambda k: [(Effect.ARMATURE, d + k, 0, 1.0)]
+        ),
     ]
 
 
@@ -239,8 +241,10 @@ def _collision_parameters(mech: Mechanism) -> list[Parameter]:
         first = mech.touches[mine[0]]
         swapped = first.bodies[0] != index.get(collision.a, -1)
         for kind, side in (("shape_a", int(swapped)), ("shape_b", 1 - int(swapped))):
-            center = first.places[side, :3]
-            found += _vector(
-                kind, collision.name, center, lambda k, s=side, j=mine[0]: [(Effect.SHAPE_SHIFT, j, 3 * s + k, 1.0)]
-            )
+            found += _center(kind, collision.name, first.places[side, :3], mine[0], side)
     return found
+
+
+def _center(kind: str, name: str, center: Floats, j: int, side: int) -> list[Parameter]:
+    """The centre of shape `side` of the collision whose first pair is j."""
+    return _vector(kind, name, center, lambda k: [(Effect.SHAPE_SHIFT, j, 3 * side + k, 1.0)])

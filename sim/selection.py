@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.mechanism import Mechanism
-from sim.parameters import INERTIA, KINDS, Parameter, Parameters, Plan, all_parameters
+from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 
 Floats = NDArray[np.float64]
 COMMON = "*"
+Entries = Mapping[str, float]  # by component, "" of a single number
 
 
 def chosen(call: str, known: Sequence[Parameter], name: str) -> list[Parameter]:
@@ -53,9 +54,7 @@ def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple
         found += some
     terms = [(int(e), i, k, column) for column, p in enumerate(found) for e, i, k, _ in p.terms]
     weights = [term[3] for p in found for term in p.terms]
-    plan = Plan(
-        np.array(terms, dtype=np.int64).reshape(-1, 4), np.array(weights, dtype=np.float64), len(found)
-    )
+    plan = Plan(np.array(terms, dtype=np.int64).reshape(-1, 4), np.array(weights, dtype=np.float64), len(found))
     return Parameters(tuple(p.name for p in found), np.array([p.value for p in found]), rows), plan
 
 
@@ -76,13 +75,16 @@ def with_values(
             for place, q in by_place.items():
                 if q.kind == p.kind and q.component == p.component:
                     changes[place] = q.value + float(value) - p.value
+    together: dict[tuple[str, str], dict[str, float]] = {}
+    for (kind, part, component), value in changes.items():
+        together.setdefault((kind, part), {})[component] = value
     draft = _Draft(mech)
     # the centre of mass last: it moves the points that the others put in their places
-    for (kind, part, component), value in sorted(changes.items(), key=lambda item: item[0][0] == "com"):
+    for (kind, part), entries in sorted(together.items(), key=lambda item: item[0][0] == "com"):
         if kind == "time_step":
-            time_step = value
+            time_step = entries[""]
         else:
-            draft.change(kind, part, component, value)
+            draft.change(kind, part, entries)
     return draft.finish(), time_step
 
 
@@ -97,76 +99,76 @@ class _Draft:
         self.collisions = {c.name: c for c in mech.collisions}
         self.gravity = np.array(mech.gravity, dtype=np.float64)
 
-    def change(self, kind: str, part: str, component: str, value: float) -> None:
-        """Give one parameter its value."""
+    def change(self, kind: str, part: str, entries: Entries) -> None:
+        """Give one number, or some components of a vector, their values."""
         if kind == "gravity":
-            self.gravity[int(component)] = value
+            self.gravity = _entries(self.gravity, entries)
         elif kind == "com":
-            self._move_centre(part, int(component), value)
+            self._move_centre(part, _entries(np.zeros(3), entries))
         elif kind in ("mass", "inertia"):
-            self._change_body(kind, part, component, value)
+            self._change_body(kind, part, entries)
         elif kind in ("shape_a", "shape_b"):
-            self._move_shape(part, kind, int(component), value)
+            self._move_shape(part, kind, entries)
         elif kind == "friction" or kind.startswith("contact_"):
             field = kind.removeprefix("contact_")
             parts: dict[str, Any] = self.contacts if part in self.contacts else self.collisions
-            parts[part] = replace(parts[part], **{field: _entry(getattr(parts[part], field), component, value)})
+            parts[part] = replace(parts[part], **{field: _entries(getattr(parts[part], field), entries)})
         else:
-            self._change_joint(kind, part, component, value)
+            self._change_joint(kind, part, entries)
 
-    def _change_body(self, kind: str, name: str, component: str, value: float) -> None:
+    def _change_body(self, kind: str, name: str, entries: Entries) -> None:
         body = self.bodies[name]
         if kind == "mass":
-            self.bodies[name] = replace(body, mass=value)
+            self.bodies[name] = replace(body, mass=entries[""])
             return
         J = np.array(body.inertia)
-        a, b = ("xyz".index(letter) for letter in INERTIA[INERTIA.index(component)])
-        J[a, b] = J[b, a] = value
+        for label, value in entries.items():
+            a, b = ("xyz".index(letter) for letter in label)
+            J[a, b] = J[b, a] = value
         self.bodies[name] = replace(body, inertia=J)
 
-    def _change_joint(self, kind: str, name: str, component: str, value: float) -> None:
+    def _change_joint(self, kind: str, name: str, entries: Entries) -> None:
         joint = self.joints[name]
         if kind in ("lower", "upper"):
             limits = [list(pair) for pair in joint.limits or ()]
-            limits[int(component or 0)][kind == "upper"] = value
+            for component, value in entries.items():
+                limits[int(component or 0)][kind == "upper"] = value
             changed = replace(joint, limits=limits)
         elif kind == "orientation":
-            turn = np.zeros(3)
-            turn[int(component)] = value
-            changed = replace(joint, orientation=_turned(np.asarray(joint.orientation), turn))
-        elif kind == "spring" and joint.nrot == 3 and int(component or 0) == joint.ntrans:
-            springs = np.array(joint.spring)
-            springs[joint.ntrans :] = value
+            changed = replace(joint, orientation=_turned(np.asarray(joint.orientation), _entries(np.zeros(3), entries)))
+        elif kind == "spring" and joint.nrot == 3:
+            springs = _entries(joint.spring, entries)
+            springs[joint.ntrans :] = springs[joint.ntrans]
             changed = replace(joint, spring=springs)
         else:
-            changed = replace(joint, **{kind: _entry(getattr(joint, kind), component, value)})
+            changed = replace(joint, **{kind: _entries(getattr(joint, kind), entries)})
         self.joints[name] = changed
 
-    def _move_centre(self, name: str, k: int, distance: float) -> None:
-        """The centre of mass moves along axis k of the body; what is on the body stays where it is."""
+    def _move_centre(self, name: str, d: Floats) -> None:
+        """The centre of mass moves by d, body axes; what is on the body stays where it is."""
         body = self.bodies[name]
         if body.shape is not None:
-            self.bodies[name] = replace(body, shape=_moved(body.shape, k, -distance))
+            self.bodies[name] = replace(body, shape=_moved(body.shape, -d))
         for label, joint in self.joints.items():
             for side, field in ((joint.parent, "parent_point"), (joint.child, "child_point")):
                 if side == name:
-                    self.joints[label] = _moved(self.joints[label], k, -distance, field)
+                    self.joints[label] = _moved(self.joints[label], -d, field)
         for label, contact in self.contacts.items():
             if contact.body == name:
-                self.contacts[label] = _moved(contact, k, -distance, "point")
+                self.contacts[label] = _moved(contact, -d, "point")
         for label, collision in self.collisions.items():
             for side, field in ((collision.a, "shape_a"), (collision.b, "shape_b")):
                 shape = getattr(collision, field)
                 if side == name and shape is not None:
-                    self.collisions[label] = replace(self.collisions[label], **{field: _moved(shape, k, -distance)})
+                    self.collisions[label] = replace(self.collisions[label], **{field: _moved(shape, -d)})
 
-    def _move_shape(self, name: str, field: str, k: int, value: float) -> None:
+    def _move_shape(self, name: str, field: str, entries: Entries) -> None:
         """The shape of a collision sits elsewhere in its body; other collisions keep theirs."""
         collision = self.collisions[name]
         body = self.bodies.get((collision.a if field == "shape_a" else collision.b) or "")
-        shape = getattr(collision, field) or (body.shape if body else None)
-        center = _entry(shape.center, str(k), value)
-        self.collisions[name] = replace(collision, **{field: replace(shape, center=center)})
+        shape: Any = getattr(collision, field) or (body.shape if body else None)
+        moved: Any = replace(shape, center=_entries(shape.center, entries))
+        self.collisions[name] = replace(collision, **{field: moved})
 
     def finish(self) -> Mechanism:
         """The changed mechanism."""
@@ -182,20 +184,19 @@ class _Draft:
         )
 
 
-def _entry(values: Any, component: str, value: float) -> Any:
-    """The number, or the vector with one of its components, replaced."""
+def _entries(values: Any, entries: Entries) -> Any:
+    """The number, or the vector with some of its components, replaced."""
     if np.ndim(values) == 0:
-        return value
+        return entries[""]
     out = np.array(values, dtype=np.float64)
-    out[int(component or 0)] = value
+    for component, value in entries.items():
+        out[int(component or 0)] = value
     return out
 
 
-def _moved(part: Any, k: int, distance: float, field: str = "center") -> Any:
-    """The part with its point shifted along axis k."""
-    point = np.array(getattr(part, field), dtype=np.float64)
-    point[k] += distance
-    return replace(part, **{field: point})
+def _moved(part: Any, d: Floats, field: str = "center") -> Any:
+    """The part with its point moved by d."""
+    return replace(part, **{field: np.asarray(getattr(part, field)) + d})
 
 
 def _turned(quat: Floats, turn: Floats) -> Floats:

@@ -19,12 +19,10 @@ _TWISTS = 12  # rows of scratch for twists at three configurations
 def parameter_columns(calls: Calls, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
     """d(next state)/d(parameters), (ndx, n), right after `linearize_one` of the step (x, u) with the result A."""
     x, u = step
-    out = np.zeros((calls.ndx, plan.count))
+    out = np.zeros((calls.ndx, plan.size))
     nq = calls.sizes.nq
-    at = At(
-        calls.settings.time_step, x[:nq], x[nq:], u, np.zeros((_TWISTS, 6)), np.zeros(calls.sizes.nbody)
-    )
-    if plan.count:
+    at = At(calls.settings.time_step, x[:nq], x[nq:], u, np.zeros((_TWISTS, 6)), np.zeros(calls.sizes.nbody))
+    if plan.size:
         model, work = calls.tables()
         parameter_jacobian(model, work, at, A, plan.terms, plan.weights, out)
     return out
@@ -46,7 +44,7 @@ def adjoint_sweep(
         report=np.zeros((1, REPORT)),
         costate=np.zeros((2, calls.ndx)),
         inputs=np.zeros((len(us), calls.nu)),
-        parameters=np.zeros(plan.count),
+        parameters=np.zeros(plan.size),
         w=np.zeros(sizes.nv),
         y=np.zeros(sizes.nv + sizes.nrow),
         twists=np.zeros((_TWISTS, 6)),
