@@ -54,8 +54,6 @@ def sweep(
     line: Sweep,
     terms: IntegerMatrix,
     weights: Vector,
-    hard: int | None,
-    smooth: int | None,
 ) -> int:
     """Gradients of the loss; returns the step that was not solved, -1 when all were."""
     model = model_view(model_at)
@@ -70,7 +68,7 @@ def sweep(
         for k in range(line.xs.shape[1]):
             line.x_next[0, k] = line.xs[t + 1, k]
         one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], line.A, line.B, line.x_next, line.report)
-        linearize(model_at, work_at, settings, (0, 1), 1, one, hard, smooth)
+        linearize(model_at, work_at, settings, (0, 1), 1, one)
         if line.report[0, 0] != _SOLVED:
             return t
         if line.parameters.shape[0] > 0:

@@ -13,7 +13,6 @@ from sim.pairs import is_absent, pair_arm, pair_force
 from sim.parameter_effects import add_wrench, moment
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
-from solvers.record import rich
 
 _POINT, _RADIUS, _HEIGHT = int(Effect.POINT), int(Effect.RADIUS), int(Effect.HEIGHT)
 _NONLINEAR, _LINEAR = int(Law.NONLINEAR), int(Law.LINEAR)
@@ -241,7 +240,7 @@ def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
     )
 
 
-@rich()
+@kernel
 def add_shapes_shift(model: Model, work: Work, at: At, first: int, k: int, w: float, col: int) -> None:
     """`add_shape_shift` for all points of the collision whose first pair this is."""
     j = first

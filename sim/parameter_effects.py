@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from sim.ball_spring import spring_turns
 from sim.effects import At
-from sim.joints import spring_turns
 from sim.model import InputKind, Model, Vector, Work
 from sim.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from solvers.jit import kernel

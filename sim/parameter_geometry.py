@@ -18,7 +18,6 @@ from sim.model import Matrix, Model, Vector, Work
 from sim.parameter_effects import add_wrench
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
-from solvers.record import rich
 
 _PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)
 _ORIENTATION = int(Effect.ORIENTATION)
@@ -157,7 +156,7 @@ def add_geometry(model: Model, work: Work, at: At, effect: int, i: int, k: int, 
     add_coupled_geometry(model, work, at, w, col)
 
 
-@rich()
+@kernel
 def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -> None:
     """What a change of geometry does to couplings across branches: wrench F on a and -F on b, gaps of loops."""
     T2, T3, F = at.twists[3], at.twists[6], at.twists[_PRODUCT]
@@ -181,7 +180,7 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
             add_wrench(model, work, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
 
 
-@rich()
+@kernel
 def add_loop_geometry(model: Model, work: Work, effect: int, m: int, k: int, w: float, col: int) -> None:
     """Loop m, force f_e along t_e at the child's point A, t.(A - B) the gap:
 
@@ -213,7 +212,7 @@ def add_loop_geometry(model: Model, work: Work, effect: int, m: int, k: int, w: 
         add_wrench(model, work, b, (0.0, 0.0, 0.0), x, f, col)
 
 
-@rich()
+@kernel
 def add_loop_turn(model: Model, work: Work, m: int, k: int, w: float, col: int) -> None:
     """The frame of loop m turns by e = Q e_k:  dt = e x t of its directions; gap dt.(A - B) or dt.(axis of a)."""
     c = model.coupling_body.shape[0] - model.loop_ntrans.shape[0] + m

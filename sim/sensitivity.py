@@ -52,4 +52,4 @@ def adjoint_sweep(
     )
     model, work = calls.tables()
     settings = calls.settings.array(kappa)
-    return int(sweep(model, work, settings, line, plan.terms, plan.weights, calls.hard, calls.smooth)), line
+    return int(sweep(model, work, settings, line, plan.terms, plan.weights)), line

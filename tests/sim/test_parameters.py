@@ -33,7 +33,7 @@ def test_the_situations_are_what_they_are_called() -> None:
         return np.linalg.norm(contacts.impulse, axis=1).max()
 
     assert impulse("flying") < 1e-3 < 0.01 < impulse("touching") < impulse("sticking")
-    assert min(impulse(name) for name in CASES if name.startswith(("sliding", "colliding"))) > 0.1
+    assert min(impulse(name) for name in CASES if name.startswith(("sliding", "colliding"))) > 0.05
 
 
 def rollout(case: Case, steps: int = 4) -> tuple[dojo.Trajectory, np.ndarray, np.ndarray]:
@@ -69,16 +69,17 @@ def test_the_sweep_against_differences_of_the_rollout() -> None:
     wrt = ("friction", "mass", "com:body1", "time_step", "contact_height:*", "spring:body1")
     got = sim.vjp(t, loss, wrt=("state", "input", *wrt))
     values = sim.parameters(wrt)
+    scale = np.array([sim.time_step / 10 if name == "time_step" else 1.0 for name in values.names])
 
     def change(simulator: dojo.Simulator, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         moved = simulator.rollout(x, inputs)
         return np.array([np.sum(loss * sim.difference(moved.x, t.x))]) if moved.success else np.array([np.nan])
 
     def by_parameters(dp: np.ndarray) -> np.ndarray:
-        new = {name: values[name] + dp[values.rows[name]] for name in wrt}
+        new = {name: values[name] + (scale * dp)[values.rows[name]] for name in wrt}
         return change(sim.with_parameters(new), case.x, us)
 
-    gradient = np.concatenate([got[name] for name in wrt])[None]
+    gradient = (scale * np.concatenate([got[name] for name in wrt]))[None]
     check_jacobian(by_parameters, gradient, np.zeros(len(gradient[0])), np.add)
     check_jacobian(lambda x: change(sim, x, us), got["state"][None], case.x, sim.integrate)
     flat = us.ravel()
@@ -181,5 +182,7 @@ def test_bad_values_and_shapes() -> None:
     t, loss, _ = rollout(case)
     with pytest.raises(ValueError, match=r"vjp\(dL_dx\)"):
         sim.vjp(t, loss[:-1])
+    fast = t.x.copy()
+    fast[:, sim.nq :] += 20.0
     with pytest.raises(dojo.SimulationError, match=r"Simulator.vjp: step 3"):
-        sim.replace(max_iterations=1).vjp((t.x + 0.5, t.u), loss)
+        sim.replace(max_iterations=1).vjp((fast, t.u), loss)
