@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
+from sim import coordinates, coordinates_jacobian, energy, linear_rollout, rollout, start, state, velocity
 from sim.bind import bind_gradient, bind_poses, bind_step
 from sim.layout import allocate_work, sizes_of, table, work_view
 from sim.model import Integers, Model, Vector
@@ -96,8 +96,8 @@ class Calls:
         return self._works(1)[0]
 
     def tables(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Tables of the Model and of the first Work of this thread."""
-        return self._model, self._work()
+        """Tables of the Model, bound for derivatives, and of the first Work of this thread."""
+        return self._table(bind_step, bind_gradient), self._work()
 
     def _chunks(self, count: int) -> NDArray[np.int64]:
         """Tables for a parallel call over `count` items, one per chunk."""
@@ -169,6 +169,19 @@ class Calls:
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
         return A, B, x_next, reports
+
+    def roll_linear(self, x: Vector, us: Floats, kappa: float | None) -> tuple[int, Floats, Floats, Floats, Floats]:
+        """(number of solved steps, states, A, B, report of every step) of a rollout."""
+        n = len(us)
+        xs, reports = np.zeros((n + 1, self.nx)), np.zeros((n, REPORT))
+        A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
+        xs[0] = x
+        line = rollout.Linearized(xs, us, A, B, xs, reports)
+        model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
+        knot = linear_rollout.roll_linear(model, self._work(), settings, line)
+        if knot < n:
+            np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
+        return int(knot), xs, A, B, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
         """(A, B, next state, report) of one step."""
