@@ -48,7 +48,9 @@ arm = np.r_[np.ones(3), np.full(3, 0.5 * WIDTH)]  # rotations as the way of a fa
 def errors(theta: np.ndarray) -> np.ndarray:
     """Predicted minus filmed third pose of every triplet [m]."""
     sim = base.with_parameters(dict(zip(wrt, np.split(theta, (1, *range(4, 25, 3))), strict=True)))
-    return np.concatenate([arm * sim.difference(sim.step(x, throw=True).x, np.r_[y, np.zeros(6)])[:6] for x, y in steps])
+    return np.concatenate(
+        [arm * sim.difference(sim.step(x, throw=True).x, np.r_[y, np.zeros(6)])[:6] for x, y in steps]
+    )
 
 
 def slopes(theta: np.ndarray) -> np.ndarray:
