@@ -57,3 +57,9 @@ def slopes(theta: np.ndarray) -> np.ndarray:
     """Derivatives of the errors, through the contact."""
     sim = base.with_parameters(dict(zip(wrt, np.split(theta, (1, *range(4, 25, 3))), strict=True)))
     return np.concatenate([arm[:, None] * np.hstack(list(sim.linearize(x, wrt=wrt).values()))[:6] for x, _ in steps])
+
+
+history = [GUESS]
+fit = least_squares(
+    errors, GUESS, lambda theta: (history.append(theta), slopes(theta))[1], loss="soft_l1", f_scale=1e-3
+)  # most of a film is right to a millimetre; some poses are not

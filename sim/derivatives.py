@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.border import whole
-from sim.parameters import Parameters, all_parameters
+from sim.parameters import Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
 from sim.sensitivity import adjoint_sweep, parameter_columns
@@ -57,7 +58,7 @@ class Derivatives(States):
         if wrt is None:
             return A, B
         asked = _names("Simulator.linearize(wrt=...)", wrt)
-        found, plan = select("Simulator.linearize(wrt=...)", self._all_parameters(), _parameters(asked))
+        found, plan = self._select("Simulator.linearize(wrt=...)", _parameters(asked))
         J = parameter_columns(self._calls, (state, us), A, plan)
         blocks = {"state": A, "input": B}
         return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
@@ -133,7 +134,7 @@ class Derivatives(States):
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
         asked = _names(f"{call}(wrt=...)", wrt)
-        found, plan = select(f"{call}(wrt=...)", self._all_parameters(), _parameters(asked))
+        found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
         level = self._border.kappa("vjp", kappa)
         knot, line = adjoint_sweep(self._calls, path, loss, plan, level)
@@ -160,9 +161,8 @@ class Derivatives(States):
             shape_a, shape_b            centres of the shapes of collisions in their bodies
             gravity, time_step
         """
-        known = self._all_parameters()
-        names = [p.name for p in known] if wrt is None else list(_names("Simulator.parameters(wrt)", wrt))
-        return select("Simulator.parameters(wrt)", known, names)[0]
+        names = [p.name for p in self._known] if wrt is None else _names("Simulator.parameters(wrt)", wrt)
+        return self._select("Simulator.parameters(wrt)", tuple(names))[0]
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
         """The same simulator with other values of the named parameters, as in `parameters`; compiled code is shared."""
@@ -173,8 +173,21 @@ class Derivatives(States):
         """See Simulator."""
         raise NotImplementedError
 
-    def _all_parameters(self) -> list[Any]:
+    @cached_property
+    def _known(self) -> list[Parameter]:
+        """All parameters."""
         return all_parameters(self.mechanism, self.time_step)
+
+    @cached_property
+    def _selections(self) -> dict[tuple[str, ...], tuple[Parameters, Plan]]:
+        """Those made so far: finding parameters by name takes longer than their derivatives."""
+        return {}
+
+    def _select(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, Plan]:
+        """Parameters by name, and the terms of their columns."""
+        if names not in self._selections:
+            self._selections[names] = select(call, self._known, names)
+        return self._selections[names]
 
 
 def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
@@ -187,5 +200,5 @@ def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def _parameters(names: Sequence[str]) -> list[str]:
-    return [name for name in names if name not in _VARIABLES]
+def _parameters(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in _VARIABLES)

@@ -55,7 +55,9 @@ def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple
     terms = [(int(e), i, k, column) for column, p in enumerate(found) for e, i, k, _ in p.terms]
     weights = [term[3] for p in found for term in p.terms]
     plan = Plan(np.array(terms, dtype=np.int64).reshape(-1, 4), np.array(weights, dtype=np.float64), len(found))
-    return Parameters(tuple(p.name for p in found), np.array([p.value for p in found]), rows), plan
+    values = np.array([p.value for p in found])
+    values.flags.writeable = False  # kept by the simulator
+    return Parameters(tuple(p.name for p in found), values, rows), plan
 
 
 def with_values(

@@ -36,6 +36,14 @@ def test_the_situations_are_what_they_are_called() -> None:
     assert min(impulse(name) for name in CASES if name.startswith(("sliding", "colliding"))) > 0.05
 
 
+def test_a_joint_with_two_rotations_in_a_loop() -> None:
+    """Its curvature needs the residual wrenches, before the loops use their place."""
+    case = case_of("in a loop, orbital")
+    A, _ = case.sim.linearize(case.x, case.u)
+    here = case.sim.step(case.x, case.u).x
+    check_jacobian(lambda x: case.sim.difference(case.sim.step(x, case.u).x, here), A, case.x, case.sim.integrate)
+
+
 def rollout(case: Case, steps: int = 4) -> tuple[dojo.Trajectory, np.ndarray, np.ndarray]:
     """A few steps, a random loss gradient, and the inputs."""
     rng = np.random.default_rng(4)
