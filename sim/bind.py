@@ -7,7 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim import ball_spring, cone_limit, coupling, coupling_gradient, loops, pair_stiffness, pairs, pyramid, swing
+from sim import (
+    ball_spring,
+    cone_limit,
+    coupling,
+    coupling_gradient,
+    loops,
+    pair_stiffness,
+    pairs,
+    pyramid,
+    restitution,
+    swing,
+    terrain_contact,
+)
 from sim.contact_report import report_contacts, report_pairs, worst_contact
 from sim.gradients import gradient
 from sim.inequalities import add_stiffness
@@ -16,6 +28,7 @@ from sim.limits import add_limit_derivatives
 from sim.model import Law, Model
 from sim.newton import newton
 from sim.step import step
+from sim.terrain_far import evaluate_on_terrain
 from solvers.late import LateKernel
 
 _LOOPS = (
@@ -45,6 +58,14 @@ _PYRAMIDS = (
     pyramid.pyramid_constant,
     pyramid.recover_pyramid,
 )
+_TERRAIN = (
+    terrain_contact.place_on_terrain,
+    terrain_contact.turn_on_terrain,
+    terrain_contact.add_frame_matrix,
+    terrain_contact.terrain_gap,
+    evaluate_on_terrain,
+)
+_IMPACTS = (restitution.find_impacts, restitution.subtract_floors, restitution.gained_energy)
 _COUPLING_GRADIENT = (
     coupling_gradient.add_coupling_composites,
     coupling_gradient.add_coupling_derivatives,
@@ -84,6 +105,10 @@ def bind_step(model: Model) -> None:
         _bind(model, _LOOPS)
     if len(model.pair_kind):
         _bind(model, _PAIRS)
+    if np.any(model.contact_terrain):
+        _bind(model, _TERRAIN)
+    if np.any(model.contact_restitution):
+        _bind(model, _IMPACTS)
 
 
 def bind_gradient(model: Model) -> None:
@@ -101,3 +126,7 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
     if len(model.coupling_body):
         _bind(model, _COUPLING_GRADIENT)
+    if np.any(model.contact_restitution):
+        _bind(model, (restitution.add_bounce_composites,))
+        if len(model.pair_kind):
+            _bind(model, (restitution.add_bounce_derivatives,))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim import wrenches as pushed
 from sim.border import whole
 from sim.parameters import Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
 from sim.sensitivity import adjoint_sweep, parameter_columns
 from sim.states import States
+from sim.wrenches import Wrenches
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -28,12 +30,23 @@ class Derivatives(States):
 
     @overload
     def linearize(
-        self, x: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, wrt: None = None
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        wrt: None = None,
     ) -> tuple[Floats, Floats]: ...
 
     @overload
     def linearize(
-        self, x: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, *, wrt: Sequence[str]
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: None = None,
+        *,
+        wrt: Sequence[str],
     ) -> Blocks: ...
 
     def linearize(
@@ -41,14 +54,20 @@ class Derivatives(States):
         x: ArrayLike,
         u: ArrayLike | None = None,
         kappa: float | None = None,
+        wrenches: Wrenches | None = None,
         wrt: Sequence[str] | None = None,
     ) -> Any:
         """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
 
         wrt: "state", "input" and parameters, as in `parameters`; then a table by these names, of blocks (ndx, n). x and
-        u are held fixed, so the poses and momenta that belong to x move with a parameter. An unsolved step raises
+        u are held fixed, so the poses and momenta that belong to x move with a parameter.
+        wrenches: (nbody, 6) as in `rollout`, constants; not together with `wrt`. An unsolved step raises
         SimulationError.
         """
+        if wrenches is not None:
+            if wrt is not None:
+                raise ValueError("Simulator.linearize(wrt=..., wrenches=...): give either, or the wrenches as inputs")
+            return pushed.linearize(cast(Any, self), x, u, wrenches, kappa)
         state = self._border.state("linearize", x)
         us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         level = self._border.kappa("linearize", kappa)
@@ -78,12 +97,19 @@ class Derivatives(States):
         return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
 
     def linearize_trajectory(
-        self, xs: ArrayLike, us: ArrayLike, substeps: int = 1, kappa: float | None = None
+        self,
+        xs: ArrayLike,
+        us: ArrayLike,
+        substeps: int = 1,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Linearization:
         """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
 
-        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu).
+        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu); wrenches: (T, nbody, 6) as in `rollout`.
         """
+        if wrenches is not None:
+            return pushed.linearize_trajectory(cast(Any, self), xs, us, wrenches, substeps, kappa)
         call = "Simulator.linearize_trajectory"
         inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
         states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
@@ -156,7 +182,7 @@ class Derivatives(States):
             parent_point, child_point   of joints, also of those that close loops
             orientation, axis           rotation vector of the joint frame, from where it is; direction
             spring, damper, rest, armature, lower, upper, cone       of joints
-            friction                    of contacts and collisions
+            friction, restitution       of contacts and collisions
             contact_point, contact_radius, contact_height, contact_normal
             shape_a, shape_b            centres of the shapes of collisions in their bodies
             gravity, time_step

@@ -32,6 +32,7 @@ class Effect(IntEnum):
     LOOP_PARENT = 18  # joint frame of a closing joint on its parent [loop, axis]
     LOOP_CHILD = 19  # its joint point on the child [loop, axis]
     LOOP_TURN = 20  # right rotation of its frame, as ORIENTATION [loop, axis]
+    RESTITUTION = 22  # [contact]
     SHAPE_SHIFT = 21  # of the shapes of a collision [pair of the first point; 3 side + axis of the body]
 
 

@@ -10,9 +10,11 @@ from sim.effects import At, Effect
 from sim.model import IntegerMatrix, Model, Vector, Work
 from sim.parameter_contacts import (
     add_friction,
-    add_ground_geometry,
+    add_height,
     add_normal,
-    add_shapes_shift,
+    add_point,
+    add_radius,
+    add_restitution,
     add_slips_time_step,
 )
 from sim.parameter_effects import (
@@ -25,6 +27,7 @@ from sim.parameter_effects import (
     add_time_step,
 )
 from sim.parameter_geometry import add_geometry, add_loop_geometry, add_loop_turn
+from sim.parameter_pairs import add_shapes_shift
 from solvers.jit import kernel
 
 _MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
@@ -34,6 +37,7 @@ _REST, _BOUND, _FRICTION, _POINT = int(Effect.REST), int(Effect.BOUND), int(Effe
 _HEIGHT, _NORMAL, _GRAVITY = int(Effect.HEIGHT), int(Effect.NORMAL), int(Effect.GRAVITY)
 _TIME_STEP, _LOOP_PARENT, _LOOP_CHILD = int(Effect.TIME_STEP), int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
 _LOOP_TURN, _SHAPE_SHIFT = int(Effect.LOOP_TURN), int(Effect.SHAPE_SHIFT)
+_RADIUS, _RESTITUTION = int(Effect.RADIUS), int(Effect.RESTITUTION)
 
 
 @kernel
@@ -57,8 +61,14 @@ def add_term(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: f
         add_bound(model, work, i, w, col)
     elif effect == _FRICTION:
         add_friction(model, work, i, w, col)
-    elif _POINT <= effect <= _HEIGHT:
-        add_ground_geometry(model, work, at.h, effect, i, k, w, col)
+    elif effect == _RESTITUTION:
+        add_restitution(model, work, i, w, col)
+    elif effect == _POINT:
+        add_point(model, work, at.h, i, k, w, col)
+    elif effect == _RADIUS:
+        add_radius(model, work, at.h, i, w, col)
+    elif effect == _HEIGHT:
+        add_height(model, work, i, w, col)
     elif effect == _NORMAL:
         add_normal(model, work, at.h, i, k, w, col)
     elif effect == _GRAVITY:

@@ -16,6 +16,7 @@ from sim.effects import At, Effect
 from sim.loops import child_point, loop_frame, turned
 from sim.model import Matrix, Model, Vector, Work
 from sim.parameter_effects import add_wrench
+from sim.restitution import gap_wrench
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
 
@@ -178,6 +179,22 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
                 for r in range(6):
                     F[r] += work.couple_B[row, r] * t / work.couple_E[row]
             add_wrench(model, work, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
+    for j in range(model.pair_kind.shape[0]):
+        if work.bounce[model.contact_height.shape[0] + j, 1] > 0.0:
+            _add_coupled_impact(model, work, at, j, w, col)
+
+
+@kernel
+def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col: int) -> None:
+    """As `add_bounce_derivatives` (restitution.py): a floor that the motion of one body raises pushes the other."""
+    c = model.contact_height.shape[0] + j
+    b = work.bounce[c]
+    rise = b[1] * _dot(b[2:8], at.twists[0]) + (1.0 - b[1]) * _dot(b[8:14], at.twists[3])
+    f, t = gap_wrench(model, work, c)
+    for side in range(2):
+        i = model.coupling_body[model.pair_coupling[j], side]
+        if i >= 0 and at.below[i] > 0.0:
+            add_wrench(model, work, model.coupling_body[model.pair_coupling[j], 1 - side], f, t, -w * rise, col)
 
 
 @kernel

@@ -27,7 +27,8 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 UNITS = {
     "mass": "kg", "inertia": "kg m^2", "com": "m", "parent_point": "m", "child_point": "m", "orientation": "rad",
     "axis": "1", "spring": "N/m, N m/rad", "damper": "N s/m, N m s/rad", "rest": "m, rad", "armature": "kg, kg m^2",
-    "lower": "m, rad", "upper": "m, rad", "cone": "rad", "friction": "1", "contact_point": "m", "contact_radius": "m",
+    "lower": "m, rad", "upper": "m, rad", "cone": "rad", "friction": "1", "restitution": "1",
+    "contact_point": "m", "contact_radius": "m",
     "contact_height": "m", "contact_normal": "1", "shape_a": "m", "shape_b": "m", "gravity": "m/s^2", "time_step": "s",
 }  # fmt: skip
 KINDS = tuple(UNITS)
@@ -214,19 +215,23 @@ def _limits(joint: Joint, first: int) -> Iterator[Parameter]:
 
 
 def _contact_parameters(contact: Contact, c: int) -> list[Parameter]:
+    """Radius and normal of half-spaces only: a terrain is made for a radius, and has its own normals."""
     turns = normal_turns(contact.normal)
-    return [
+    found = [
         Parameter("friction", contact.name, "", contact.friction, ((Effect.FRICTION, c, 0, 1.0),)),
+        Parameter("restitution", contact.name, "", contact.restitution, ((Effect.RESTITUTION, c, 0, 1.0),)),
         *_vector("contact_point", contact.name, contact.point, lambda k: [(Effect.POINT, c, k, 1.0)]),
-        Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)),
         Parameter("contact_height", contact.name, "", contact.height, ((Effect.HEIGHT, c, 0, 1.0),)),
-        *_vector(
-            "contact_normal",
-            contact.name,
-            contact.normal,
-            lambda k: [(Effect.NORMAL, c, j, float(turns[j, k])) for j in range(3)],
-        ),
     ]
+    if contact.terrain is not None:
+        return found
+    found.append(Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)))
+    return found + _vector(
+        "contact_normal",
+        contact.name,
+        contact.normal,
+        lambda k: [(Effect.NORMAL, c, j, float(turns[j, k])) for j in range(3)],
+    )
 
 
 def _collision_parameters(mech: Mechanism) -> list[Parameter]:
@@ -238,6 +243,8 @@ def _collision_parameters(mech: Mechanism) -> list[Parameter]:
         mine = [j for j, t in enumerate(mech.touches) if t.name in (collision.name, f"{collision.name}_{t.feature}")]
         frictions = tuple((Effect.FRICTION, ground + j, 0, 1.0) for j in mine)
         found.append(Parameter("friction", collision.name, "", collision.friction, frictions))
+        bounces = tuple((Effect.RESTITUTION, ground + j, 0, 1.0) for j in mine)
+        found.append(Parameter("restitution", collision.name, "", collision.restitution, bounces))
         first = mech.touches[mine[0]]
         swapped = first.bodies[0] != index.get(collision.a, -1)
         for kind, side in (("shape_a", int(swapped)), ("shape_b", 1 - int(swapped))):

@@ -111,7 +111,7 @@ class _Draft:
             self._change_body(kind, part, entries)
         elif kind in ("shape_a", "shape_b"):
             self._move_shape(part, kind, entries)
-        elif kind == "friction" or kind.startswith("contact_"):
+        elif kind in ("friction", "restitution") or kind.startswith("contact_"):
             field = kind.removeprefix("contact_")
             parts: dict[str, Any] = self.contacts if part in self.contacts else self.collisions
             parts[part] = replace(parts[part], **{field: _entries(getattr(parts[part], field), entries)})

@@ -16,7 +16,9 @@ from sim.parameters import KINDS
 H = 0.02
 SIZES = (1e-3, 1e-4, 1e-2, 1e-5)
 GOOD = 1e-8
-ONE_SIDED = ("spring", "damper", "armature", "friction", "contact_radius")  # not below zero
+GRID = np.linspace(-3.0, 3.0, 25)
+HILLS = dojo.Terrain.from_function(lambda x, y: 0.1 * np.sin(2.0 * x + 0.3) * np.cos(1.5 * y - 0.2), GRID, GRID)
+ONE_SIDED = ("spring", "damper", "armature", "friction", "contact_radius", "restitution")  # not below zero
 
 
 class Case(NamedTuple):
@@ -64,6 +66,25 @@ def _pyramid() -> Case:
     return Case(dojo.Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, np.array([1.0, -2.0]))
 
 
+def _bouncing(terrain: dojo.Terrain | None = None) -> Case:
+    """A spinning body on a joint falls on its foot, on a tilted ground or on terrain; with terrain, it slides."""
+    rng = np.random.default_rng(3)
+    mech = chain("revolute", 1, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2)
+    ground = {"terrain": terrain} if terrain else {"normal": (0.2, -0.1, 0.9)}
+    foot = dojo.Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, height=-1e3, restitution=0.5, **ground)
+    mech = dataclasses.replace(mech, contacts=[foot])
+    far = dojo.Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
+    x, u = random_state(far, rng, 1.0, spread=0.4), 0.1 * rng.normal(size=far.nu)
+    x[far.nq + 2] -= 3.0
+    z = far.maximal(far.step(x, u).x)[1]
+    centre = z[:3] + rot.rotate(z[6:10], np.array(foot.point))
+    level = dataclasses.replace(foot, height=0.0)
+    steep = level.normal_at(centre)[2] if terrain else 1.0
+    foot = dataclasses.replace(foot, height=float(level.gap(centre) / steep) + 0.03)
+    mech = dataclasses.replace(mech, contacts=[foot])
+    return Case(dojo.Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, u)
+
+
 def _limited(kind: str) -> Case:
     """Two joints, moving towards their limits."""
     mech = limited(kind)
@@ -91,14 +112,16 @@ def _loop(kind: str, tree: str = "spherical") -> Case:
     return Case(sim, sim.close(x), np.zeros(sim.nu))
 
 
-def _colliding(b: dojo.Box | dojo.Sphere) -> Case:
+def _colliding(b: dojo.Box | dojo.Sphere, restitution: float = 0.0) -> Case:
     """Two spinning bodies run into each other."""
     bodies = [
         dojo.Body("a", 1.0, (0.02, 0.03, 0.04), shape=dojo.Box(0.4, 0.3, 0.5)),
         dojo.Body("b", 2.0, (0.05, 0.06, 0.07), shape=b),
     ]
     joints = [dojo.Joint("floating", None, name) for name in "ab"]
-    mech = dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b")], gravity=(0.1, 0.2, -0.3))
+    mech = dojo.Mechanism(
+        bodies, joints, collisions=[dojo.Collision("a", "b", restitution=restitution)], gravity=(0.1, 0.2, -0.3)
+    )
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-4, tolerance=1e-12)
     n = np.array([0.6, 0.0, 0.8])
     turns = [rot.exp(np.array(t)) for t in ((0.3, 0.2, 0.1), (-0.2, 0.4, 0.3))]
@@ -106,7 +129,8 @@ def _colliding(b: dojo.Box | dojo.Sphere) -> Case:
     x = np.r_[n, turns[0], np.zeros(3), turns[1], v]
     for _ in range(60):
         r = sim.step(x)
-        if r.contacts.gap.min() < 0.01:
+        hit = np.abs(r.contacts.impulse).max() > 0.1 if restitution else r.contacts.gap.min() < 0.01
+        if hit:
             return Case(sim, x, np.zeros(0 if sim.nu == 0 else sim.nu))
         x = r.x
     raise AssertionError("they do not meet")
@@ -118,12 +142,15 @@ CASES: dict[str, Callable[[], Case]] = {
     "sliding": lambda: _resting("cylindrical_free", -0.01, 0.1, 2.0),
     "sticking": lambda: _resting("revolute", -0.01, 0.7, 0.02, 1e-3),
     "sliding, pyramid": _pyramid,
+    "bouncing": _bouncing,
+    "on terrain": lambda: _bouncing(HILLS),
     "at a limit": lambda: _limited("planar_axis"),
     "at a cone": lambda: _limited("cylindrical_free"),
     "in a loop": lambda: _loop("revolute"),
     "in a loop, orbital": lambda: _loop("spherical", "orbital"),
     "in a loop, fixed": lambda: _loop("fixed"),
     "colliding, box and sphere": lambda: _colliding(dojo.Sphere(0.2)),
+    "colliding, bouncing": lambda: _colliding(dojo.Sphere(0.2), 0.5),
     "colliding, boxes": lambda: _colliding(dojo.Box(0.3, 0.3, 0.4)),
 }
 
