@@ -49,9 +49,9 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     residual_derivatives(model, work, h)
     add_bounce_derivatives(model, work)
     add_coupling_derivatives(model, work)
+    add_swing_curvature(model, work, q)  # needs `subtree`, which the couplings use up
     if not factor_coupling(model, work):
         return False
-    add_swing_curvature(model, work, q)
     add_spring_derivatives(model, work, h, q, v)
     _joint_columns(model, work, h, v)
     _input_columns(model, work, h)
