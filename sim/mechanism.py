@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.closing import carried
 from sim.collisions import Collision, Touch, touches
 from sim.parts import WORLD, Body, Contact, Input, Joint
 
@@ -19,7 +20,8 @@ from sim.parts import WORLD, Body, Contact, Input, Joint
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones
+    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+              those that close loops
     neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
               or all of q
     """
@@ -41,7 +43,13 @@ class Mechanism:
             if field != "inputs" or self.inputs is not None:
                 object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
         loops = (*self.loops, *(j for j in self.joints if j.close))
-        object.__setattr__(self, "joints", tuple(j for j in self.joints if not j.close))
+        tree = tuple(j for j in self.joints if not j.close)
+        if self.inputs is None:
+            object.__setattr__(self, "inputs", _every_dof(tree))
+        driven = {part.joint for part in self.inputs or () if part.joint is not None}
+        bodies, tree, loops = carried(f"{call})", self.bodies, tree, loops, driven)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", tree)
         object.__setattr__(self, "loops", _check_loops(f"{call})", loops, self.bodies, self.joints))
         bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
@@ -119,13 +127,8 @@ class Mechanism:
 
     def _name_inputs(self, call: str) -> tuple[Input, ...]:
         """The inputs with names, after a look at what they act on."""
-        if self.inputs is None:
-            free = [j for j in self.joints if j.kind != "floating"]
-            given = [Input(j.name, dof=d) for j in free for d in range(j.nv)]
-        else:
-            given = list(self.inputs)
         out = []
-        for part in given:
+        for part in self.inputs or ():
             if part.joint is not None:
                 label = checks.one_of(f"{call}, inputs=...): joint", part.joint, self.joint_names)
                 nv = self.joints[self.joint_names.index(label)].nv
@@ -169,6 +172,11 @@ _KINDS = {
     "collisions": Collision,
     "loops": Joint,
 }
+
+
+def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
+    """An input for every degree of freedom of every joint but the floating ones."""
+    return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
 
 
 def _check_loops(

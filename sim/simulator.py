@@ -15,7 +15,17 @@ from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
-from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
+from sim.reactions import FRAMES, Reactions, stacked
+from sim.results import (
+    Batch,
+    Linearization,
+    Shot,
+    SimulationError,
+    StepResult,
+    Trajectory,
+    contacts_of,
+    error_of,
+)
 from sim.states import States
 from solvers.status import MESSAGES, Status
 
@@ -107,7 +117,7 @@ class Simulator(States):
         knot, xs, reports, contacts = self._calls.roll(state, us[None])
         status, iterations, residual, violation = reports[0, :4]
         if knot == 0 and throw:
-            raise error_of(self.mechanism, "Simulator.step", reports[0], self.tolerance)
+            raise self._error("Simulator.step", reports[0])
         out = xs[knot] if knot else state
         return StepResult(
             out,
@@ -128,7 +138,7 @@ class Simulator(States):
         error = (
             None
             if status == Status.SOLVED
-            else error_of(self.mechanism, f"Simulator.rollout: step {knot}", last, self.tolerance)
+            else self._error(f"Simulator.rollout: step {knot}", last)
         )
         if error and throw:
             raise error
@@ -144,6 +154,12 @@ class Simulator(States):
             contacts=contacts_of(self.mechanism, self.time_step, contacts[:knot]),
             message=str(error) if error else MESSAGES[status],
         )
+
+    def _error(self, where: str, report: Floats) -> SimulationError:
+        """Why the last step of this thread was not solved."""
+        worst = self._calls.worst_loop()
+        loop = (self.mechanism.loops[worst[0]].name, worst[1]) if worst else None
+        return error_of(self.mechanism, where, report, self.tolerance, loop)
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
@@ -190,6 +206,28 @@ class Simulator(States):
             self._border.kappa(call, kappa),
         )
         return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+
+    def reactions(self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world") -> Reactions:
+        """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
+
+        x (..., nx) and u (..., nu), zero when left out, with the same leading axes: `sim.reactions(t.x[:-1], t.u)` has
+        those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
+        ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
+        """
+        checks.one_of("Simulator.reactions(frame=...)", frame, FRAMES)
+        states, lead = self._border.stacked("reactions", "x", x)
+        us = self._border.inputs(
+            "reactions", "u", np.zeros((*lead, self.nu)) if u is None else u, (*lead, self.nu)
+        ).reshape(-1, self.nu)
+        if self.order != 2:
+            raise ValueError(f"Simulator.reactions: steps of order 2 have them, got order {self.order}")
+        found = []
+        for state, control in zip(states, us, strict=True):
+            knot, _, reports, _ = self._calls.roll(state, control[None])
+            if knot == 0:
+                raise self._error("Simulator.reactions", reports[0])
+            found.append(self._calls.reactions(self.mechanism, frame))
+        return stacked(found, lead)
 
     # ---- derivatives
 

@@ -11,7 +11,7 @@ from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls, Settings
-from sim.closure import Closure
+from sim.closure import Closure, LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.results import SimulationError
@@ -64,6 +64,13 @@ class States:
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
         """By loop joint, how far it is open: distances [m], then sines of angles."""
         return Closure(self.mechanism, self._calls).gaps(self._border.state("loop_gaps", x))
+
+    def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
+        """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
+        if not self.mechanism.loops:
+            raise ValueError(f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop")
+        state = self.neutral() if x is None else self._border.state("loop_rank", x)
+        return Closure(self.mechanism, self._calls).rank(state)
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
