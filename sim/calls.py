@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
 from sim.build import bind
 from sim.layout import allocate_work, sizes_of, table, work_view
-from sim.mechanism import Mechanism
-from sim.model import Integers, Model, Vector
+from sim.model import Integers, Model, Vector, Work
 from sim.policy import Path, Policy, closed_loop
-from sim.reactions import Reactions, reactions_of
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -192,17 +190,17 @@ class Calls:
             out[first:last] = False
         return out
 
+    def last(self) -> Work:
+        """What the last step of this thread has left."""
+        return work_view(self._work())
+
     def worst_loop(self) -> tuple[int, float] | None:
         """The loop that was furthest open in the last iterate of this thread, and by how much [m, or sine]."""
         if not self.sizes.nloop:
             return None
-        work, ends = work_view(self._work()), self.model.coupling_row[-self.sizes.nloop - 1 :]
+        work, ends = self.last(), self.model.coupling_row[-self.sizes.nloop - 1 :]
         gaps = [float(np.abs(work.couple_gap[a:b]).max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
         return int(np.argmax(gaps)), max(gaps)
-
-    def reactions(self, mechanism: Mechanism, frame: str) -> Reactions:
-        """Wrenches of the joints in the last step of this thread."""
-        return reactions_of(mechanism, self.model, self._work(), self.settings.time_step, frame)
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

@@ -42,6 +42,12 @@ class LoopRank(NamedTuple):
         )
 
 
+def _angle(sine: Floats, cosine: float) -> Floats:
+    """The rotation vector along sin(angle) direction."""
+    size = float(np.linalg.norm(sine))
+    return sine * (np.arctan2(size, cosine) / size) if size > 0.0 else sine
+
+
 class Closure:
     """The loop constraints of a mechanism, as sim/loops.py has them, for Python."""
 
@@ -51,7 +57,10 @@ class Closure:
         self._h = calls.settings.time_step
 
     def gaps(self, x: Floats) -> dict[str, Floats]:
-        """By loop joint, what its constraints miss: distances [m], then sines of angles; at the configuration of x."""
+        """By loop joint, what its constraints miss: distances [m], then angles [rad]; at the configuration of x.
+
+        Angles and not the sines of the step (sim/loops.py), which vanish after half a turn as well.
+        """
         z = self._calls.maximal(x[None], self._mechanism.nbody)[0]
         return {joint.name: self._gap(joint, z) for joint in self._mechanism.loops}
 
@@ -68,9 +77,10 @@ class Closure:
         E = Q.T @ Ra
         if joint.nrot == 1:
             frame = contact_frame(joint.axis)
-            turned = frame[1:] @ (E @ frame[0])
+            turned = _angle(frame[1:] @ (E @ frame[0]), float(frame[0] @ E @ frame[0]))
         else:
-            turned = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+            sine = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+            turned = _angle(sine, 0.5 * (float(np.trace(E)) - 1.0))
         return np.concatenate([fixed_axes(joint) @ apart, turned if joint.nrot < 3 else turned[:0]])
 
     def close(self, x: Floats) -> Floats:

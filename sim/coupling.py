@@ -12,7 +12,8 @@ zeta_0 answers the right-hand side and Z the unit forces:
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
 so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
-new (a planar loop in space) are found by the pivots, and their forces set to zero.
+new (a planar loop in space) are found by the pivots, and their forces set to zero; their rows are rounding, and kept so
+by a scale that does not look at directions.
 """
 
 from __future__ import annotations
@@ -100,9 +101,27 @@ def response(model: Model, work: Work, k: int, row: int) -> float:
 
 
 @kernel
-def _row_scale(work: Work, row: int) -> float:
-    """1 over the largest entry of a row of the dense system."""
-    largest = 0.0
+def response_size(model: Model, work: Work, k: int, row: int) -> float:
+    """|R||zeta| instead of R zeta, translations and rotations apart: a response far below it is rounding."""
+    R = work.couple_R[row]
+    t = 0.0
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i >= 0:
+            for part in range(2):
+                r = 0.0
+                z = 0.0
+                for c in range(3 * part, 3 * part + 3):
+                    r += R[6 * side + c] ** 2
+                    z += work.twist[i, c] ** 2
+                t += (r * z) ** 0.5
+    return t
+
+
+@kernel
+def _row_scale(work: Work, row: int, size: float) -> float:
+    """1 over the largest entry of a row of the dense system, or over `size` when that is larger."""
+    largest = size
     for col in range(work.couple_T.shape[1]):
         largest = max(largest, abs(work.couple_T[row, col]))
     return 1.0 / largest if largest > 0.0 else 1.0
@@ -112,6 +131,8 @@ def _row_scale(work: Work, row: int) -> float:
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
     pairs = 0
+    for row in range(work.couple_scale.shape[0]):
+        work.couple_scale[row] = 0.0
     for k in range(model.coupling_body.shape[0]):
         if not is_loop(model, k):
             take_apart(work, k, model.coupling_row[k])
@@ -125,11 +146,14 @@ def factor_coupling(model: Model, work: Work) -> bool:
             for m in range(model.coupling_body.shape[0]):
                 for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
                     work.couple_T[row, col] = -response(model, work, m, row)
+                    if is_loop(model, m):
+                        size = response_size(model, work, m, row)
+                        work.couple_scale[row] = max(work.couple_scale[row], size)
             if not is_loop(model, k):
                 work.couple_T[col, col] += work.couple_E[col]
                 pairs += 1
     for row in range(work.couple_T.shape[0]):
-        work.couple_scale[row] = _row_scale(work, row)
+        work.couple_scale[row] = _row_scale(work, row, work.couple_scale[row])
         for col in range(work.couple_T.shape[1]):
             work.couple_T[row, col] *= work.couple_scale[row]
     least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300

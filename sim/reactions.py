@@ -2,7 +2,7 @@
 
 A step leaves in `work.subtree` the momentum balance of the bodies behind each joint, without the forces of joints:
 
-    sum over the subtree of (p_out - p_in - impulses of gravity, contacts, loops and inputs on bodies) = h wrench of joint
+    sum over the bodies behind it of (p_out - p_in - impulses of gravity, contacts, loops, inputs) = h wrench of a joint
 
 so the wrench of a joint of the tree is read from there, and that of a closing joint from its multipliers. Along the
 directions S in which the joint is free it is what springs, dampers, limits and inputs of the joint give, less what its
@@ -15,19 +15,21 @@ and the rest the constraint's, which does no work.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.closing import is_weld
-from sim.layout import work_view
 from sim.mechanism import Mechanism
 from sim.model import Model, Work
 from sim.parts import WORLD, Joint
 from sim.shapes import rotation_matrix
+
+if TYPE_CHECKING:
+    from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
@@ -65,10 +67,7 @@ class Reactions:
         """Those of one joint, (..., 3)."""
         k = self.names.index(checks.one_of("Reactions[...]: joint", joint, self.names))
         parts = (self.point, self.force, self.torque, self.constraint_force, self.constraint_torque)
-        return replace(self, names=(joint,), **dict(zip(_FIELDS, (p[..., k, :] for p in parts), strict=True)))
-
-
-_FIELDS = ("point", "force", "torque", "constraint_force", "constraint_torque")
+        return Reactions((joint,), self.frame, *(part[..., k, :] for part in parts))
 
 
 class _Row(NamedTuple):
@@ -80,25 +79,28 @@ class _Row(NamedTuple):
     axes: Floats  # (3, 3) of the frame asked for, as columns
 
 
-def reactions_of(mech: Mechanism, model: Model, table: NDArray[np.int64], h: float, frame: str) -> Reactions:
-    """The reactions of the step that the work of this table has just solved."""
-    work = work_view(table)
-    rows = [_tree_joint(joint, i, model, work, h, frame) for i, joint in enumerate(mech.joints)]
-    own = [(m, loop) for m, loop in enumerate(mech.loops) if not is_weld(loop)]
-    rows += [_loop_joint(mech, loop, m, model, work, h, frame) for m, loop in own]
-    names = (*mech.joint_names, *(loop.name for _, loop in own))
-    turned = np.array([[row.wrench @ row.axes, row.constraint @ row.axes] for row in rows])
-    point = np.array([row.point for row in rows])
-    return Reactions(names, frame, point, turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1])
-
-
-def stacked(parts: list[Reactions], lead: tuple[int, ...]) -> Reactions:
-    """One record out of those of several steps, with these leading axes."""
-    arrays = {}
-    for field in _FIELDS:
-        rows = np.array([getattr(part, field) for part in parts])
-        arrays[field] = rows.reshape(*lead, *rows.shape[1:])
-    return replace(parts[0], **arrays)
+def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, frame: str) -> Reactions:
+    """The reactions of the steps from x (..., nx) under u (..., nu), see `Simulator.reactions`."""
+    call = "Simulator.reactions"
+    checks.one_of(f"{call}(frame=...)", frame, FRAMES)
+    if sim.order != 2:
+        raise ValueError(f"{call}: steps of order 2 have them, got order {sim.order}")
+    states, lead = sim._border.stacked("reactions", "x", x)
+    given = np.zeros((*lead, sim.nu)) if u is None else u
+    us = sim._border.inputs("reactions", "u", given, (*lead, sim.nu)).reshape(len(states), sim.nu)
+    loops = [(m, loop) for m, loop in enumerate(sim.mechanism.loops) if not is_weld(loop)]
+    names = (*sim.mechanism.joint_names, *(loop.name for _, loop in loops))
+    out = np.zeros((5, len(states), len(names), 3))
+    for k, (state, control) in enumerate(zip(states, us, strict=True)):
+        knot, _, reports, _ = sim._calls.roll(state, control[None])
+        if knot == 0:
+            raise sim._error(call, reports[0])
+        work, h = sim._calls.last(), sim.time_step
+        rows = [_tree_joint(joint, i, sim.model, work, h, frame) for i, joint in enumerate(sim.mechanism.joints)]
+        rows += [_loop_joint(sim.mechanism, loop, m, sim.model, work, h, frame) for m, loop in loops]
+        for n, row in enumerate(rows):
+            out[:, k, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
+    return Reactions(names, frame, *out.reshape(5, *lead, len(names), 3))
 
 
 def _tree_joint(joint: Joint, i: int, model: Model, work: Work, h: float, frame: str) -> _Row:

@@ -15,7 +15,7 @@ from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
-from sim.reactions import FRAMES, Reactions, stacked
+from sim.reactions import Reactions, reactions
 from sim.results import (
     Batch,
     Linearization,
@@ -135,11 +135,7 @@ class Simulator(States):
         knot, xs, reports, contacts = self._calls.roll(state, inputs)
         last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
         status = Status(int(last[0]))
-        error = (
-            None
-            if status == Status.SOLVED
-            else self._error(f"Simulator.rollout: step {knot}", last)
-        )
+        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last)
         if error and throw:
             raise error
         return Trajectory(
@@ -214,20 +210,7 @@ class Simulator(States):
         those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
         ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
         """
-        checks.one_of("Simulator.reactions(frame=...)", frame, FRAMES)
-        states, lead = self._border.stacked("reactions", "x", x)
-        us = self._border.inputs(
-            "reactions", "u", np.zeros((*lead, self.nu)) if u is None else u, (*lead, self.nu)
-        ).reshape(-1, self.nu)
-        if self.order != 2:
-            raise ValueError(f"Simulator.reactions: steps of order 2 have them, got order {self.order}")
-        found = []
-        for state, control in zip(states, us, strict=True):
-            knot, _, reports, _ = self._calls.roll(state, control[None])
-            if knot == 0:
-                raise self._error("Simulator.reactions", reports[0])
-            found.append(self._calls.reactions(self.mechanism, frame))
-        return stacked(found, lead)
+        return reactions(self, x, u, frame)
 
     # ---- derivatives
 

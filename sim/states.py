@@ -62,7 +62,7 @@ class States:
         return Closure(self.mechanism, self._calls).close(state) if self.mechanism.loops else state
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
-        """By loop joint, how far it is open: distances [m], then sines of angles."""
+        """By loop joint, how far it is open: distances [m], then angles [rad]."""
         return Closure(self.mechanism, self._calls).gaps(self._border.state("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,10 +35,10 @@ def delta(
 ) -> Mechanism:
     """Three motors under the ceiling turn the arms; two parallel rods per arm carry the platform.
 
-        motor o---arm---o    z up    q  (19,) of arm 0 to 2: its angle from the horizontal, downwards [rad], and the swings
-                       //                 of its two rods (2 each) [rad]; then the attitude of the platform to the first
-        platform ====o//                  rod, a quaternion (4)
-                             u  (3,) torque of each motor [N m], positive lowers the arm
+        motor o---arm---o    z up    q  (19,) of arm 0 to 2: its angle from the horizontal, downwards [rad], and the
+                       //                 swings of its two rods (2 each) [rad]; then the attitude of the platform to
+        platform ====o//                  the first rod, a quaternion (4)
+                                     u  (3,) torque of each motor [N m], positive lowers the arm
 
     Rods have universal joints at the arm and ball joints at the platform; five of the latter close loops, which leave
     the platform its three translations. Lengths and radii [m], `gap` between the rods of an arm; masses [kg] of one
@@ -52,7 +53,7 @@ def delta(
         turned = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
         bodies.append(Body(f"arm_{k}", arm_mass, shape=Box(arm, 0.04, 0.04)))
         pivot = base_radius * radial + np.array([0.0, 0.0, height])
-        start = {"child_point": (-arm / 2, 0.0, 0.0), "axis": (0.0, 1.0, 0.0), "orientation": turned}
+        start: dict[str, Any] = {"child_point": (-arm / 2, 0.0, 0.0), "axis": (0.0, 1.0, 0.0), "orientation": turned}
         joints.append(Joint("revolute", None, f"arm_{k}", f"motor_{k}", pivot, damper=damper, limits=limits, **start))
         # axes of the arm in the neutral state, and the rods from it to the platform
         frame = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,6 +22,7 @@ def fivebar(
     density: float = 2.0,
     width: float = 0.03,
     angle: float = 0.6,
+    limits: tuple[float, float] | None = (-0.3, 1.2),
     spring: float = 0.0,
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
@@ -33,18 +36,21 @@ def fivebar(
                  \\ /
                   o pin
 
-    Lengths [m], density [kg/m] of the links; angle [rad] by which the cranks open outwards in the neutral state.
-    spring [N m/rad, rest at the neutral angle] and damper [N m s/rad] of the motors.
+    Lengths [m], density [kg/m] of the links; angle [rad] by which the cranks open outwards in the neutral state, and
+    limits of that angle [rad]: with the forearms in one line the arm would be singular. spring [N m/rad, rest at the
+    neutral angle] and damper [N m s/rad] of the motors.
     """
     up = {"crank": (0.0, 0.0, crank / 2), "forearm": (0.0, 0.0, forearm / 2)}
     down = {"crank": (0.0, 0.0, -crank / 2), "forearm": (0.0, 0.0, -forearm / 2)}
     length = {"crank": crank, "forearm": forearm}
     inwards = float(np.arcsin((base / 2 + crank * np.sin(angle)) / forearm))
-    bodies, joints, neutral = [], [], {}
+    neutral: dict[str, float] = {}
+    bodies, joints = [], []
     for side, sign in (("l", -1.0), ("r", 1.0)):
         bodies += [Body(f"{k}_{side}", density * n, shape=Box(width, width, n)) for k, n in length.items()]
         rest = -sign * angle
-        motor = {"axis": Y, "spring": spring, "damper": damper, "rest": rest}
+        bounds = None if limits is None else sorted(-sign * bound for bound in limits)
+        motor: dict[str, Any] = {"axis": Y, "spring": spring, "damper": damper, "rest": rest, "limits": bounds}
         where = (sign * base / 2, 0.0, crank + forearm)
         joints.append(Joint("revolute", None, f"crank_{side}", f"motor_{side}", where, up["crank"], **motor))
         ends = (f"crank_{side}", f"forearm_{side}", f"elbow_{side}", down["crank"], up["forearm"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -32,10 +34,10 @@ def minitaur_leg(
     """It moves in the x-z plane, the hip of the leg at the centre of mass of its body; the knees point fore and aft.
 
           [body]         z up, x forward
-        back / \\ front    q  (7,) position x, z [m] and pitch of the body about y [rad]; angle of the front and of the back
-            o   o             thigh to the body from pointing down, of the front and of the back shank to its thigh [rad]
-             \\ /          u  (2,) torque of the front and of the back motor, about y [N m]
-              o foot
+        back / \\ front    q  (7,) position x, z [m] and pitch of the body about y [rad]; angle of the front and of the
+            o   o             back thigh to the body from pointing down, of the front and of the back shank to its
+             \\ /              thigh [rad]
+              o foot     u  (2,) torque of the front and of the back motor, about y [N m]
 
     Both motors turn together: the leg swings; against each other: it stretches. Lengths [m] and masses [kg] of one
     thigh and one shank; angle [rad] of the thighs from the vertical where it stands; damper [N m s/rad] and rotor
@@ -45,7 +47,8 @@ def minitaur_leg(
     reach = upper * np.cos(angle) + np.sqrt(lower**2 - (upper * np.sin(angle)) ** 2)
     knee = angle + float(np.arcsin(upper * np.sin(angle) / lower))
     bodies = [Body("body", body_mass, shape=Box(0.2, 0.12, 0.08))]
-    hips, knees, neutral = [], [], {"base": (0.0, float(reach) + foot_radius, 0.0)}
+    neutral: dict[str, ArrayLike] = {"base": (0.0, float(reach) + foot_radius, 0.0)}
+    hips, knees = [], []
     for side, sign in (("front", 1.0), ("back", -1.0)):
         thigh, shank = f"{side}_thigh", f"{side}_shank"
         bodies += [
@@ -53,7 +56,7 @@ def minitaur_leg(
             Body(shank, lower_mass, shape=Box(0.012, 0.012, lower)),
         ]
         top, bottom, start = (0.0, 0.0, upper / 2), (0.0, 0.0, -upper / 2), (0.0, 0.0, lower / 2)
-        motor = {"axis": Y, "damper": damper, "armature": rotor}
+        motor: dict[str, Any] = {"axis": Y, "damper": damper, "armature": rotor}
         hips.append(Joint("revolute", "body", thigh, f"{side}_hip", child_point=top, **motor))
         bounds = sorted((sign * straight, sign * folded))
         knees.append(Joint("revolute", thigh, shank, f"{side}_knee", bottom, start, axis=Y, limits=bounds))

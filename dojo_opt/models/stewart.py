@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -33,8 +35,8 @@ def stewart(
 
     The plate hangs on leg 0 in the tree; the ball joints of the other legs close five loops and leave its six degrees
     of freedom. Radii of the circles of joints and height of the plate in the neutral state [m]; `spread` [rad] is half
-    the angle between neighbouring joints. leg_mass [kg] of each cylinder and each rod; spring [N/m] with its rest at the
-    neutral length, and damper [N s/m], of each slider.
+    the angle between neighbouring joints. leg_mass [kg] of each cylinder and each rod; spring [N/m] with its rest at
+    the neutral length, and damper [N s/m], of each slider.
     """
     feet, tops = _hexagon(base_radius, spread), _hexagon(plate_radius, np.pi / 3 - spread)
     bodies, joints, closing = [], [], []
@@ -48,15 +50,18 @@ def stewart(
             Body(f"rod_{k}", leg_mass, shape=Cylinder(0.015, half)),
         ]
         low, end = (0.0, 0.0, -half / 2), (0.0, 0.0, half / 2)
-        slider = {"spring": spring, "damper": damper, "parent_point": (0.0, 0.0, half), "name": f"slider_{k}"}
+        slider: dict[str, Any] = {
+            "spring": spring,
+            "damper": damper,
+            "parent_point": (0.0, 0.0, half),
+            "name": f"slider_{k}",
+        }
         joints += [
             Joint("orbital", None, f"cylinder_{k}", f"hinge_{k}", foot, low, orientation=turn),
             Joint("prismatic", f"cylinder_{k}", f"rod_{k}", **slider),
         ]
         upright = turn * (1.0, -1.0, -1.0, -1.0)
-        closing.append(
-            Joint("spherical", f"rod_{k}", "plate", f"ball_{k}", end, top, orientation=upright, close=k > 0)
-        )
+        closing.append(Joint("spherical", f"rod_{k}", "plate", f"ball_{k}", end, top, orientation=upright, close=k > 0))
     bodies.append(Body("plate", plate_mass, shape=Cylinder(plate_radius, 0.03)))
     return Mechanism(
         bodies,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from sim import checks
 from sim.parts import LAWS, Contact
 from sim.urdf.assemble import Choices, assemble
+from sim.urdf.loops import read_loops
 from sim.urdf.report import Notes, UrdfMechanism
 from sim.urdf.robot import read_robot
 from sim.urdf.xml import parse
@@ -60,17 +61,20 @@ def load_urdf(
 
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
     PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in
-    Dojo). A body's frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links`
-    has the pose of every link in
-    its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented
-    (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a UrdfWarning.
+    Dojo), and <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (sim/urdf/loops.py). A body's
+    frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links` has the pose of
+    every link in its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not
+    represented (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a
+    UrdfWarning.
 
     Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
     names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
     """
     file = Path(path)
     notes = Notes()
-    robot = read_robot(parse(file), notes)
+    root = parse(file)
+    robot = read_robot(root, notes)
+    loops = read_loops(root, robot, notes)
     checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
     checks.one_of("load_urdf(law=...)", law, LAWS)
     if not isinstance(rim_points, int | np.integer) or rim_points < 3:
@@ -97,4 +101,4 @@ def load_urdf(
         rim_points=int(rim_points),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
     )
-    return assemble(robot, choices, notes)
+    return assemble(robot, loops, choices, notes)
