@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.collisions import couples, pack_collisions
-from sim.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
-from sim.model import InputKind, Late, Law, Model
+from sim.model import InputKind, Law, Model
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
-from sim.swing import swing_curvature, swing_pose
 
 Floats = NDArray[np.float64]
 
@@ -49,19 +47,7 @@ def pack(mech: Mechanism) -> Model:
     _pack_loops(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
-    bind(model)
     return model
-
-
-def bind(model: Model) -> None:
-    """Fill in the addresses, in this process, of the kernels that few scenes have."""
-    if np.any(model.limit_cone):
-        model.late[Late.CONE_GAP] = cone_gap.address()
-        model.late[Late.CONE_BLOCK] = cone_block.address()
-        model.late[Late.CONE_DERIVATIVE] = cone_derivative.address()
-    if np.any(model.joint_nrot == 2):
-        model.late[Late.SWING_POSE] = swing_pose.address()
-        model.late[Late.SWING_CURVATURE] = swing_curvature.address()
 
 
 def _pack_tree(mech: Mechanism, model: Model) -> None:

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import os
 import threading
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
-from sim.build import bind
+from sim.bind import bind_gradient, bind_poses, bind_step
 from sim.layout import allocate_work, sizes_of, table, work_view
 from sim.model import Integers, Model, Vector, Work
 from sim.policy import Path, Policy, closed_loop
@@ -51,10 +52,9 @@ class Calls:
         self.model, self.settings = model, settings
         self.sizes = sizes_of(model)
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
-        self.hard = 1 if self.sizes.ncontact + self.sizes.nlimit else None  # None: the interior point is not compiled
-        self.smooth = None if self.hard else 1  # None: Newton's method is not compiled
-        bind(model)  # addresses are those of this process
-        self._model = table(model, rich=self.sizes.ncoupling > 0)
+        bind_poses(model)
+        self._model = table(model)
+        self._bound: set[Callable[[Model], None]] = set()
         # what a policy need not know: derivatives and cone variables of its steps
         self.unknown = tuple(
             np.empty((0, *shape))
@@ -68,11 +68,19 @@ class Calls:
         self._scratch = threading.local()
 
     def __getstate__(self) -> tuple[Model, Settings]:
-        """Tables are addresses in this process: another one makes its own."""
-        return self.model, self.settings
+        """Tables and kernels are addresses in this process: another one makes its own."""
+        return self.model._replace(late=np.zeros_like(self.model.late)), self.settings
 
     def __setstate__(self, state: tuple[Model, Settings]) -> None:
         self.__init__(*state)  # type: ignore[misc]
+
+    def _table(self, *needs: Callable[[Model], None]) -> NDArray[np.int64]:
+        """Table of the Model, with the kernels bound that a call needs."""
+        for bind in needs:
+            if bind not in self._bound:
+                bind(self.model)
+                self._bound.add(bind)
+        return self._model
 
     def _works(self, count: int) -> NDArray[np.int64]:
         """Tables of `count` Works of this thread, (count, ...)."""
@@ -97,18 +105,8 @@ class Calls:
         xs = np.zeros((steps + 1, self.nx))
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
-        knot = rollout.roll(
-            self._model,
-            self._work(),
-            self.settings.array(),
-            x,
-            us,
-            xs,
-            reports,
-            contacts,
-            self.hard,
-            self.smooth,
-        )
+        settings = self.settings.array()
+        knot = rollout.roll(self._table(bind_step), self._work(), settings, x, us, xs, reports, contacts)
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
@@ -134,8 +132,8 @@ class Calls:
             np.empty((kept, self.sizes.nlimit, BOUND)),
             np.zeros(REPORT),
         )
-        settings, how = self.settings.array(kappa), (self.hard, self.smooth)
-        knot = closed_loop(self._model, self._work(), settings, x, policy, alpha, limits, substeps, path, *how)
+        model, settings = self._table(bind_step), self.settings.array(kappa)
+        knot = closed_loop(model, self._work(), settings, x, policy, alpha, limits, substeps, path)
         if knot < knots:
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), path
@@ -157,11 +155,11 @@ class Calls:
             if len(xs) == n:
                 x_next[-1:] = xs[-1:]
         line = rollout.Linearized(xs, us, A, B, x_next, reports)
-        settings, how = self.settings.array(kappa), (self.hard, self.smooth)
+        model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            rollout.linearize(self._model, self._work(), settings, (0, n), substeps, line, *how)
+            rollout.linearize(model, self._work(), settings, (0, n), substeps, line)
         else:
-            rollout.linearize_knots(self._model, self._chunks(n), settings, substeps, line, *how)
+            rollout.linearize_knots(model, self._chunks(n), settings, substeps, line)
         if reports[:, 0].any():
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):
@@ -179,7 +177,7 @@ class Calls:
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         settings, works = self.settings.array(), self._chunks(n)
-        rollout.roll_batch(self._model, works, settings, x0s, us, xs, status, knots, self.hard, self.smooth)
+        rollout.roll_batch(self._table(bind_step), works, settings, x0s, us, xs, status, knots)
         return xs, status, knots
 
     def far(self) -> NDArray[np.bool_]:

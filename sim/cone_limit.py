@@ -15,12 +15,11 @@ the axes aligned. These kernels are compiled by scenes with such a limit only.
 from __future__ import annotations
 
 from math import cos, sin
-from typing import Any
 
-from sim.layout import model_view, work_view
-from sim.model import Model, Work
+from sim.model import Late, Model, Work
 from sim.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
-from solvers.jit import kernel, late
+from solvers.jit import kernel
+from solvers.late import late
 
 
 @kernel
@@ -44,11 +43,9 @@ def _cone_axes(model: Model, work: Work, h: float, k: int) -> tuple[Vec3, Vec3]:
     return v, (E[0] * x + E[1] * y + E[2] * z, E[3] * x + E[4] * y + E[5] * z, E[6] * x + E[7] * y + E[8] * z)
 
 
-@late
-def cone_gap(model_at: Any, work_at: Any, k: int, h: float, _: float) -> int:
+@late(Late.CONE_GAP)
+def cone_gap(model: Model, work: Work, h: float, k: int) -> None:
     """bound_gap, and p in bound_row."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     v, b = _cone_axes(model, work, h, k)
     scale = 1.0 / sin(model.limit_bound[k])
     x, y, z = cross(v[0], v[1], v[2], b[0], b[1], b[2])
@@ -56,14 +53,11 @@ def cone_gap(model_at: Any, work_at: Any, k: int, h: float, _: float) -> int:
     work.bound_row[k, 0] = scale * x
     work.bound_row[k, 1] = scale * y
     work.bound_row[k, 2] = scale * z
-    return 0
 
 
-@late
-def cone_block(model_at: Any, work_at: Any, k: int, h: float, _: float) -> int:
+@late(Late.CONE_BLOCK)
+def cone_block(model: Model, work: Work, h: float, k: int) -> None:
     """joint_block += (gamma/s) p c^T - gamma dp h J; fills c."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     d = model.limit_dof[k]
     i = model.dof_body[d]
     n = model.body_vadr[i + 1] - model.body_vadr[i]
@@ -80,14 +74,11 @@ def cone_block(model_at: Any, work_at: Any, k: int, h: float, _: float) -> int:
         bJ = b[0] * J[j] + b[1] * J[3 + j] + b[2] * J[6 + j]
         for r in range(3):
             work.joint_block[i, first + r * n + j] += ratio * p[r] * p[3 + j] - g * (v[r] * bJ - dot * J[3 * r + j])
-    return 0
 
 
-@late
-def cone_derivative(model_at: Any, work_at: Any, k: int, h: float, _: float) -> int:
+@late(Late.CONE_DERIVATIVE)
+def cone_derivative(model: Model, work: Work, h: float, k: int) -> None:
     """dR_dq += (gamma/s) p p^T - gamma (b v^T - (v.b) I)/sin angle: b turns with q2, v does not."""
-    model = model_view(model_at)
-    work = work_view(work_at)
     d = model.limit_dof[k]
     v, b = _cone_axes(model, work, h, k)
     p = work.bound_row[k]
@@ -98,4 +89,3 @@ def cone_derivative(model_at: Any, work_at: Any, k: int, h: float, _: float) -> 
         for j in range(3):
             work.dR_dq[d + r, d + j] += ratio * p[r] * p[j] - g * b[r] * v[j]
         work.dR_dq[d + r, d + r] += g * dot
-    return 0

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from sim.contact import contact_kinematics
 from sim.friction import contact_error, contact_impulse, slip_violation
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pairs import is_absent
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 
-@kernel
+@late(Late.WORST_CONTACT, -1.0)
 def worst_contact(model: Model, work: Work, kappa: float) -> float:
     """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
     worst = -1.0
@@ -26,7 +26,7 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     return worst
 
 
-@kernel
+@late(Late.REPORT_CONTACTS)
 def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
@@ -40,7 +40,7 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
     report_pairs(model, work, out)
 
 
-@rich()
+@late(Late.REPORT_PAIRS)
 def report_pairs(model: Model, work: Work, out: Matrix) -> None:
     """The rows of the pairs: impulse on the first body."""
     for j in range(model.pair_kind.shape[0]):

@@ -19,10 +19,10 @@ by a scale that does not look at directions.
 from __future__ import annotations
 
 from sim.elimination import solve
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
@@ -127,7 +127,7 @@ def _row_scale(work: Work, row: int, size: float) -> float:
     return 1.0 / largest if largest > 0.0 else 1.0
 
 
-@rich("True")
+@late(Late.FACTOR_COUPLING, True)
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
     pairs = 0
@@ -162,7 +162,7 @@ def factor_coupling(model: Model, work: Work) -> bool:
     return rank >= pairs
 
 
-@rich()
+@late(Late.SOLVE_COUPLING)
 def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
     """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
 
@@ -195,7 +195,7 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
                 V[k] += work.S3nu[d, k] * y[d]
 
 
-@rich()
+@late(Late.SOLVE_COUPLING_PANEL)
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
     X = work.couple_panel

@@ -11,15 +11,15 @@ from __future__ import annotations
 from sim.coupling import cross_block, is_loop
 from sim.friction import contact_impulse
 from sim.loops import loop_stiffness
-from sim.model import Model, Work
+from sim.model import Late, Model, Work
 from sim.pair_stiffness import add_earlier_slip, centre_shift
 from sim.pairs import is_absent, pair_force
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 
-@rich()
+@late(Late.COUPLING_COMPOSITES)
 def add_coupling_composites(model: Model, work: Work, h: float) -> None:
     """A3, A2 += the terms of one branch; fills coupling_K2. After `pose2_to_origin`, before `sum_composites`.
 
@@ -67,7 +67,7 @@ def _take_back(model: Model, work: Work, k: int, f: Vec3) -> None:
                 work.A2[i, 18 + 6 * r + c] += m[r]
 
 
-@rich()
+@late(Late.COUPLING_DERIVATIVES)
 def add_coupling_derivatives(model: Model, work: Work) -> None:
     """dR_dq += the terms across branches; couple_panel = the gaps of loops by the columns of dR_dq."""
     for k in range(model.coupling_body.shape[0]):

@@ -75,7 +75,7 @@ def contact_products(model: Model, work: Work, c: int) -> tuple[float, float, fl
     """(sum, count, low, high) of the complementarity products of contact c; all equal kappa on the central path."""
     p = work.cone[c, 0] * work.cone[c, 1]
     if law_of(model, c) == _LINEAR:
-        total, lo, hi = pyramid_products(work, c)
+        total, lo, hi = pyramid_products(model, work, c)
         return p + total, 6.0, min(p, lo), max(p, hi)
     return p, 1.0, p, p
 
@@ -108,7 +108,7 @@ def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tu
     d = work.cone_step[c]
     p = (z[0] + alpha * d[0]) * (z[1] + alpha * d[1])
     if law_of(model, c) == _LINEAR:
-        return p + pyramid_products_ahead(work, c, alpha), 6.0
+        return p + pyramid_products_ahead(model, work, c, alpha), 6.0
     return p, 1.0
 
 
@@ -127,7 +127,7 @@ def contact_boundary(model: Model, work: Work, c: int) -> float:
     d = work.cone_step[c]
     a = min(orthant_step(z[0], d[0]), orthant_step(z[1], d[1]))
     if law_of(model, c) == _LINEAR:
-        a = min(a, pyramid_boundary(work, c))
+        a = min(a, pyramid_boundary(model, work, c))
     return a
 
 
@@ -142,7 +142,7 @@ def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> 
     weight = 1.0 / m if m > 0.0 else 1.0
     return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
     if law_of(model, c) == _LINEAR:
-        return_pyramid(work, c, weight, kappa)
+        return_pyramid(model, work, c, weight, kappa)
 
 
 @kernel

@@ -10,23 +10,22 @@ from sim.coupling import factor_coupling, solve_coupling_panel
 from sim.coupling_gradient import add_coupling_composites, add_coupling_derivatives
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
-from sim.inequalities import add_slip_jacobians, condense_into
+from sim.inequalities import add_stiffness
 from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
-from sim.limits import add_limit_blocks, add_limit_derivatives
-from sim.model import InputKind, Matrix, Model, Vector, Work
+from sim.limits import add_limit_derivatives
+from sim.model import InputKind, Late, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
-from solvers.jit import inlined, kernel
+from solvers.jit import kernel
+from solvers.late import late
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)
 
 
-@inlined
-def gradient(
-    model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix, hard: int | None
-) -> bool:
+@late(Late.GRADIENT, False)
+def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix) -> bool:
     """A = dx3/dx2 (2 nv, 2 nv), B = dx3/du (2 nv, nu) of the step now in `work`, solved at kappa.  False if singular.
 
     Needs work as a step leaves it: configurations, residual wrenches and cone variables at the solution.
@@ -34,10 +33,7 @@ def gradient(
     inertial_jacobians(model, work, h)
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     joint_blocks(model, work, h, q, v)
-    if hard is not None:
-        condense_into(model, work, h, kappa, 1.0, work.A3)
-        add_slip_jacobians(model, work, h)
-        add_limit_blocks(model, work, h)
+    add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
     for i in range(work.A.shape[0]):
         for k in range(36):
@@ -52,7 +48,7 @@ def gradient(
     if not factor_coupling(model, work):
         return False
     add_spring_derivatives(model, work, h, q, v)
-    _joint_columns(model, work, h, v, hard)
+    _joint_columns(model, work, h, v)
     _input_columns(model, work, h)
     solve_panel(model, work)
     solve_coupling_panel(model, work)
@@ -161,7 +157,7 @@ def _composite_products(work: Work, d: int, i: int, root: bool) -> None:
 
 
 @kernel
-def _joint_columns(model: Model, work: Work, h: float, v: Vector, hard: int | None) -> None:
+def _joint_columns(model: Model, work: Work, h: float, v: Vector) -> None:
     """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T)."""
     nv = v.shape[0]
     R = work.dR_dv
@@ -179,8 +175,7 @@ def _joint_columns(model: Model, work: Work, h: float, v: Vector, hard: int | No
         for k in range(e, end):
             for d in range(nv):
                 R[d, k] *= -h
-    if hard is not None:
-        add_limit_derivatives(model, work, h)
+    add_limit_derivatives(model, work, h)
     for d in range(nv):
         for k in range(nv):
             work.columns[d, k] = -work.dR_dq[d, k]

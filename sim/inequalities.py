@@ -23,12 +23,13 @@ from sim.friction import (
 )
 from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
 from sim.loops import keep_loops, move_loops
-from sim.model import Goal, Matrix, Model, Work
+from sim.model import Goal, Late, Matrix, Model, Work
 from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
 from solvers.cones import orthant_step
 from solvers.jit import kernel
+from solvers.late import late
 
 _KAPPA_START = 1e-2  # [N s m]
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
@@ -119,6 +120,14 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_matrix(model, work, h, c, share * fn, share * f1, share * f2, out)
     condense_pairs(model, work, h, kappa, share)
+
+
+@late(Late.STIFFNESS)
+def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
+    """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
+    condense_into(model, work, h, kappa, 1.0, work.A3)
+    add_slip_jacobians(model, work, h)
+    add_limit_blocks(model, work, h)
 
 
 @kernel

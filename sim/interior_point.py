@@ -23,9 +23,10 @@ from sim.friction import slip_noise
 from sim.inequalities import products, slip_error
 from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
-from sim.model import Guess, Model, Options, Outcome, Vector, Work
+from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
 from solvers.jit import inlined, kernel
+from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -106,7 +107,7 @@ def try_from(
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
-@inlined
+@late(Late.SOLVE, FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:

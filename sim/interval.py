@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sim.ball_spring import spring_turns
 from sim.dynamics import _turns_below_half, angular_momentum, momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
-from sim.joints import joint_blocks, spring_turns
+from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.model import Model, Options, Outcome, Vector, Work
 from sim.newton import norm, residual_scale, rounding

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model import Late, Matrix, Model, Vector
+from sim.model import Matrix, Model, Vector
 from sim.rotation import cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate
+from sim.swing import swing_pose
 from solvers.jit import kernel
-from solvers.record import call_late
-
-_SWING_POSE = int(Late.SWING_POSE)
 
 
 @kernel
@@ -110,8 +108,8 @@ def tree_poses(
         elif model.joint_nrot[i] == 3:
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q[a], q[a + 1], q[a + 2], q[a + 3])
         elif model.joint_nrot[i] == 2:
-            call_late(model.late[_SWING_POSE], model, S[d], i, q[a], q[a + 1])
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, S[d + 1, 0], S[d, 0], S[d, 1], S[d, 2])
+            turn, first, second = swing_pose(model, i, q[a], q[a + 1])
+            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, turn[0], turn[1], turn[2], turn[3])
         else:
             g0, g1, g2, g3 = f0, f1, f2, f3
         quat[i, 0] = g0
@@ -130,9 +128,10 @@ def tree_poses(
             for k in range(3):
                 _column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
         elif model.joint_nrot[i] == 2:
-            for k in range(2):
-                ax, ay, az = rotate(rot, i, S[d + k, 3], S[d + k, 4], S[d + k, 5])
-                _column(S, d + k, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
+            ax, ay, az = rotate(rot, i, first[0], first[1], first[2])
+            _column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
+            ax, ay, az = rotate(rot, i, second[0], second[1], second[2])
+            _column(S, d + 1, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
         m = model.joint_child_point[i]
         cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])
         pos[i, 0] = ox - cx

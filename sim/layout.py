@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.model import Model, Work
+from sim.model import Late, Model, Work
 from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
@@ -25,7 +25,7 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late 5,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
     """
@@ -99,6 +99,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "2npair": 2 * sizes.npair,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
+        "nlate": len(Late),
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols

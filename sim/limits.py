@@ -8,14 +8,11 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 
 from __future__ import annotations
 
+from sim.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.model import Goal, Late, Model, Vector, Work
 from solvers.cones import return_pair
 from solvers.jit import kernel
-from solvers.record import call_late
-
-_CONE_GAP = int(Late.CONE_GAP)
-_CONE_BLOCK = int(Late.CONE_BLOCK)
-_CONE_DERIVATIVE = int(Late.CONE_DERIVATIVE)
+from solvers.late import late
 
 
 @kernel
@@ -23,7 +20,7 @@ def limit_gaps(model: Model, work: Work, h: float) -> None:
     """bound_gap, and p of cones."""
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
-            call_late(model.late[_CONE_GAP], model, work, k, h, 0.0)
+            cone_gap(model, work, h, k)
             continue
         a = model.dof_qadr[model.limit_dof[k]]
         work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
@@ -49,17 +46,17 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
         n = model.body_vadr[i + 1] - model.body_vadr[i]
         a = d - model.body_vadr[i]
         if model.limit_cone[k]:
-            call_late(model.late[_CONE_BLOCK], model, work, k, h, 0.0)
+            cone_block(model, work, h, k)
         else:
             work.joint_block[i, a * n + a] += h * work.bound[k, 1] / work.bound[k, 0]
 
 
-@kernel
+@late(Late.LIMIT_DERIVATIVES)
 def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
     """dR_dq += gamma/s, and what a cone has in its place."""
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
-            call_late(model.late[_CONE_DERIVATIVE], model, work, k, h, 0.0)
+            cone_derivative(model, work, h, k)
         else:
             d = model.limit_dof[k]
             work.dR_dq[d, d] += work.bound[k, 1] / work.bound[k, 0]

@@ -15,11 +15,11 @@ A loop joint sits on b (the parent) with the frame Q = R_b offset, and holds the
 from __future__ import annotations
 
 from sim.coupling import is_loop
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pair_stiffness import add_wrench_column, point_shift, unit_vector
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 
 @kernel
@@ -122,7 +122,7 @@ def loop_rows(model: Model, work: Work, m: int, pos: Matrix, rot: Matrix, out: M
             row += 1
 
 
-@rich()
+@late(Late.START_LOOPS)
 def start_loops(model: Model, work: Work, keep: bool) -> None:
     """Force directions couple_B at configuration 2; forces at zero, or those of the step before."""
     for m in range(model.loop_ntrans.shape[0]):
@@ -134,7 +134,7 @@ def start_loops(model: Model, work: Work, keep: bool) -> None:
         work.couple_step[row] = 0.0
 
 
-@rich("0.0")
+@late(Late.APPLY_LOOPS, 0.0)
 def apply_loops(model: Model, work: Work) -> float:
     """wrench -= loop forces on a, += on b; couple_gap and couple_R at configuration 3; returns the largest gap."""
     for m in range(model.loop_ntrans.shape[0]):
@@ -156,14 +156,14 @@ def apply_loops(model: Model, work: Work) -> float:
     return error
 
 
-@rich()
+@late(Late.KEEP_LOOPS)
 def keep_loops(model: Model, work: Work) -> None:
     """Remember the loop forces from which the line search starts."""
     for row in range(work.couple_force.shape[0]):
         work.couple_trial[row] = work.couple_force[row]
 
 
-@rich()
+@late(Late.MOVE_LOOPS)
 def move_loops(model: Model, work: Work, alpha: float) -> None:
     """force = kept + alpha step; pairs have none of their own."""
     first = model.coupling_row[model.coupling_body.shape[0] - model.loop_ntrans.shape[0]]

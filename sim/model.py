@@ -20,6 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.status import Status
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -43,13 +45,53 @@ class InputKind(IntEnum):
 
 
 class Late(IntEnum):
-    """Kernels that are compiled by the first scene that needs them (solvers/jit.py)."""
+    """Kernels called by their address (solvers/late.py), bound by sim/late.py: where each is in `Model.late`."""
 
-    CONE_GAP = 0
-    CONE_BLOCK = 1
-    CONE_DERIVATIVE = 2
-    SWING_POSE = 3
-    SWING_CURVATURE = 4
+    # what all scenes do, compiled once
+    STEP = 0
+    SOLVE = 1  # the unknown of a step: interior point or Newton
+    GRADIENT = 2
+    # contacts and limits
+    REPORT_CONTACTS = 3
+    WORST_CONTACT = 4
+    STIFFNESS = 5
+    LIMIT_DERIVATIVES = 6
+    # joints with two rotations, and cones
+    SWING_POSE = 7
+    SWING_CURVATURE = 8
+    CONE_GAP = 9
+    CONE_BLOCK = 10
+    CONE_DERIVATIVE = 11
+    # loops, and pairs of bodies in contact
+    FACTOR_COUPLING = 12
+    SOLVE_COUPLING = 13
+    SOLVE_COUPLING_PANEL = 14
+    COUPLING_COMPOSITES = 15
+    COUPLING_DERIVATIVES = 16
+    START_LOOPS = 17
+    APPLY_LOOPS = 18
+    KEEP_LOOPS = 19
+    MOVE_LOOPS = 20
+    PAIR_KINEMATICS = 21
+    PAIR_RATE = 22
+    CONDENSE_PAIRS = 23
+    APPLY_PAIRS = 24
+    PAIR_CONSTANTS = 25
+    REPORT_PAIRS = 26
+    # friction pyramids
+    START_PYRAMID = 27
+    PYRAMID_ERROR = 28
+    PYRAMID_PRODUCTS = 29
+    PYRAMID_PRODUCTS_AHEAD = 30
+    PYRAMID_BOUNDARY = 31
+    RETURN_PYRAMID = 32
+    CONDENSE_PYRAMID = 33
+    PYRAMID_CONSTANT = 34
+    RECOVER_PYRAMID = 35
+    # springs of quaternion joints
+    SPRING_IMPULSE = 36
+    SPRING_BLOCK = 37
+    SPRING_DERIVATIVE = 38
 
 
 class Model(NamedTuple):
@@ -66,7 +108,7 @@ class Model(NamedTuple):
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
     contact_body: Integers  # (ncontact,) contacts with the ground come first, then the pairs
     contact_law: Integers  # (ncontact,) Law
-    late: Integers  # (5,) addresses of kernels that few scenes have, by `Late`; 0 where the scene has no use for it
+    late: Integers  # addresses of kernels, by `Late`; 0 where the scene has no use for one, or had none so far
     cluster_end: Integers  # (nground,) of the cluster whose first contact this is, one past its last; see far.py
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
@@ -253,3 +295,6 @@ class Outcome(NamedTuple):
     iterations: int
     residual: float  # largest equality residual
     violation: float  # largest |product - kappa| of complementary pairs
+
+
+FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

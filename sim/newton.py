@@ -8,8 +8,9 @@ from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints import joint_blocks, joint_impulses
 from sim.kinematics import velocity_columns
 from sim.loops import apply_loops, keep_loops, move_loops
-from sim.model import Guess, Model, Options, Outcome, Vector, Work
+from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from solvers.jit import kernel
+from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -51,7 +52,7 @@ def norm(x: Vector) -> float:
     return r
 
 
-@kernel
+@late(Late.SOLVE, FAILED)
 def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
     """Solve R(v25) = 0 from the guess of v25; halve steps that leave the domain or let the residual grow.
 

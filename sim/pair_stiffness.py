@@ -8,11 +8,11 @@ with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows 
 from __future__ import annotations
 
 from sim.friction import condense_contact, contact_constant, contact_error, contact_impulse
-from sim.model import Goal, Matrix, Model, Vector, Work
+from sim.model import Goal, Late, Matrix, Model, Vector, Work
 from sim.pairs import add_pair_wrench, is_absent, pair_arm, pair_force, pair_jacobian, shares
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 
 @kernel
@@ -98,7 +98,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         add_wrench_column(Kb, k, f, df, P, dP)
 
 
-@rich()
+@late(Late.CONDENSE_PAIRS)
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
     """coupling_K of all pairs, their laws linearised at kappa; overwritten.  share: as in `condense_into`."""
     for r in range(work.coupling_K.shape[0]):
@@ -111,7 +111,7 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: floa
             add_pair_stiffness(model, work, j, share)
 
 
-@rich("0.0")
+@late(Late.APPLY_PAIRS, 0.0)
 def apply_pairs(model: Model, work: Work) -> float:
     """wrench -= impulses of the pairs; returns their largest |gap - slack|."""
     r = 0.0
@@ -124,7 +124,7 @@ def apply_pairs(model: Model, work: Work) -> float:
     return r
 
 
-@rich()
+@late(Late.PAIR_CONSTANTS)
 def pair_constants(model: Model, work: Work, goal: Goal) -> None:
     """wrench -= constant parts of the impulses of the pairs, for the goal of this Newton step."""
     for j in range(model.pair_kind.shape[0]):

@@ -16,10 +16,10 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.collision.collide import arrange, collide_arranged
-from sim.model import Model, Vector, Work
+from sim.model import Late, Model, Vector, Work
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
-from solvers.record import rich
+from solvers.late import late
 
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
 
@@ -108,7 +108,7 @@ def is_absent(work: Work, j: int) -> bool:
     return work.pair_out[j, 0] > _NO_POINT
 
 
-@rich()
+@late(Late.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
     """Gap, slip, frame and point of every pair at configuration 3."""
     ground = model.contact_height.shape[0]
@@ -312,7 +312,7 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
             Cb[6 * e + 3 + k] += gm[k] + ge[k]
 
 
-@rich("(0.0, 0.0, 0.0)")
+@late(Late.PAIR_RATE, (0.0, 0.0, 0.0))
 def pair_rate(model: Model, work: Work, c: int) -> Vec3:
     """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
     j = c - model.contact_height.shape[0]

@@ -73,8 +73,6 @@ def closed_loop(
     limits: tuple[Vector, Vector],
     substeps: int,
     path: Path,
-    hard: int | None,
-    smooth: int | None,
 ) -> int:
     """Rollout under the policy of a backward pass; returns the number of solved knots.
 
@@ -110,7 +108,7 @@ def closed_loop(
             for k in range(x.shape[0]):
                 work.step_x[0, k] = b[k]
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
-            if step(model, work, options, work.step_x[0], u, guess, b, path.report, hard, smooth) != _SOLVED:
+            if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t
             total += path.report[1]
         if path.cones.shape[0] > 0:

@@ -8,9 +8,10 @@ along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:1
 
 from __future__ import annotations
 
-from sim.model import Goal, Model, Work
+from sim.model import Goal, Late, Model, Work
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
+from solvers.late import late
 
 
 @kernel
@@ -42,7 +43,7 @@ def _pyramid_slip(x: float, y: float, a: float) -> float:
     return psi
 
 
-@kernel
+@late(Late.START_PYRAMID)
 def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
     """Variables on the central path of kappa at the present slip and gap slack."""
     z = work.cone[c]
@@ -62,7 +63,7 @@ def cap_error(model: Model, work: Work, c: int) -> float:
     return model.contact_friction[c] * z[1] - z[4] - z[5] - z[6] - z[7] - z[3]
 
 
-@kernel
+@late(Late.PYRAMID_ERROR, 0.0)
 def pyramid_error(model: Model, work: Work, c: int) -> float:
     """Largest of |s_psi - (mu gamma - sum beta)| and |s_i - (d_i.v_t + psi)|."""
     z = work.cone[c]
@@ -73,8 +74,8 @@ def pyramid_error(model: Model, work: Work, c: int) -> float:
     return r
 
 
-@kernel
-def pyramid_products(work: Work, c: int) -> tuple[float, float, float]:
+@late(Late.PYRAMID_PRODUCTS, (0.0, 0.0, 0.0))
+def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, float]:
     """(sum, low, high) of the five products."""
     z = work.cone[c]
     total = z[2] * z[3]
@@ -88,8 +89,8 @@ def pyramid_products(work: Work, c: int) -> tuple[float, float, float]:
     return total, lo, hi
 
 
-@kernel
-def pyramid_products_ahead(work: Work, c: int, alpha: float) -> float:
+@late(Late.PYRAMID_PRODUCTS_AHEAD, 0.0)
+def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> float:
     """Sum of the five products after a step of length alpha."""
     z = work.cone[c]
     d = work.cone_step[c]
@@ -99,8 +100,8 @@ def pyramid_products_ahead(work: Work, c: int, alpha: float) -> float:
     return total
 
 
-@kernel
-def pyramid_boundary(work: Work, c: int) -> float:
+@late(Late.PYRAMID_BOUNDARY, 1e30)
+def pyramid_boundary(model: Model, work: Work, c: int) -> float:
     """Largest step that keeps all ten variables positive, or 1e30."""
     a = 1e30
     for e in range(2, 12):
@@ -108,15 +109,15 @@ def pyramid_boundary(work: Work, c: int) -> float:
     return a
 
 
-@kernel
-def return_pyramid(work: Work, c: int, weight: float, kappa: float) -> None:
+@late(Late.RETURN_PYRAMID)
+def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float) -> None:
     """The five pairs put back onto the central path of kappa where they left their cones."""
     return_pair(work.cone[c], work.cone_trial[c], 2, 3, weight, kappa)
     for e in range(4):
         return_pair(work.cone[c], work.cone_trial[c], 8 + e, 4 + e, weight, kappa)
 
 
-@kernel
+@late(Late.CONDENSE_PYRAMID)
 def condense_pyramid(model: Model, work: Work, c: int) -> None:
     """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4)."""
     z = work.cone[c]
@@ -139,7 +140,7 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
     W[6] = mu * W[0] * g * q[5]
 
 
-@kernel
+@late(Late.PYRAMID_CONSTANT)
 def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     """Friction part of contact_w, after its normal part."""
     z = work.cone[c]
@@ -163,7 +164,7 @@ def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     w[2] = q[10] - q[11] - q[5] * p
 
 
-@kernel
+@late(Late.RECOVER_PYRAMID)
 def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share: float) -> None:
     """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
     z = work.cone[c]

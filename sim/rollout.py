@@ -3,7 +3,6 @@
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
     report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
-    hard       None for scenes without contacts and limits: their code is then not compiled; otherwise `smooth` is None
 
 Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
 not SOLVED.
@@ -55,8 +54,6 @@ def roll(
     xs: Matrix,
     reports: Matrix,
     contacts: Cube,
-    hard: int | None,
-    smooth: int | None,
 ) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
 
@@ -69,13 +66,9 @@ def roll(
     for k in range(x.shape[0]):
         xs[0, k] = x[k]
     for t in range(us.shape[0]):
-        if (
-            step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t], hard, smooth)
-            != _SOLVED
-        ):
+        if step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t]) != _SOLVED:
             return t
-        if hard is not None:
-            report_contacts(model, work, options.h, contacts[t])
+        report_contacts(model, work, options.h, contacts[t])
     return us.shape[0]
 
 
@@ -115,8 +108,6 @@ def linearize(
     knots: tuple[int, int],
     substeps: int,
     line: Linearized,
-    hard: int | None,
-    smooth: int | None,
 ) -> None:
     """Derivatives of the knots from knots[0] up to knots[1]: products of the derivatives of their steps."""
     model = model_view(model_at)
@@ -138,11 +129,11 @@ def linearize(
             for k in range(x.shape[0]):
                 x[k] = x_next[k]
             guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
-            if step(model, work, options, x, line.us[t], guess, x_next, report, hard, smooth) != _SOLVED:
+            if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break
             Js = A if s == 0 else work.step_A
             Ju = B if s == 0 else work.step_B
-            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju, hard):
+            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
                 report[0] = _SINGULAR
                 break
             if s > 0:
@@ -156,15 +147,13 @@ def linearize_knots(
     settings: Vector,
     substeps: int,
     line: Linearized,
-    hard: int | None,
-    smooth: int | None,
 ) -> None:
     """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c]."""
     n = line.us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
         knots = (c * n // chunks, (c + 1) * n // chunks)
-        linearize(model_at, work_ats[c], settings, knots, substeps, line, hard, smooth)
+        linearize(model_at, work_ats[c], settings, knots, substeps, line)
 
 
 @kernel
@@ -175,8 +164,6 @@ def _roll_one(
     x0: Vector,
     us: Matrix,
     xs: Matrix,
-    hard: int | None,
-    smooth: int | None,
 ) -> tuple[int, int]:
     """A rollout that keeps its states only: (status, number of solved steps)."""
     model = model_view(model_at)
@@ -186,9 +173,7 @@ def _roll_one(
     for k in range(x0.shape[0]):
         xs[0, k] = x0[k]
     for t in range(us.shape[0]):
-        status = step(
-            model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report, hard, smooth
-        )
+        status = step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report)
         if status != _SOLVED:
             return status, t
     return _SOLVED, us.shape[0]
@@ -204,12 +189,10 @@ def roll_batch(
     xs: Cube,
     status: Integers,
     knots: Integers,
-    hard: int | None,
-    smooth: int | None,
 ) -> None:
     """Rollouts from x0s[i] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,)."""
     n = us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
         for i in range(c * n // chunks, (c + 1) * n // chunks):
-            status[i], knots[i] = _roll_one(model_at, work_ats[c], settings, x0s[i], us[i], xs[i], hard, smooth)
+            status[i], knots[i] = _roll_one(model_at, work_ats[c], settings, x0s[i], us[i], xs[i])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from sim.contact_report import worst_contact
 from sim.dynamics import begin_step
-from sim.interior_point import interior_point
+from sim.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
 from sim.loops import start_loops
-from sim.model import Guess, Model, Options, Outcome, Vector, Work
-from sim.newton import newton
-from solvers.jit import inlined
+from sim.model import Guess, Late, Model, Options, Outcome, Vector, Work
+from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -16,26 +15,16 @@ _NOT_FINITE = int(Status.NOT_FINITE)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 
 
-@inlined
+@late(Late.STEP, int(Status.NOT_FINITE))
 def step(
-    model: Model,
-    work: Work,
-    options: Options,
-    x: Vector,
-    u: Vector,
-    guess: Guess,
-    out: Vector,
-    report: Vector,
-    hard: int | None,
-    smooth: int | None,
+    model: Model, work: Work, options: Options, x: Vector, u: Vector, guess: Guess, out: Vector, report: Vector
 ) -> int:
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
     guess: of the next velocity, x[nq:] when nothing better is known.
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
     last iterate when the status is not SOLVED; nobody must use it.
-    Exactly one of `hard` and `smooth` is None, and what it stands for is not even compiled: the interior point of
-    scenes with contacts or limits, Newton's method of scenes without.
+    Scenes with contacts or limits bind the interior point as `solve`, those without bind Newton's method.
     """
     nq = work.theta1.shape[0]
     q = x[:nq]
@@ -43,10 +32,7 @@ def step(
     r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
     if begin_step(model, work, options.h, q, v, u):
         start_loops(model, work, guess.impulses)
-        if smooth is not None:
-            r = newton(model, work, options, q, v, u, guess)
-        if hard is not None:
-            r = interior_point(model, work, options, q, v, u, guess)
+        r = solve(model, work, options, q, v, u, guess)
     total = 0.0
     for k in range(nq):
         out[k] = work.theta3[k]
@@ -61,7 +47,7 @@ def step(
     report[2] = r.residual
     report[3] = r.violation
     report[4] = -1.0
-    if hard is not None and status != _SOLVED and r.iterations > 0:
+    if status != _SOLVED and r.iterations > 0:
         report[4] = worst_contact(model, work, options.kappa)
     report[0] = status
     return status

@@ -13,13 +13,13 @@ Scenes without such joints do not compile these kernels.
 from __future__ import annotations
 
 from math import cos, sqrt
-from typing import Any
 
-from sim.layout import model_view, work_view
-from sim.model import Model, Vector
-from sim.rotation import Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients
-from solvers.jit import kernel, late
-from solvers.record import floats
+from sim.model import Late, Model, Vector, Work
+from sim.rotation import Quat, Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients
+from solvers.jit import kernel
+from solvers.late import late
+
+_STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @kernel
@@ -29,26 +29,17 @@ def swing(model: Model, i: int, p1: float, p2: float) -> Vec3:
     return p1 * V[0] + p2 * V[3], p1 * V[1] + p2 * V[4], p1 * V[2] + p2 * V[5]
 
 
-@late
-def swing_pose(model_at: Any, out_at: Any, i: int, p1: float, p2: float) -> int:
-    """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p.
-
-    out, the rows S[d] and S[d + 1] of the joint: (x, y, z, column 1), (w, -, -, column 2).
-    """
-    model = model_view(model_at)
-    out = floats(out_at, 12)
+@late(Late.SWING_POSE, _STILL)
+def swing_pose(model: Model, i: int, p1: float, p2: float) -> tuple[Quat, Vec3, Vec3]:
+    """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p."""
     t = swing(model, i, p1, p2)
-    w, x, y, z = quat_exp(t[0], t[1], t[2])
     J = left_jacobian(-t[0], -t[1], -t[2])
     V = model.joint_swing_axes[i]
-    for r in range(3):
-        out[3 + r] = J[3 * r] * V[0] + J[3 * r + 1] * V[1] + J[3 * r + 2] * V[2]
-        out[9 + r] = J[3 * r] * V[3] + J[3 * r + 1] * V[4] + J[3 * r + 2] * V[5]
-    out[0] = x
-    out[1] = y
-    out[2] = z
-    out[6] = w
-    return 0
+    x, y, z = V[0], V[1], V[2]
+    first = J[0] * x + J[1] * y + J[2] * z, J[3] * x + J[4] * y + J[5] * z, J[6] * x + J[7] * y + J[8] * z
+    x, y, z = V[3], V[4], V[5]
+    second = J[0] * x + J[1] * y + J[2] * z, J[3] * x + J[4] * y + J[5] * z, J[6] * x + J[7] * y + J[8] * z
+    return quat_exp(t[0], t[1], t[2]), first, second
 
 
 @kernel
@@ -81,15 +72,13 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
     )
 
 
-@late
-def swing_curvature(model_at: Any, work_at: Any, i: int, p1: float, p2: float) -> int:
+@late(Late.SWING_CURVATURE)
+def swing_curvature(model: Model, work: Work, i: int, p1: float, p2: float) -> None:
     """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 
     All in the child's axes, in which a test direction changes; that it turns with its joint, `residual_derivatives`
     knows.
     """
-    model = model_view(model_at)
-    work = work_view(work_at)
     c = model.joint_child_point[i]
     x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
     x, y, z = (
@@ -111,4 +100,3 @@ def swing_curvature(model_at: Any, work_at: Any, i: int, p1: float, p2: float) -
         for k in range(2):
             g = column_derivative(t, V[3 * j : 3 * j + 3], V[3 * k : 3 * k + 3])
             work.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2
-    return 0

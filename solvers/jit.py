@@ -1,4 +1,5 @@
-"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Only this file and record.py import Numba.)
+"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is
+imported here, in code.py, late.py and record.py only.)
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the cache folder is named by a digest of every source file that can reach a kernel, so any edit
@@ -18,11 +19,14 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import prange
-from numba.core.registry import cpu_target
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.types.misc import unliteral
+
+from solvers.code import EntryCompiler, InnerCompiler
 
 __all__ = [
     "cache_folder",
@@ -39,7 +43,6 @@ __all__ = [
 F = TypeVar("F", bound=Callable[..., Any])
 
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
-_LATE_FLAGS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
 _REGISTRY: list[Any] = []
@@ -103,16 +106,45 @@ if _FOLDER is not None:
 cpu_target.typing_context.refresh()
 
 
-def _compile(func: F, cache: bool = True, **flags: Any) -> F:
-    users_folder = numba.config.CACHE_DIR
-    try:
-        if _FOLDER is not None:
-            numba.config.CACHE_DIR = str(_FOLDER)
-        compiled = numba.njit(cache=cache and _FOLDER is not None, **_FLAGS, **flags)(func)
-    finally:
-        numba.config.CACHE_DIR = users_folder
-    _REGISTRY.append(compiled)
-    return compiled
+class Kernel(CPUDispatcher):
+    """A compiled function in two forms: an entry, compiled when Python calls it, and `inner`, for other kernels."""
+
+    def __init__(self, func: Callable[..., Any], inner: Any, **flags: Any) -> None:
+        options = {"nopython": True, "boundscheck": None, **_FLAGS, "_nrt": False, **flags}
+        super().__init__(func, targetoptions=options, pipeline_class=InnerCompiler if inner is None else EntryCompiler)
+        self.inner = inner
+        if inner is not None:  # kernels see the inner form
+            self.typingctx._remove_global(self)
+            self.typingctx.insert_global(self, inner._type)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """How kernels see it: a constant argument is a number like any other, not a reason to compile anew."""
+        return super().get_call_template([unliteral(a) for a in args], {k: unliteral(a) for k, a in kws.items()})
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._type if self.inner is None else self.inner._type
+
+    @property
+    def compiled(self) -> set[Any]:
+        """Signatures compiled or loaded so far, of both forms."""
+        return {*self.overloads, *(() if self.inner is None else self.inner.overloads)}
+
+
+def _cached(kernel: Any, form: str = "entry") -> Any:
+    """The kernel, with its cache in our folder, in which any edit of a source starts anew; one folder per form."""
+    if _FOLDER is not None:
+        users_folder = numba.config.CACHE_DIR
+        try:
+            numba.config.CACHE_DIR = str(_FOLDER / form)
+            kernel.enable_caching()
+        finally:
+            numba.config.CACHE_DIR = users_folder
+    return kernel
+
+
+def _inner(func: Callable[..., Any], **flags: Any) -> Kernel:
+    return cast(Kernel, _cached(Kernel(func, None, no_cpython_wrapper=True, no_cfunc_wrapper=True, **flags), "inner"))
 
 
 def kernel(func: F) -> F:
@@ -120,75 +152,53 @@ def kernel(func: F) -> F:
 
     A kernel cannot allocate: it fails to compile if it tries. That removes the reference counting of every array in
     every call (`_nrt=False`; in a prototype, one step of a 13-body tree went from 103 to 61 us).
-
-    A kernel that takes a Model or a Work gets no Python wrapper, which would be half of its compile time. Call it from
-    kernels only: called from Python it takes the process down.
     """
-    inner = not {"Model", "Work"}.isdisjoint(func.__annotations__.values())
-    return _compile(func, _nrt=False, no_cpython_wrapper=inner, no_cfunc_wrapper=True)
+    if numba.config.DISABLE_JIT:
+        return func
+    compiled = _cached(Kernel(func, _inner(func), no_cfunc_wrapper=True))
+    _REGISTRY.append(compiled)
+    return cast(F, compiled)
 
 
 def inlined(func: F) -> F:
-    """A kernel whose text becomes part of its callers: for the few that stand around a long one, which the compiler
-    would otherwise optimise once more on their account. Called from kernels only.
-    """
-    return _compile(func, _nrt=False, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """A kernel whose text becomes part of its callers, which read better with it apart. Called from kernels only."""
+    return func if numba.config.DISABLE_JIT else cast(F, _inner(func, inline="always"))
 
 
-def inner_kernel(func: F) -> F:
-    """A kernel that only kernels call, for the small ones: without the Python wrapper, half of their compile time."""
-    return _compile(func, _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner_kernel = kernel  # where only kernels call it
 
 
-class Late:
-    """A kernel that other kernels call by its address (solvers/record.py, `call_late`): for what few scenes have.
-
-    It takes two records as pointers, a whole number and two numbers, and returns a whole number. It is compiled when a
-    scene first asks for its address; in all other scenes nothing but the call is compiled.
-    """
-
-    def __init__(self, func: Callable[..., int]) -> None:
-        self.func = func
-        self._compiled: Any = None
-
-    def address(self) -> int:
-        """Where the compiled kernel is, in this process."""
-        if self._compiled is None:
-            users_folder = numba.config.CACHE_DIR
-            try:
-                if _FOLDER is not None:
-                    numba.config.CACHE_DIR = str(_FOLDER)
-                signature = "int64(voidptr, voidptr, int64, float64, float64)"
-                self._compiled = numba.cfunc(signature, cache=_FOLDER is not None, **_LATE_FLAGS)(self.func)
-            finally:
-                numba.config.CACHE_DIR = users_folder
-        return int(self._compiled.address)
-
-
-def late(func: Callable[..., int]) -> Late:
-    """A kernel that is compiled by the first scene that needs it, see `Late`."""
-    return Late(func)
+def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
+    """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result."""
+    compiled = _cached(Kernel(func, _inner(func), no_cpython_wrapper=True, no_cfunc_wrapper=True))
+    _REGISTRY.append(compiled)
+    compiled.compile(signature)
+    return compiled.overloads[signature]
 
 
 def local_kernel(func: F) -> F:
     """A kernel made inside a function, around another kernel: Numba never finds such a closure in its cache again, so
     it is compiled once per process and leaves no file behind.
     """
-    return _compile(func, cache=False, _nrt=False)
+    compiled = Kernel(func, Kernel(func, None, no_cpython_wrapper=True, no_cfunc_wrapper=True), no_cfunc_wrapper=True)
+    _REGISTRY.append(compiled)
+    return cast(F, compiled)
 
 
 def parallel_kernel(func: F) -> F:
     """Compile `func` with `prange` over the cores; allowed to allocate. Only for loops over whole knots or rollouts."""
-    return _compile(func, parallel=True)
+    compiled = _cached(numba.njit(parallel=True, **_FLAGS)(func))
+    _REGISTRY.append(compiled)
+    return cast(F, compiled)
 
 
 def compiled_signatures() -> dict[str, int]:
     """Kernels compiled or loaded so far in this process, by qualified name, with their number of signatures."""
-    return {
-        f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.signatures)
+    counts = {
+        f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.compiled if isinstance(k, Kernel) else k.signatures)
         for k in _REGISTRY
-        if getattr(k, "signatures", None)
     }
+    return {name: count for name, count in counts.items() if count}
 
 
 @contextmanager

@@ -9,18 +9,14 @@ and its field k an array read from there. Tables do not change while compiled co
 `invariant.load`), so a field costs no more in a loop than a local array does.
 
 A table holds addresses: whoever makes one keeps the arrays alive.
-
-A record may come in two variants, told apart by the type of their tables (int64, and uint64 for the rich one): compiled
-code specialises on the variant, and what is marked `rich` is compiled for, and costs, the rich one only.
 """
 
 from __future__ import annotations
 
 import ctypes
-import inspect
 import zlib
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -31,11 +27,8 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
-
 Table = NDArray[np.int64]
 R = TypeVar("R")
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Field(NamedTuple):
@@ -49,11 +42,10 @@ class Field(NamedTuple):
 class RecordType(types.Type):
     """Numba's type of a record."""
 
-    def __init__(self, name: str, fields: tuple[Field, ...], rich: bool) -> None:
-        self.rich = rich
+    def __init__(self, name: str, fields: tuple[Field, ...]) -> None:
         self.fields = {field.name: (k, field) for k, field in enumerate(fields)}
         digest = zlib.crc32(repr(fields).encode())  # the name stands in every symbol: short, and one per list of fields
-        super().__init__(name=f"{'Rich' if rich else ''}{name}_{digest:08x}")
+        super().__init__(name=f"{name}_{digest:08x}")
 
     def array(self, name: str) -> types.Array:
         """Type of one field."""
@@ -83,38 +75,41 @@ def _field(context: Any, builder: Any, record: RecordType, value: Any, name: str
     kind = record.array(name)
     array = context.make_array(kind)(context, builder)
     item = context.get_data_type(kind.dtype).as_pointer()
-    data = _load(builder, value, item, 3 * k)
-    shape = [_load(builder, value, cgutils.intp_t, 3 * k + 1)]
+    data = load_word(builder, value, item, 3 * k)
+    shape = [load_word(builder, value, cgutils.intp_t, 3 * k + 1)]
     strides = [cgutils.intp_t(8)]
     if field.columns is not None:
-        columns = cgutils.intp_t(field.columns) if field.columns else _load(builder, value, cgutils.intp_t, 3 * k + 2)
+        columns = (
+            cgutils.intp_t(field.columns) if field.columns else load_word(builder, value, cgutils.intp_t, 3 * k + 2)
+        )
         shape.append(columns)
         strides = [builder.mul(columns, strides[0]), strides[0]]
     populate_array(array, data=data, shape=shape, strides=strides, itemsize=cgutils.intp_t(8), meminfo=None)
     return array._getvalue()
 
 
-def _load(builder: Any, table: Any, kind: Any, k: int) -> Any:
-    """Word k of the table; nothing writes to it while compiled code runs."""
+def load_word(builder: Any, table: Any, kind: Any, k: int) -> Any:
+    """Word k of a table; nothing writes to it while compiled code runs."""
     words = builder.bitcast(table, kind.as_pointer())
     word = builder.load(builder.gep(words, [ir.Constant(ir.IntType(64), k)]))
     word.set_metadata("invariant.load", builder.module.add_metadata([]))
     return word
 
 
+RECORDS: dict[type, RecordType] = {}
+
+
 def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
     """A function, for compiled code and for Python, from a table to the record `cls` with these fields."""
-    plain, rich = (RecordType(cls.__name__, tuple(fields), rich) for rich in (False, True))
+    kind = RecordType(cls.__name__, tuple(fields))
+    RECORDS[cls] = kind
 
     @intrinsic
     def at(typing: Any, table: Any) -> Any:
         def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            if signature.args[0] == types.voidptr:  # what a late kernel is given
-                return arguments[0]
             array = context.make_array(signature.args[0])(context, builder, arguments[0])
             return builder.bitcast(array.data, cgutils.voidptr_t)
 
-        kind = rich if getattr(table, "dtype", None) == types.uint64 else plain
         return kind(table), lower
 
     def view(table: Table) -> R:
@@ -127,41 +122,6 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
     return view
 
 
-@intrinsic
-def call_late(typing: Any, address: Any, first: Any, second: Any, k: Any, x: Any, y: Any) -> Any:
-    """Call the kernel at an address (solvers/jit.py, `late`) with two records, a whole number and two numbers.
-
-    Instead of the second record, a C-contiguous array of numbers, which the kernel finds again by `floats`.
-    """
-    signature = types.int64(types.int64, first, second, types.int64, types.float64, types.float64)
-
-    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        word, number = ir.IntType(64), ir.DoubleType()
-        kind = ir.FunctionType(word, [cgutils.voidptr_t, cgutils.voidptr_t, word, number, number])
-        given = list(arguments[1:])
-        if isinstance(signature.args[2], types.Array):
-            array = context.make_array(signature.args[2])(context, builder, given[1])
-            given[1] = builder.bitcast(array.data, cgutils.voidptr_t)
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
-
-    return signature, lower
-
-
-@intrinsic
-def floats(typing: Any, address: Any, count: Any) -> Any:
-    """The `count` numbers at an address, as a vector."""
-    kind = types.Array(types.float64, 1, "C")
-
-    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array = context.make_array(kind)(context, builder)
-        data = builder.bitcast(arguments[0], ir.DoubleType().as_pointer())
-        size = cgutils.intp_t(8)
-        populate_array(array, data=data, shape=[arguments[1]], strides=[size], itemsize=size, meminfo=None)
-        return array._getvalue()
-
-    return kind(types.voidptr, types.int64), lower
-
-
 def _array(field: Field, words: Table) -> NDArray[Any]:
     """One field, for Python."""
     address, rows, columns = (int(word) for word in words)
@@ -170,35 +130,7 @@ def _array(field: Field, words: Table) -> NDArray[Any]:
     return flat if field.columns is None else flat.reshape(rows, columns)
 
 
-def table(arrays: Sequence[NDArray[Any]], rich: bool = False) -> Table:
-    """Addresses and shapes of the arrays of a record, in the order of its fields; `rich` for that variant."""
+def table(arrays: Sequence[NDArray[Any]]) -> Table:
+    """Addresses and shapes of the arrays of a record, in the order of its fields."""
     rows = [(a.ctypes.data, a.shape[0], a.shape[1] if a.ndim == 2 else 1) for a in arrays]
-    words = np.array(rows, dtype=np.int64).ravel()
-    return words.view(np.uint64) if rich else words
-
-
-# Not inline="always": inside kernels that are inlined themselves, Numba 0.68 then runs calls around it twice.
-_OPTIONS = {"_nrt": False, "error_model": "numpy"}
-
-
-def rich(otherwise: str = "None") -> Callable[[F], F]:
-    """A kernel that exists only where its first argument is a rich record; elsewhere its call is `otherwise`.
-
-    The choice is one of types, made while a caller is compiled.
-    """
-
-    def decorate(func: F) -> F:
-        arguments = ", ".join(inspect.signature(func).parameters)
-        there = eval(f"lambda {arguments}: compiled({arguments})", {"compiled": kernel(func)})
-        absent = eval(f"lambda {arguments}: {otherwise}")
-
-        def choice(*args: Any) -> Any:
-            raise TypeError(f"{func.__name__} is called from kernels only")
-
-        @overload(choice, strict=False, jit_options=_OPTIONS)
-        def choose(*args: Any) -> Any:
-            return there if args[0].rich else absent
-
-        return cast(F, choice)
-
-    return decorate
+    return np.array(rows, dtype=np.int64).ravel()

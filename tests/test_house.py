@@ -24,14 +24,6 @@ HOME = Path(dojo.__file__).resolve().parent.parent  # where the three packages a
 ROOT = Path(__file__).resolve().parent.parent
 
 # small kernels that are called with literals and with variables, or with rows and with slices: cheap to compile twice
-SEVERAL_SIGNATURES = {
-    "dojo_opt.manifold.add_rotation_block",
-    "sim.elimination_panel._apply_block",
-    "sim.interior_point.start",
-    "sim.kinematics.displace",
-    "sim.pose_jacobians.add_skew",
-    "sim.state.integrate_state",
-}
 
 
 def python(program: str, *, cwd: Path | None = None, home: Path = HOME, **environment: str) -> str:
@@ -191,37 +183,41 @@ print(json.dumps(compiled_signatures()))
 def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
     program = """
 import numpy as np, dojo_opt as dojo
-from sim.cone_limit import cone_block, cone_derivative, cone_gap
-from sim.swing import swing_curvature, swing_pose
-late = (cone_gap, cone_block, cone_derivative, swing_pose, swing_curvature)
+from sim.ball_spring import spring_impulse
+from sim.cone_limit import cone_gap
+from sim.coupling import factor_coupling
+from sim.interior_point import interior_point
+from sim.newton import newton
+from sim.pyramid import start_pyramid
+from sim.swing import swing_pose
+late = (newton, interior_point, swing_pose, cone_gap, spring_impulse, start_pyramid, factor_coupling)
 body = dojo.Body("b", 1.0, (1, 1, 1))
 scenes = (
+    dojo.models.pendulum(),
     dojo.models.hopper(),
     dojo.Mechanism([body], [dojo.Joint("spherical", None, "b", cone=0.5)]),
     dojo.models.orbital(),
 )
 for mech in scenes:
     sim = dojo.Simulator(mech, time_step=0.01)
-    print("".join("." if kernel._compiled is None else "x" for kernel in late))
+    sim.step(sim.neutral())
+    print("".join("x" if kernel.compiled else "." for kernel in late))
 """
-    assert python(program).split() == [".....", "xxx..", "xxxxx"]
+    assert python(program).split() == ["x......", "xx.....", "xx.x...", "xxxx..."]
 
 
 @pytest.mark.slow
 def test_kernels_have_one_signature_each() -> None:
     program = """
 import json, numpy as np, dojo_opt as dojo
-from solvers import jit
 from solvers.jit import compiled_signatures
 dojo.ilqr(dojo.problems.hop())
 sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
 sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))
 sim.linearize(sim.neutral(), np.zeros(sim.nu))
-kernels = {f"{k.py_func.__module__}.{k.py_func.__name__}": k.py_func.__code__.co_varnames for k in jit._REGISTRY}
-print(json.dumps([name for name, count in compiled_signatures().items() if count > 1 + ("hard" in kernels[name])]))
+print(json.dumps([name for name, count in compiled_signatures().items() if count > 1]))
 """
-    # `hard` is None in scenes without contacts and limits: one more signature instead of their code
-    assert set(json.loads(python(program))) <= SEVERAL_SIGNATURES
+    assert json.loads(python(program)) == []
 
 
 # -- command line ------------------------------------------------------------------------------------------------------

@@ -1,0 +1,103 @@
+"""Which kernels a mechanism has use for (solvers/late.py): compiled, or loaded, before the first call that needs them.
+
+Addresses are those of this process, so they are no part of a mechanism that is copied into another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim import ball_spring, cone_limit, coupling, coupling_gradient, loops, pair_stiffness, pairs, pyramid, swing
+from sim.contact_report import report_contacts, report_pairs, worst_contact
+from sim.gradients import gradient
+from sim.inequalities import add_stiffness
+from sim.interior_point import interior_point
+from sim.limits import add_limit_derivatives
+from sim.model import Law, Model
+from sim.newton import newton
+from sim.step import step
+from solvers.late import LateKernel
+
+_LOOPS = (
+    coupling.factor_coupling,
+    coupling.solve_coupling,
+    loops.start_loops,
+    loops.apply_loops,
+    loops.keep_loops,
+    loops.move_loops,
+)
+_PAIRS = (
+    pairs.pair_kinematics,
+    pairs.pair_rate,
+    pair_stiffness.condense_pairs,
+    pair_stiffness.apply_pairs,
+    pair_stiffness.pair_constants,
+    report_pairs,
+)
+_PYRAMIDS = (
+    pyramid.start_pyramid,
+    pyramid.pyramid_error,
+    pyramid.pyramid_products,
+    pyramid.pyramid_products_ahead,
+    pyramid.pyramid_boundary,
+    pyramid.return_pyramid,
+    pyramid.condense_pyramid,
+    pyramid.pyramid_constant,
+    pyramid.recover_pyramid,
+)
+_COUPLING_GRADIENT = (
+    coupling_gradient.add_coupling_composites,
+    coupling_gradient.add_coupling_derivatives,
+    coupling.solve_coupling_panel,
+)
+
+
+def _bind(model: Model, kernels: tuple[LateKernel, ...]) -> None:
+    for kernel in kernels:
+        model.late[kernel.index] = kernel.address()
+
+
+def _has_ball_springs(model: Model) -> bool:
+    first = model.body_vadr[:-1] + model.joint_ntrans
+    return bool(np.any(model.dof_spring[first[model.joint_nrot == 3]] > 0.0))
+
+
+def bind_poses(model: Model) -> None:
+    """What every call of a mechanism may need."""
+    if np.any(model.joint_nrot == 2):
+        _bind(model, (swing.swing_pose,))
+    if _has_ball_springs(model):
+        _bind(model, (ball_spring.add_spring_block,))
+
+
+def bind_step(model: Model) -> None:
+    """What a time step needs: the interior point only where there are contacts or limits."""
+    hard = len(model.contact_body) + len(model.limit_dof) > 0
+    _bind(model, (step, interior_point, worst_contact, report_contacts) if hard else (step, newton))
+    if np.any(model.limit_cone):
+        _bind(model, (cone_limit.cone_gap, cone_limit.cone_block))
+    if _has_ball_springs(model):
+        _bind(model, (ball_spring.spring_impulse,))
+    if np.any(model.contact_law == int(Law.LINEAR)):
+        _bind(model, _PYRAMIDS)
+    if len(model.coupling_body):
+        _bind(model, _LOOPS)
+    if len(model.pair_kind):
+        _bind(model, _PAIRS)
+
+
+def bind_gradient(model: Model) -> None:
+    """What the derivatives of a time step need beyond it."""
+    _bind(model, (gradient,))
+    if len(model.contact_body) + len(model.limit_dof):
+        _bind(model, (add_stiffness,))
+    if len(model.limit_dof):
+        _bind(model, (add_limit_derivatives,))
+    if np.any(model.limit_cone):
+        _bind(model, (cone_limit.cone_derivative,))
+    if np.any(model.joint_nrot == 2):
+        _bind(model, (swing.swing_curvature,))
+    if _has_ball_springs(model):
+        _bind(model, (ball_spring.add_ball_spring_derivatives,))
+    if len(model.coupling_body):
+        _bind(model, _COUPLING_GRADIENT)

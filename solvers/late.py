@@ -1,0 +1,142 @@
+"""`@late`: kernels that other kernels call by their address, for what few scenes have.
+
+A call of a late kernel is compiled like any other call, but the kernel itself is not: the address is read from the
+table `late` of the first argument, a record, and where it is 0 the call stands for a constant. So a scene compiles what
+it binds, and pays a comparison for the rest; and what many entries call, the time step for one, is compiled once
+instead of once in each.
+
+What a late kernel takes and returns is read from its annotations, because a caller is compiled before it:
+
+    int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/record.py), NamedTuples
+
+    @late(Late.FACTOR_COUPLING, otherwise=True)
+    def factor_coupling(model: Model, work: Work) -> bool: ...
+
+    model.late[Late.FACTOR_COUPLING] = factor_coupling.address()
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Iterable
+from types import GenericAlias
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.registry import cpu_target
+from numba.extending import intrinsic
+
+from solvers.jit import entry
+from solvers.record import RECORDS, load_word
+
+__all__ = ["LateKernel", "late"]
+
+_TYPES: dict[str, types.Type] = {
+    "int": types.int64,
+    "float": types.float64,
+    "bool": types.boolean,
+    "None": types.none,
+    "Vector": types.Array(types.float64, 1, "C"),
+    "Matrix": types.Array(types.float64, 2, "C"),
+    "Integers": types.Array(types.int64, 1, "C"),
+}
+
+
+def type_of(annotation: str, names: dict[str, Any]) -> types.Type:
+    """Numba's type for the text of an annotation, in a module with these names."""
+    if annotation in _TYPES:
+        return _TYPES[annotation]
+    found = eval(annotation, {}, names)
+    if isinstance(found, GenericAlias):
+        return _tuple_of(found)
+    if found in RECORDS:
+        return RECORDS[found]
+    fields = [type_of(ref.__forward_arg__, vars(sys.modules[found.__module__])) for ref in _annotations(found)]
+    return types.BaseTuple.from_types(fields, found)
+
+
+def _annotations(cls: Any) -> Iterable[Any]:
+    """Those of the fields of a NamedTuple, which keeps their texts as references."""
+    found: Iterable[Any] = cls.__annotations__.values()
+    return found
+
+
+def _tuple_of(alias: GenericAlias) -> types.Type:
+    """Numba's type of tuple[...], of numbers and tuples of them."""
+    parts = [_tuple_of(part) if isinstance(part, GenericAlias) else _TYPES[part.__name__] for part in alias.__args__]
+    return types.BaseTuple.from_types(parts)
+
+
+class LateKernel:
+    """A kernel at an address; compiled when it is first asked for."""
+
+    def __init__(self, func: Callable[..., Any], index: int, otherwise: Any) -> None:
+        self.func, self.index, self.otherwise = func, int(index), otherwise
+        self._code: Any = None
+        self._call = _caller(self)
+
+    def __call__(self, *args: Any) -> Any:
+        raise TypeError(f"{self.func.__name__} is called from kernels only")
+
+    @property
+    def compiled(self) -> bool:
+        """Whether its address was asked for."""
+        return self._code is not None
+
+    def signature(self) -> Any:
+        """Numba's signature, by the annotations."""
+        *arguments, result = (type_of(text, self.func.__globals__) for text in self.func.__annotations__.values())
+        return result(*arguments)
+
+    def address(self) -> int:
+        """Where the compiled kernel is, in this process."""
+        if self._code is None:
+            declared = self.signature()
+            code = entry(self.func, declared.args)
+            if code.signature.return_type != declared.return_type:
+                name, found = self.func.__name__, code.signature.return_type
+                raise TypeError(f"late kernel {name}: expected to return {declared.return_type}, got {found}")
+            self._code = code
+        return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
+
+    @property
+    def _numba_type_(self) -> Any:
+        return cpu_target.typing_context.resolve_value_type(self._call)
+
+
+def late(index: int, otherwise: Any = None) -> Callable[[Callable[..., Any]], Any]:
+    """A kernel called by the address at this index of `late`; `otherwise` stands for it where that is 0."""
+    return lambda func: LateKernel(func, index, otherwise)
+
+
+def _caller(kernel: LateKernel) -> Any:
+    """What Numba compiles a call of the kernel to."""
+
+    def call(typing: Any, *args: Any) -> Any:
+        signature = kernel.signature()
+
+        def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            result = signature.return_type
+            k, _ = signature.args[0].fields["late"]
+            addresses = load_word(builder, arguments[0], cgutils.intp_t.as_pointer(), 3 * k)
+            address = builder.load(builder.gep(addresses, [ir.Constant(cgutils.intp_t, kernel.index)]))
+            value = context.get_constant_generic(builder, result, kernel.otherwise)
+            slot = cgutils.alloca_once_value(builder, value)
+            with builder.if_then(cgutils.is_not_null(builder, address)):
+                kind = context.call_conv.get_function_type(result, signature.args)
+                callee = builder.inttoptr(address, kind.as_pointer())
+                status, value = context.call_conv.call_function(builder, callee, result, signature.args, arguments)
+                with cgutils.if_unlikely(builder, status.is_error):
+                    context.call_conv.return_status_propagate(builder, status)
+                builder.store(value, slot)
+            return builder.load(slot)
+
+        return signature, lower
+
+    parameters = inspect.signature(kernel.func).parameters.values()
+    first = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    call.__signature__ = inspect.Signature([first, *parameters])  # type: ignore[attr-defined]
+    return intrinsic(call)
