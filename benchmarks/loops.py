@@ -3,8 +3,8 @@
     python benchmarks/loops.py [steps]        100,000 by default; in chunks, so that memory stays small
 
 gap        largest violation of any loop constraint, every tenth step [m, rad]
-energy     largest change against the energy at the first step, over the largest kinetic energy; the models without their
-           contacts, limits and dampers, left to gravity
+energy     largest change against the energy at the first step, over the largest kinetic energy; of the models without
+           their contacts, limits and dampers
 us         processor time per step [us] of those, and of the same mechanism with its loops cut, as a tree
 """
 

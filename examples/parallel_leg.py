@@ -21,15 +21,17 @@ problem = dojo.Problem(
     sim,
     start,
     horizon,
-    cost=[dojo.Tracking(np.array([apex] * 15 + [goal] * 16), weight), dojo.Effort(1e-4)],
-    constraints=[dojo.Goal(goal, components=np.arange(5))],
+    cost=[dojo.cost.Tracking(np.array([apex] * 15 + [goal] * 16), weight), dojo.cost.Effort(1e-4)],
+    constraints=[dojo.constraint.Goal(goal, components=np.arange(5))],
     control_limits=(-8.0, 8.0),
     controls0=np.array([hold, -hold]),
 )
 plan = dojo.ilqr(problem, verbose=True)
 gap = max(float(np.abs(g).max()) for x in plan.x for g in sim.loop_gaps(x).values())
 knee = np.linalg.norm(sim.reactions(plan.x[:-1], plan.u)["foot"].force, axis=-1).max()
-print(f"apex {plan.x[:, 1].max():.3f} m, landed at {plan.x[-1, 0]:.4f} m; the pin of the foot carries up to {knee:.0f} N")
+print(
+    f"apex {plan.x[:, 1].max():.3f} m, landed at {plan.x[-1, 0]:.4f} m; the pin of the foot carries up to {knee:.0f} N"
+)
 print(f"the loop is open by {gap:.1e} at most; largest violation of a constraint {plan.violation:.1e}")
 
 finish(dojo.plots.trajectory(plan), __file__)

@@ -7,7 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim import ball_spring, cone_limit, coupling, coupling_gradient, loops, pair_stiffness, pairs, pyramid, swing
+from sim import (
+    ball_spring,
+    cone_limit,
+    coupling,
+    coupling_gradient,
+    gears,
+    loops,
+    pair_stiffness,
+    pairs,
+    pyramid,
+    swing,
+)
 from sim.contact_report import report_contacts, report_pairs, worst_contact
 from sim.gradients import gradient
 from sim.inequalities import add_stiffness
@@ -80,8 +91,10 @@ def bind_step(model: Model) -> None:
         _bind(model, (ball_spring.spring_impulse,))
     if np.any(model.contact_law == int(Law.LINEAR)):
         _bind(model, _PYRAMIDS)
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _LOOPS)
+    if len(model.gear_dof):
+        _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
 
@@ -99,5 +112,5 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (swing.swing_curvature,))
     if _has_ball_springs(model):
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)

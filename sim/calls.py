@@ -192,13 +192,12 @@ class Calls:
         """What the last step of this thread has left."""
         return work_view(self._work())
 
-    def worst_loop(self) -> tuple[int, float] | None:
-        """The loop that was furthest open in the last iterate of this thread, and by how much [m, or sine]."""
-        if not self.sizes.nloop:
-            return None
-        work, ends = self.last(), self.model.coupling_row[-self.sizes.nloop - 1 :]
-        gaps = [float(np.abs(work.couple_gap[a:b]).max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        return int(np.argmax(gaps)), max(gaps)
+    def open_loops(self) -> list[float]:
+        """How far loops, then gears, were open in the last iterate of this thread [m, or sine of an angle]."""
+        ends = self.model.coupling_row[len(self.model.coupling_body) - self.sizes.nloop :]
+        ends = np.concatenate([ends, ends[-1] + 1 + np.arange(self.sizes.ngear)])
+        gap = np.abs(self.last().couple_gap)
+        return [float(gap[a:b].max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

@@ -57,12 +57,17 @@ class Closure:
         self._h = calls.settings.time_step
 
     def gaps(self, x: Floats) -> dict[str, Floats]:
-        """By loop joint, what its constraints miss: distances [m], then angles [rad]; at the configuration of x.
+        """By loop joint and gear, what its constraints miss at x: distances [m], then angles [rad].
 
         Angles and not the sines of the step (sim/loops.py), which vanish after half a turn as well.
         """
-        z = self._calls.maximal(x[None], self._mechanism.nbody)[0]
-        return {joint.name: self._gap(joint, z) for joint in self._mechanism.loops}
+        mech = self._mechanism
+        z = self._calls.maximal(x[None], mech.nbody)[0]
+        out = {joint.name: self._gap(joint, z) for joint in mech.loops}
+        for gear in mech.gears:
+            a, b = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
+            out[f"gear {gear.name}"] = np.array([x[a] - gear.ratio * x[b] - gear.offset])
+        return out
 
     def _gap(self, joint: Joint, z: Floats) -> Floats:
         names = self._mechanism.body_names
@@ -158,7 +163,8 @@ class Closure:
         gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d)).items()}
         worst = max(gaps, key=lambda name: gaps[name])
         call = f"Mechanism({self._mechanism.name!r})"
+        what = worst if worst.startswith("gear ") else f"loop joint {worst!r}"
         raise ValueError(
-            f"{call}: loop joint {worst!r} cannot be closed near this state, it is off by {gaps[worst]:.2g}; give "
+            f"{call}: {what} cannot be closed near this state, it is off by {gaps[worst]:.2g}; give "
             "neutral=... a configuration near one that closes, or see whether two loops contradict each other"
         )

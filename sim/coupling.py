@@ -19,6 +19,7 @@ by a scale that does not look at directions.
 from __future__ import annotations
 
 from sim.elimination import solve
+from sim.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
 from sim.model import Late, Matrix, Model, Vector, Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
@@ -149,14 +150,25 @@ def factor_coupling(model: Model, work: Work) -> bool:
                     if is_loop(model, m):
                         size = response_size(model, work, m, row)
                         work.couple_scale[row] = max(work.couple_scale[row], size)
+            for m in range(model.gear_dof.shape[0]):
+                work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
             if not is_loop(model, k):
                 work.couple_T[col, col] += work.couple_E[col]
                 pairs += 1
+    for k in range(model.gear_dof.shape[0]):
+        col = gear_row(model, k)
+        unit_gear_impulse(model, k, work.rhs)
+        solve(model, work, work.rhs, work.couple_Y[col])
+        for m in range(model.coupling_body.shape[0]):
+            for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
+                work.couple_T[row, col] = -response(model, work, m, row)
+        for m in range(model.gear_dof.shape[0]):
+            work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
     for row in range(work.couple_T.shape[0]):
         work.couple_scale[row] = _row_scale(work, row, work.couple_scale[row])
         for col in range(work.couple_T.shape[1]):
             work.couple_T[row, col] *= work.couple_scale[row]
-    least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
+    least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
     rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
     work.couple_rank[0] = rank
     return rank >= pairs
@@ -172,6 +184,9 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
     for k in range(model.coupling_body.shape[0]):
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
             x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + response(model, work, k, row))
+    for k in range(model.gear_dof.shape[0]):
+        row = gear_row(model, k)
+        x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + gear_response(model, work, k, out))
     full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), x)
     for row in range(x.shape[0]):
         f = x[row, 0]
@@ -212,6 +227,7 @@ def solve_coupling_panel(model: Model, work: Work) -> None:
                         X[row, m] += f * z[m]
             for m in range(X.shape[1]):
                 X[row, m] *= work.couple_scale[row]
+    add_gear_columns(model, work, X)
     full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), X)
     for row in range(X.shape[0]):
         for d in range(work.columns.shape[0]):

@@ -65,10 +65,11 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
 
 def _loop_lines(sim: Simulator) -> list[str]:
     """What closes loops, and how many of its constraints say something new."""
-    loops = sim.mechanism.loops
-    if not loops:
+    loops, gears = sim.mechanism.loops, sim.mechanism.gears
+    if not loops and not gears:
         return []
     lines = [f"  {j.name:<18}{j.kind:<16}{j.parent} -> {j.child}:  {6 - j.nv} constraints" for j in loops]
+    lines += [f"  {g.name:<18}{'gear':<16}{g.joint} = {g.ratio:g} {g.other} + {g.offset:g}" for g in gears]
     return ["loops", *lines, f"  {sim.loop_rank()}"]
 
 

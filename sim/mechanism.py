@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim.closing import carried
 from sim.collisions import Collision, Touch, touches
+from sim.gear import Gear, check_gears
 from sim.parts import WORLD, Body, Contact, Input, Joint
 
 
@@ -35,6 +36,7 @@ class Mechanism:
     neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
     collisions: Sequence[Collision] = ()
     loops: Sequence[Joint] = ()  # joints with close=True are moved here
+    gears: Sequence[Gear] = ()
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
@@ -55,6 +57,7 @@ class Mechanism:
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
         _check_masses(f"{call})", bodies, joints)
+        check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
         for c in self.collisions:
@@ -171,6 +174,7 @@ _KINDS = {
     "inputs": Input,
     "collisions": Collision,
     "loops": Joint,
+    "gears": Gear,
 }
 
 

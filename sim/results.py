@@ -135,11 +135,11 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
 
 
 def error_of(
-    mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[str, float] | None = None
+    mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
 ) -> SimulationError:
     """The sentence of a status, with the numbers of the report of a kernel.
 
-    loop: the one that is furthest open, and by how much.
+    loop: by how much the one that is furthest open is, and which it is.
     """
     status, iterations, residual, violation, contact = report
     reason = Status(int(status))
@@ -148,6 +148,6 @@ def error_of(
         text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})."
         if contact >= 0:
             text += f" Contact {mech.contact_names[int(contact)]!r} is worst, off by {violation:.1e}."
-        if loop is not None and not loop[1] < tolerance:
-            text += f" Loop joint {loop[0]!r} is open by {loop[1]:.1e}."
+        if loop is not None and not loop[0] < tolerance:
+            text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)

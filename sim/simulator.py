@@ -153,9 +153,10 @@ class Simulator(States):
 
     def _error(self, where: str, report: Floats) -> SimulationError:
         """Why the last step of this thread was not solved."""
-        worst = self._calls.worst_loop()
-        loop = (self.mechanism.loops[worst[0]].name, worst[1]) if worst else None
-        return error_of(self.mechanism, where, report, self.tolerance, loop)
+        mech = self.mechanism
+        names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
+        gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
+        return error_of(mech, where, report, self.tolerance, max(gaps, default=None))
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""

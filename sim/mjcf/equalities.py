@@ -1,7 +1,8 @@
-"""The equality constraints of an MJCF file: <connect> and <weld> as joints that close loops.
+"""The equality constraints of an MJCF file: <connect> and <weld> as joints that close loops, <joint> as a gear.
 
     connect   a point of body 1 stays on a point of body 2: a spherical joint
     weld      the pose of body 2 in body 1 stays: a fixed joint
+    joint     a coordinate is a linear function of another one
 
 MuJoCo's are soft, those of the mechanism are not.
 """
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.gear import Gear
 from sim.mjcf.groups import Group, name_of, pose_of
 from sim.parts import WORLD, Joint
 from sim.urdf.pose import HERE, Pose
@@ -21,7 +23,7 @@ from sim.urdf.report import Notes
 Floats = NDArray[np.float64]
 Where = dict[int, tuple[Group | None, Pose]]
 
-CONNECT, WELD = 0, 1  # mjtEq
+CONNECT, WELD, JOINT = 0, 1, 2  # mjtEq
 _SITE = 6  # mjtObj
 
 
@@ -30,8 +32,10 @@ def find_loops(model: Any, where: Where, notes: Notes) -> list[Joint]:
     out = []
     for k in range(model.neq):
         name, kind = name_of(model, "equality", k), int(model.eq_type[k])
+        if kind == JOINT:
+            continue
         if kind not in (CONNECT, WELD):
-            notes.add("equality constraints other than connect and weld are left out", [name], warn=True)
+            notes.add("equality constraints other than connect, weld and joint are left out", [name], warn=True)
             continue
         if not model.eq_active0[k]:
             notes.add("equality constraints that the file switches off are left out", [name])
@@ -42,6 +46,25 @@ def find_loops(model: Any, where: Where, notes: Notes) -> list[Joint]:
             continue
         notes.add("equality constraints are rigid here", [name])
         out.append(_joint(name, kind, *((first, second) if second[0] else (second, first))))
+    return out
+
+
+def find_gears(model: Any, homes: dict[int, tuple[str, int]], notes: Notes) -> list[Gear]:
+    """The gears: q1 - q1_0 = a0 + a1 (q2 - q2_0), q_0 of the reference configuration."""
+    out = []
+    for k in np.flatnonzero(np.asarray(model.eq_type) == JOINT):
+        name, poly = name_of(model, "equality", int(k)), np.array(model.eq_data[k, :5], dtype=np.float64)
+        first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        if not model.eq_active0[k]:
+            notes.add("equality constraints that the file switches off are left out", [name])
+        elif second < 0 or poly[2:].any():
+            notes.add("equality constraints that hold one joint, or are not linear, are left out", [name], warn=True)
+        else:
+            start, other = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (first, second))
+            (joint, dof), (leader, leading) = homes[first], homes[second]
+            offset = start + float(poly[0]) - float(poly[1]) * other
+            notes.add("equality constraints are rigid here", [name])
+            out.append(Gear(joint, leader, float(poly[1]), offset, dof, leading, name))
     return out
 
 

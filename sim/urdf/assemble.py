@@ -15,6 +15,7 @@ from sim.urdf.contacts import find_contacts
 from sim.urdf.drawing import drawn
 from sim.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.urdf.loops import UrdfLoop, closing_joint, zero_poses
+from sim.urdf.mimic import mimic_gears
 from sim.urdf.pose import HERE, Pose
 from sim.urdf.report import Frame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.urdf.robot import Robot, UrdfJoint
@@ -39,6 +40,7 @@ class Choices:
     fixed_base: bool
     merge: bool
     locked: frozenset[str]
+    geared: tuple[str, ...]  # joints that follow another one
     repair: bool
     neutral: Mapping[str, ArrayLike]
     position: tuple[float, ...]
@@ -83,6 +85,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         gravity=choices.gravity,
         name=robot.name,
         neutral=neutral,
+        gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
     )
     bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
     if len(bases) == 1 and bases[0] not in choices.neutral:

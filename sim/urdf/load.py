@@ -16,7 +16,7 @@ from sim.urdf.report import Notes, UrdfMechanism
 from sim.urdf.robot import read_robot
 from sim.urdf.xml import parse
 
-MIMIC = ("free", "locked")
+MIMIC = ("free", "locked", "gear")
 
 
 def load_urdf(
@@ -50,7 +50,8 @@ def load_urdf(
                       no contacts.
         merge_fixed   whether links on fixed joints become one body; a link without mass always does
         locked        joints that are held at their neutral coordinate, as if they were fixed
-        mimic         what becomes of joints that follow another one, which is not modelled: "free" or "locked"
+        mimic         what becomes of joints that follow another one: "gear" couples them (see Gear), "free" and
+                      "locked" leave that out
         repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
                       more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
         neutral       coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their
@@ -83,14 +84,18 @@ def load_urdf(
     for name in held:
         checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
     if following := [name for name in robot.mimics if name not in held]:
-        fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
-        notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
+        if mimic == "gear":
+            notes.add("joints that follow another one, by a gear", following)
+        else:
+            fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
+            notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
         held += following if mimic == "locked" else []
     choices = Choices(
         file=file.name,
         fixed_base=not floating,
         merge=merge_fixed,
         locked=frozenset(held),
+        geared=tuple(following) if mimic == "gear" else (),
         repair=repair,
         neutral=dict(neutral or {}),
         position=checks.vector("load_urdf(position=...)", position, 3),
