@@ -81,7 +81,11 @@ def test_derivatives(name: str) -> None:
         wheel = Joint("revolute", None, "wheel", axis=Y)
         bodies = [*plain.bodies, Body("wheel", 1.0, (0.1, 0.2, 0.15))]
         mech = replace(
-            plain, bodies=bodies, joints=[*plain.joints, wheel], gears=[Gear("wheel", "crank", 3.0)], neutral=()
+            plain,
+            bodies=bodies,
+            joints=[*plain.joints, wheel],
+            gears=[Gear("wheel", "crank", 3.0)],
+            neutral=(*plain.neutral, -3.0),
         )
     sim = dojo.Simulator(mech, time_step=0.02, tolerance=1e-12, kappa=1e-3)
     x = sim.rollout(start(sim), np.zeros((3, sim.nu)), throw=True).x[-1]
