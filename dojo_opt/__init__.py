@@ -63,6 +63,7 @@ __all__ = [
     "plots",
     "problems",
     "tasks",
+    "tracking_gains",
     "viewer",
 ]
 
@@ -113,6 +114,7 @@ _HOME: dict[str, str | None] = {
     "plots": None,
     "problems": None,
     "tasks": None,
+    "tracking_gains": "dojo_opt.tracking",
     "viewer": None,
 }
 
@@ -129,6 +131,7 @@ if TYPE_CHECKING:
     from dojo_opt.plant.study import monte_carlo
     from dojo_opt.problem import Problem
     from dojo_opt.rest import equilibrium
+    from dojo_opt.tracking import tracking_gains
     from sim.collisions import Collision
     from sim.gear import Gear
     from sim.mechanism import Mechanism

@@ -15,6 +15,8 @@ __all__ = ["equilibrium", "input_map", "potential_gradient"]
 
 _STEP = 1e-5
 _EVEN = 1e-6  # weight of the sharing of the load against its balance
+_RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
+_ROUNDS = 20
 _NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
 
 
@@ -52,6 +54,31 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
     return out
 
 
+def _down(feet: Feet, state: Array) -> Array:
+    """(k, nv) d(gaps)/dq: generalised forces of unit normal forces."""
+    return np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
+
+
+def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """The state moved until the forces kappa / (h gap) of all contacts balance the free degrees of freedom; the forces.
+
+    Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so the
+    forces that share a load most evenly are nearly, and not quite, those of a state.
+    """
+    for _ in range(_ROUNDS):
+        gap, down = feet.gaps(state), _down(feet, state)
+        force = sim.kappa / (sim.time_step * np.maximum(gap, 1e-12))
+        left = potential_gradient(sim, state) - stop_torques(sim, state) - down.T @ force
+        if np.abs(left[free]).max(initial=0.0) < 1e-9 * np.abs(left).max() or gap.min() <= 0.0:
+            break
+        slope = (down[:, free].T * (force / gap)) @ down
+        move = np.zeros(sim.ndx)
+        move[: sim.nv] = np.linalg.lstsq(slope, -left[free], rcond=_RANK)[0]
+        change = np.abs(down @ move[: sim.nv] / gap).max()
+        state = sim.integrate(state, move * min(1.0, 0.5 / max(change, 1e-300)))
+    return state, sim.kappa / (sim.time_step * np.maximum(feet.gaps(state), 1e-12))
+
+
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
     """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
 
@@ -67,11 +94,12 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     feet, B = Feet(sim, mech.contact_names), input_map(sim)
     state = np.array(sim.neutral() if x is None else x, dtype=float)
     state[sim.nq :] = 0.0
-    free = ~B.any(axis=1)
-    u, left = np.zeros(sim.nu), np.zeros(sim.nv)
+    free = np.asarray(~B.any(axis=1))
+    u: Array = np.zeros(sim.nu)
+    left: Array = np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
-        down = np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
+        down = _down(feet, state)
         gap = feet.gaps(state)
         touching = gap < gap.min() + _NEAR
         afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * np.maximum(gap, _NEAR)))
@@ -79,15 +107,18 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         rows = np.concatenate([(down[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
         force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
         left = load - down.T @ force
-        u = np.linalg.lstsq(B, left, rcond=None)[0]
+        u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * force[loaded])
         error = wanted - gap[loaded]
         if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
             break
         move = np.zeros(sim.ndx)
-        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=None)[0]
+        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
         state = sim.integrate(state, move)
+    state, force = _pressed(sim, feet, state, free)
+    left = potential_gradient(sim, state) - stop_torques(sim, state) - _down(feet, state).T @ force
+    u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
     if np.abs(left[free]).max() > 1e-3 * weight:
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(

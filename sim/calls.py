@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import coordinates, coordinates_jacobian, energy, rollout, start, state, velocity
+from sim import coordinates, coordinates_jacobian, energy, linear_rollout, rollout, start, state, velocity
 from sim.bind import bind_gradient, bind_poses, bind_step
 from sim.layout import allocate_work, sizes_of, table, work_view
 from sim.model import Integers, Model, Vector, Work
@@ -165,6 +165,19 @@ class Calls:
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
         return A, B, x_next, reports
+
+    def roll_linear(self, x: Vector, us: Floats, kappa: float | None) -> tuple[int, Floats, Floats, Floats, Floats]:
+        """(number of solved steps, states, A, B, report of every step) of a rollout."""
+        n = len(us)
+        xs, reports = np.zeros((n + 1, self.nx)), np.zeros((n, REPORT))
+        A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
+        xs[0] = x
+        line = rollout.Linearized(xs, us, A, B, xs, reports)
+        model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
+        knot = linear_rollout.roll_linear(model, self._work(), settings, line)
+        if knot < n:
+            np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
+        return int(knot), xs, A, B, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
         """(A, B, next state, report) of one step."""

@@ -227,6 +227,20 @@ class Simulator(States):
             raise error_of(self.mechanism, "Simulator.linearize", report, self.tolerance)
         return A, B
 
+    def linearize_rollout(
+        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None
+    ) -> tuple[Floats, Linearization]:
+        """States (T + 1, nx) of a rollout from x under us (T, nu), and its derivatives, in one pass.
+
+        As `rollout` and `linearize_trajectory`, but every step is solved once. An unsolved step raises SimulationError.
+        """
+        call = "linearize_rollout"
+        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, (None, self.nu))
+        knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, self._border.kappa(call, kappa))
+        if knot < len(inputs):
+            raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
+        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
+
     def linearize_trajectory(
         self, xs: ArrayLike, us: ArrayLike, substeps: int = 1, kappa: float | None = None
     ) -> Linearization:

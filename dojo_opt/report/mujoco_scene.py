@@ -5,6 +5,8 @@ have the same layout and, but for the convention of v (mean over the last interv
 Contacts become spheres paired with the plane of their half-space, and with nothing else.
 
 What MuJoCo cannot say is refused: a spring of a quaternion joint with a rest other than zero, orbital joints, cones.
+With `hinges=True` an orbital joint becomes two hinges one after the other, which has as many coordinates and moves as
+it does near zero: to be timed beside, not to be compared with.
 What it says otherwise: contacts and limits are soft there; a point contact is a sphere of a tenth of a millimetre.
 """
 
@@ -20,11 +22,11 @@ from sim.model import InputKind, Law, Model, Vector
 POINT_RADIUS = 1e-4  # [m] MuJoCo has no spheres of radius zero
 
 
-def load(model: Model, time_step: float, **options: str) -> Any:
+def load(model: Model, time_step: float, *, hinges: bool = False, **options: str) -> Any:
     """`mujoco.MjModel` of the mechanism; options are attributes of MJCF's <option>, such as integrator="Euler"."""
     import mujoco
 
-    return mujoco.MjModel.from_xml_string(mjcf(model, time_step, **options))
+    return mujoco.MjModel.from_xml_string(mjcf(model, time_step, hinges=hinges, **options))
 
 
 def state(mj_model: Any, x: Vector) -> Any:
@@ -38,7 +40,7 @@ def state(mj_model: Any, x: Vector) -> Any:
     return data
 
 
-def mjcf(model: Model, time_step: float, **options: str) -> str:
+def mjcf(model: Model, time_step: float, *, hinges: bool = False, **options: str) -> str:
     """MJCF text of the mechanism."""
     if len(model.coupling_body) + len(model.gear_dof):
         raise ValueError("mjcf: collisions between bodies and closed loops and gears are not written")
@@ -51,7 +53,7 @@ def mjcf(model: Model, time_step: float, **options: str) -> str:
         lines.append(_tag("geom", {"name": name, "type": "plane", "size": "0 0 1", **place, **_NO_COLLISION}))
     for body in range(len(model.body_mass)):
         if model.body_parent[body] < 0:
-            lines += _body(model, body)
+            lines += _body(model, body, hinges)
     lines += ["</worldbody>", "<contact>", *_pairs(model, planes), "</contact>"]
     lines += ["<actuator>", *(_actuator(model, k) for k in range(len(model.input_kind))), "</actuator>", "</mujoco>"]
     return "\n".join(lines)
@@ -98,7 +100,7 @@ def _plane_name(model: Model, contact: int) -> str:
     return f"plane {_numbers(rows[0])} {height!r}"
 
 
-def _body(model: Model, body: int) -> list[str]:
+def _body(model: Model, body: int, hinges: bool) -> list[str]:
     """<body> with its joints, inertia, contact spheres and children."""
     offset = model.joint_offset[body]
     pos = model.joint_parent_point[body] - _rotate(offset, model.joint_child_point[body])
@@ -106,13 +108,13 @@ def _body(model: Model, body: int) -> list[str]:
     J = model.body_inertia[body].reshape(3, 3)
     inertia = [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
     mass = {"pos": "0 0 0", "mass": _numbers(model.body_mass[body]), "fullinertia": _numbers(inertia)}
-    lines += [*_joints(model, body), _tag("inertial", mass), _tag("site", {"name": f"site{body}"})]
+    lines += [*_joints(model, body, hinges), _tag("inertial", mass), _tag("site", {"name": f"site{body}"})]
     for contact in np.flatnonzero(model.contact_body == body):
         radius = max(float(model.contact_radius[contact]), POINT_RADIUS)
         sphere = {"type": "sphere", "size": repr(radius), "pos": _numbers(model.contact_point[contact])}
         lines.append(_tag("geom", {"name": f"contact{contact}", **sphere, **_NO_COLLISION, "mass": "0"}))
     for child in np.flatnonzero(model.body_parent == body):
-        lines += _body(model, int(child))
+        lines += _body(model, int(child), hinges)
     return [*lines, "</body>"]
 
 
@@ -124,7 +126,7 @@ def _is_free(model: Model, body: int) -> bool:
     return bool(model.body_parent[body] < 0 and floating and at_origin and straight)
 
 
-def _joints(model: Model, body: int) -> list[str]:
+def _joints(model: Model, body: int, hinges: bool) -> list[str]:
     """<joint> per degree of freedom; a quaternion is one ball, a floating base one free joint."""
     if _is_free(model, body):
         return [_tag("freejoint", {"name": f"free{body}"})]
@@ -132,13 +134,16 @@ def _joints(model: Model, body: int) -> list[str]:
     ntrans, nrot = int(model.joint_ntrans[body]), int(model.joint_nrot[body])
     point = {"pos": _numbers(model.joint_child_point[body])}
     axes = model.joint_trans_axes[body].reshape(3, 3)
-    if nrot == 2:
+    if nrot == 2 and not hinges:
         raise ValueError(f"mjcf: MuJoCo has no joint that turns across an axis and not about it (body {body})")
     if np.any(model.limit_cone[(model.limit_dof >= first) & (model.limit_dof < first + ntrans + nrot)]):
         raise ValueError(f"mjcf: MuJoCo has no cone limit (body {body})")
     lines = [_scalar(model, first + k, "slide", axes[k], {}) for k in range(ntrans)]
     if nrot == 1:
         lines.append(_scalar(model, first + ntrans, "hinge", model.joint_axis[body], point))
+    elif nrot == 2:
+        swing = model.joint_swing_axes[body].reshape(2, 3)
+        lines += [_scalar(model, first + ntrans + k, "hinge", swing[k], point) for k in range(2)]
     elif nrot == 3:
         dofs = slice(first + ntrans, first + ntrans + 3)
         if np.any(model.dof_spring[dofs] * model.dof_rest[dofs]):
@@ -184,7 +189,7 @@ def _actuator(model: Model, k: int) -> str:
         ntrans = int(model.joint_ntrans[body])
         if _is_free(model, body):
             return _tag("motor", {"joint": f"free{body}", "gear": _numbers(np.eye(6)[within])})
-        if within < ntrans or model.joint_nrot[body] == 1:
+        if within < ntrans or model.joint_nrot[body] < 3:
             return _tag("motor", {"joint": f"joint{index}", "gear": "1"})
         first = int(model.body_vadr[body]) + ntrans
         return _tag("motor", {"joint": f"joint{first}", "gear": _numbers([*np.eye(3)[within - ntrans], 0, 0, 0])})

@@ -24,7 +24,9 @@ from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave, ratio, slope
 from dojo_opt.report.planning_time import add_planning
 from dojo_opt.report.result import Report, Row
+from dojo_opt.report.robots import add_robots
 from dojo_opt.report.study import Progress
+from dojo_opt.rest import equilibrium
 from sim.model import Vector
 from sim.simulator import Simulator
 from solvers.jit import threads
@@ -60,6 +62,8 @@ class Timing:
             "hopper": lambda: _hopper(report, rounds),
             "quadruped": lambda: _quadruped(report, rounds),
             "landing": lambda: _landing(report, rounds),
+            "Atlas": lambda: _atlas(report, rounds),
+            "robots": lambda: add_robots(report, quick=self.quick),
             "chains": lambda: _chains(report, rounds),
             "planning": lambda: add_planning(report, quick=self.quick),
         }
@@ -95,8 +99,17 @@ def _standing(time_step: float, *, limits: bool = False) -> tuple[Simulator, Vec
     return sim, np.ascontiguousarray(x)
 
 
-def _scene(report: Report, name: str, sim: Simulator, x: Vector, u: Vector, rounds: int, bars: Bars) -> None:
-    """Rows of one mechanism that holds still: step, gradient, and their ratios to MuJoCo's."""
+def _atlas(report: Report, rounds: int) -> None:
+    """Atlas on eight balls under its soles, its joints sprung. MuJoCo does not hold it at this time step: no ratios."""
+    sim = Simulator(dojo.models.atlas(spring=1e4, damper=500.0), time_step=0.01)
+    x, u = equilibrium(sim)
+    _scene(report, "Atlas, 10 ms", sim, x, u, rounds, Bars(120.0, 100.0), peer=False)
+
+
+def _scene(
+    report: Report, name: str, sim: Simulator, x: Vector, u: Vector, rounds: int, bars: Bars, *, peer: bool = True
+) -> None:
+    """Rows of one mechanism that holds still: step, gradient, and, with a peer, their ratios to MuJoCo's."""
     us = np.tile(u, (KNOTS, 1))
     x = np.ascontiguousarray(_solved(name, sim.rollout(x, us)).x[-1])  # settled to the last digit
     trajectory = _solved(name, sim.rollout(x, us))
@@ -105,7 +118,7 @@ def _scene(report: Report, name: str, sim: Simulator, x: Vector, u: Vector, roun
         "step": lambda: sim.rollout(x, us),
         "step and gradient": lambda: sim.linearize_trajectory(xs, us, kappa=sim.kappa),
     }
-    twin = find_spec("mujoco") is not None
+    twin = peer and find_spec("mujoco") is not None
     if twin:
         cases |= _mujoco_cases(sim, x, u)
     seconds = {case: s / KNOTS for case, s in interleave(cases, rounds).items()}

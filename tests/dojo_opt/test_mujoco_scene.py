@@ -127,3 +127,17 @@ def test_a_spring_that_mujoco_cannot_have_is_refused() -> None:
     sim = dojo.Simulator(Mechanism([body], [joint]), time_step=0.01)
     with pytest.raises(ValueError, match="rest other than zero"):
         twin(sim)
+
+
+def test_orbital_joints_become_hinges_when_asked() -> None:
+    sim = dojo.Simulator(dojo.models.orbital(3), time_step=0.01)
+    with pytest.raises(ValueError, match="no joint that turns across an axis"):
+        twin(sim)
+    model = mujoco_scene.load(numbers(sim), 0.01, hinges=True)
+    assert (model.nq, model.nv, model.nu) == (4, 4, 4)
+    # near zero they move alike
+    x = 1e-4 * np.array([1.0, -2.0, 0.5, 1.5, 0, 0, 0, 0])
+    data = mujoco_scene.state(model, x)
+    mujoco.mj_step(model, data)
+    step = sim.replace(time_step=0.01).step(sim.start(x[:4], x[4:]))
+    np.testing.assert_allclose(data.qpos, step.x[:4], atol=5e-6)

@@ -104,3 +104,18 @@ def test_states_are_checked_once():
         horizon.states("ilqr(states=...)", xs)
     with pytest.raises(ValueError, match=r"Simulator.horizon\(knots=...\): expected a whole number >= 1"):
         HOPPER.horizon(0)
+
+
+def test_linearize_rollout_is_rollout_and_linearization():
+    """In one pass: the states of the one, the derivatives of the other; a step without solution raises."""
+    x, us = HOPPER.neutral(), np.tile([0.1, -0.2, 40.0], (T, 1))
+    xs, line = HOPPER.linearize_rollout(x, us)
+    t = HOPPER.rollout(x, us, throw=True)
+    other = HOPPER.linearize_trajectory(t.x, us)
+    np.testing.assert_allclose(xs, t.x, atol=1e-9)
+    np.testing.assert_allclose(line.A, other.A, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(line.B, other.B, rtol=1e-4, atol=1e-6)
+    assert line.status.tolist() == [0] * T
+    np.testing.assert_array_equal(line.x_next, xs[1:])
+    with pytest.raises(dojo.SimulationError, match=r"Simulator\.linearize_rollout: step 0"):
+        HOPPER.replace(max_iterations=1).linearize_rollout(x + 0.1 * np.eye(HOPPER.nx)[2], us)

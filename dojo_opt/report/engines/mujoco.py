@@ -29,7 +29,7 @@ class MuJoCo:
     """
 
     integrator: str
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
     rounds: int = 3  # a run shorter than a second is clocked so many times
     contacts: Mapping[str, Sequence[float]] = field(default_factory=dict)
     label: str = ""  # names what is not default

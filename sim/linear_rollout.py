@@ -1,0 +1,37 @@
+"""A rollout with the derivatives of its steps in one pass: a step is solved once, and differentiated where it ends."""
+
+from __future__ import annotations
+
+from sim.gradients import gradient
+from sim.layout import model_view, work_view
+from sim.model import Guess, Vector
+from sim.rollout import Linearized, begin
+from sim.step import step
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_SINGULAR = int(Status.SINGULAR)
+
+
+@kernel
+def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized) -> int:
+    """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from line.xs[0]; returns the number of solved steps.
+
+    line.xs: (T + 1, nx), of which the first row is given; x_next is not used.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    options = begin(work, settings)
+    nq = work.theta1.shape[0]
+    for t in range(line.us.shape[0]):
+        x = line.xs[t]
+        report = line.reports[t]
+        guess = Guess(x[nq:], t > 0)
+        if step(model, work, options, x, line.us[t], guess, line.xs[t + 1], report) != _SOLVED:
+            return t
+        if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], line.A[t], line.B[t]):
+            report[0] = _SINGULAR
+            return t
+    return line.us.shape[0]
