@@ -46,6 +46,7 @@ __all__ = [
     "Sphere",
     "Status",
     "String",
+    "Terrain",
     "Trajectory",
     "UrdfError",
     "UrdfMechanism",
@@ -97,6 +98,7 @@ _HOME: dict[str, str | None] = {
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "String": "sim.shapes",
+    "Terrain": "sim.terrain",
     "Trajectory": "sim.results",
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
@@ -140,6 +142,7 @@ if TYPE_CHECKING:
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
+    from sim.terrain import Terrain
     from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.descent import Descent
+from dojo_opt.fit import first_fit
 from dojo_opt.journal import Journal
 from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
@@ -28,7 +29,7 @@ _SHARPER = 0.1  # of kappa_grad where its derivatives lead nowhere
 _PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
 _CREEPING = 15  # short or rejected steps in a row: of 116 gaits and hops that are planned, none takes more than 11
 _FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
-_FITS = 2.0  # times the least sum of squared gaps: what counts as a good fit of a guess
+_FALLEN = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
 _SMALL = 1e-9  # merit below which changes are judged absolutely
 
 
@@ -68,23 +69,10 @@ class Continuation:
         self._known: tuple[float, Any] | None = None  # derivatives at the first iterate, and their smoothing
 
     def first_stage(self, stages: tuple[Stage, ...]) -> int:
-        """Which stage a guess of states begins with: the smoothest at which it fits nearly as well as at any.
-
-        A good reference leaves small gaps at a hard contact and large ones at a smooth one, where contact begins above
-        the ground; to smooth it first would only lead away from it. A poor one fits nowhere, and needs all the stages.
-        """
+        """Which stage the first iterate begins with."""
         if self.kappa is not None or len(stages) == 1:
             return 0
-        now, fits = self.now, []
-        for stage in stages:
-            linear = self._horizon.linearize(now.x, now.u, stage.kappa_eval)
-            gaps = self._horizon.gaps(linear, now.x)
-            fits.append((float(np.sum(gaps**2)) if not np.any(linear.status) else np.inf, linear))
-        best = min(misfit for misfit, _ in fits)
-        if best == np.inf:
-            return 0
-        chosen = next(i for i, (misfit, _) in enumerate(fits) if misfit <= _FITS * best)
-        self._known = stages[chosen].kappa_eval, fits[chosen][1]
+        chosen, self._known = first_fit(self._horizon, self.now, stages)
         return chosen
 
     def remeasure(self) -> None:
@@ -170,7 +158,7 @@ class Continuation:
             short = 0 if alpha >= _POOR_STEP else short + 1
             if rejected >= self._options.rejections and self._unstick(stage):
                 rejected = 0
-            elif rejected >= _PATIENCE * self._options.rejections or short >= _CREEPING:
+            elif rejected >= self._patience(stage) * self._options.rejections or short >= _CREEPING:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
                 slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
@@ -187,18 +175,32 @@ class Continuation:
             return 1 if alpha >= _GOOD_STEP else _SLOW
         return _SLOW_OPEN if promising else _SLOW
 
+    def _patience(self, stage: Stage) -> int:
+        """How many times the allowed rejections end a stage; open gaps may be closed in the stages to come."""
+        return 1 if self.now.gaps is not None and stage is not self._options.stages[-1] else _PATIENCE
+
     def _unstick(self, stage: Stage) -> bool:
         """After several failed line searches: close open gaps, else bring the derivatives nearer to the rollouts."""
         if self.now.gaps is not None:
-            # gains without the regularisation of the failures, which leads to open-loop rollouts
-            self._descent.reset_regularization()
-            return self._descent.gains(self.now).status == Status.SOLVED and self.roll_with_gains(stage.kappa_eval)
+            return self._close(stage)
         if self._kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
             return False
         self._kappa_grad = max(_SHARPER * self._kappa_grad, stage.kappa_eval)
         self._descent.reset_regularization()
         self._fresh = False
         return True
+
+    def _close(self, stage: Stage) -> bool:
+        """Close the gaps by a rollout; False where that falls over, but the last stage must not leave gaps."""
+        # gains without the regularisation of the failures, which leads to open-loop rollouts
+        self._descent.reset_regularization()
+        before, fresh = self.now, self._fresh
+        if self._descent.gains(before).status != Status.SOLVED or not self.roll_with_gains(stage.kappa_eval):
+            return False
+        if stage is self._options.stages[-1] or self.now.merit <= _FALLEN * before.merit:
+            return True
+        self.now, self._fresh = before, fresh
+        return False
 
     def _advance(self, stage: Stage, promise: Promise) -> float:
         """One line search, and the regularisation that follows from its step size."""

@@ -179,7 +179,8 @@ def leap(
     the pose itself; squares of place weigh 1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`, and
     the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
     shooting. It asks for the height and does not insist: the base rises by .15, .22 and .26 m for .15, .2 and .25 m.
-    Its gains know one landing only: at a finer time step than the plan's, most of these leaps stumble at it.
+    At a finer time step than the plan's most of these leaps stumble at their landing, which their gains know at one
+    instant only; `ilqr(problem.refined(5), warm_start=plan)` makes them land at 1 ms, too.
     """
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step)
     horizon = max(2, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))

@@ -19,10 +19,12 @@ class Stage(NamedTuple):
 
 
 # Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
+# Derivatives are those of the rollouts throughout: a smoother kappa_grad costs a linearisation more per iteration.
 CONTINUATION = (
     Stage(3e-2, 3e-2),
     Stage(3e-3, 3e-3),
-    Stage(1e-6, 1e-4),
+    Stage(1e-4, 1e-4),
+    Stage(1e-6, 1e-6),
 )
 
 
@@ -50,7 +52,7 @@ class Options:
     ascent: float = 2.0  # with open gaps: allowed multiple of a predicted increase
     halvings: int = 6  # of the step size
     rejections: int = 2  # failed line searches in a row before gaps are closed by force or derivatives sharpened
-    shooting: float = 0.1  # with open gaps, a shorter step is compared with one of multiple shooting
+    shooting: float = 1.0  # with open gaps, a shorter step is compared with one of multiple shooting
     time_limit: float = float("inf")  # [s]
     callback: Callable[[dict[str, Any]], None] | None = None  # once per iteration; may raise StopIteration
     verbose: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -93,6 +94,20 @@ class Problem:
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    def refined(self, count: int = 5) -> Problem:
+        """The same problem with every time step cut into `count`: same knots, inputs and terms.
+
+        A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
+        shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
+        """
+        if isinstance(count, bool) or int(count) != count or count < 1:
+            raise ValueError(f"Problem.refined(count): expected a positive number of steps per step, got {count!r}")
+        finer = copy.copy(self)
+        finer.sim = self.sim.replace(time_step=self.sim.time_step / int(count))
+        finer.substeps = self.substeps * int(count)
+        finer.bind()
+        return finer
 
     def bind(self) -> None:
         """Make the terms of `specs` anew, with arrays and compiled functions of their own."""

@@ -17,7 +17,9 @@ from sim import (
     pair_stiffness,
     pairs,
     pyramid,
+    restitution,
     swing,
+    terrain_contact,
 )
 from sim.contact_report import report_contacts, report_pairs, worst_contact
 from sim.gradients import gradient
@@ -27,6 +29,7 @@ from sim.limits import add_limit_derivatives
 from sim.model import Law, Model
 from sim.newton import newton
 from sim.step import step
+from sim.terrain_far import evaluate_on_terrain
 from solvers.late import LateKernel
 
 _LOOPS = (
@@ -56,6 +59,14 @@ _PYRAMIDS = (
     pyramid.pyramid_constant,
     pyramid.recover_pyramid,
 )
+_TERRAIN = (
+    terrain_contact.place_on_terrain,
+    terrain_contact.turn_on_terrain,
+    terrain_contact.add_frame_matrix,
+    terrain_contact.terrain_gap,
+    evaluate_on_terrain,
+)
+_IMPACTS = (restitution.find_impacts, restitution.subtract_floors, restitution.gained_energy)
 _COUPLING_GRADIENT = (
     coupling_gradient.add_coupling_composites,
     coupling_gradient.add_coupling_derivatives,
@@ -97,6 +108,10 @@ def bind_step(model: Model) -> None:
         _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
+    if np.any(model.contact_terrain):
+        _bind(model, _TERRAIN)
+    if np.any(model.contact_restitution):
+        _bind(model, _IMPACTS)
 
 
 def bind_gradient(model: Model) -> None:
@@ -114,3 +129,7 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
     if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)
+    if np.any(model.contact_restitution):
+        _bind(model, (restitution.add_bounce_composites,))
+        if len(model.pair_kind):
+            _bind(model, (restitution.add_bounce_derivatives,))

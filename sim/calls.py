@@ -87,6 +87,7 @@ class Calls:
         kept = self._scratch.__dict__.setdefault("works", [])
         while len(kept) < count:
             kept.append(allocate_work(self.sizes))
+            kept[-1].contact_frame[:] = self.model.contact_frame
         if len(self._scratch.__dict__.get("tables", ())) < count:
             self._scratch.tables = np.array([table(work) for work in kept])
         return self._scratch.tables[:count]

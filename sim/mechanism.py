@@ -15,6 +15,8 @@ from sim.closing import carried
 from sim.collisions import Collision, Touch, touches
 from sim.gear import Gear, check_gears
 from sim.parts import WORLD, Body, Contact, Input, Joint
+from sim.shapes import Solid
+from sim.terrain import Terrain
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,45 @@ class Mechanism:
         i = self.joint_names.index(checks.one_of("Mechanism.v_slice(joint)", joint, self.joint_names))
         start = sum(j.nv for j in self.joints[:i])
         return slice(start, start + self.joints[i].nv)
+
+    def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
+        """This mechanism and another one, in one: its bodies, joints, contacts, inputs and collisions after ours.
+
+        pose     where the world of `other` is put: translation (3,) [m], or with a quaternion (7,). Its joints with the
+                 world, its obstacles and its neutral state move there; its contacts touch the ground that they touched
+                 before, and inputs along world axes keep them
+        prefix   put before every name of `other`; a ValueError says which name both have
+        """
+        from sim.scene import added
+
+        return added(self, other, pose, prefix, name or self.name)
+
+    def on(self, terrain: Terrain, contacts: Sequence[str] | None = None) -> Mechanism:
+        """The same on other ground, under all contacts or those named; it stands there as high as it touches.
+
+        Contacts keep their friction; what normal and height they had is replaced.
+        """
+        from sim.scene import on_terrain
+
+        return on_terrain(self, terrain, contacts)
+
+    def with_collisions(self, *collisions: Collision) -> Mechanism:
+        """The same with more collisions."""
+        from sim.scene import with_collisions
+
+        return with_collisions(self, collisions)
+
+    def with_obstacle(
+        self, shape: Solid, bodies: Sequence[str] | None = None, name: str = "obstacle", **options: Any
+    ) -> Mechanism:
+        """The same with a fixed obstacle, placed in world axes by its centre and orientation.
+
+        What touches the ground touches it too: the balls of the contacts; or, when given, the shapes of `bodies`.
+        options: of Collision (friction, law, restitution).
+        """
+        from sim.scene import with_obstacle
+
+        return with_obstacle(self, shape, bodies, name, **options)
 
     def _name_inputs(self, call: str) -> tuple[Input, ...]:
         """The inputs with names, after a look at what they act on."""

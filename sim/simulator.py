@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim import wrenches as pushed
 from sim.border import whole
 from sim.calls import Settings
 from sim.describe import describe
@@ -27,6 +28,7 @@ from sim.results import (
     error_of,
 )
 from sim.states import States
+from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
@@ -110,8 +112,12 @@ class Simulator(States):
         """
         return left_out(self, x, u)
 
-    def step(self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False) -> StepResult:
-        """One time step from x under the input u (zero when left out)."""
+    def step(
+        self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False, wrenches: Wrenches | None = None
+    ) -> StepResult:
+        """One time step from x under the input u (zero when left out); wrenches (nbody, 6) as in `rollout`."""
+        if wrenches is not None:
+            return pushed.step(self, x, u, wrenches, throw)
         state = self._border.state("step", x)
         us = self._border.inputs("step", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         knot, xs, reports, contacts = self._calls.roll(state, us[None])
@@ -128,8 +134,16 @@ class Simulator(States):
             contacts_of(self.mechanism, self.time_step, contacts[0]),
         )
 
-    def rollout(self, x: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Trajectory:
-        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so."""
+    def rollout(
+        self, x: ArrayLike, us: ArrayLike, *, throw: bool = False, wrenches: Wrenches | None = None
+    ) -> Trajectory:
+        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so.
+
+        wrenches: external ones, (T, nbody, 6), or {body: (6,) or (T, 6)}; a force at the centre of mass [N], then a
+        torque [N m], both in world axes and constant over a step.
+        """
+        if wrenches is not None:
+            return pushed.rollout(self, x, us, wrenches, throw)
         state = self._border.state("rollout", x)
         inputs = self._border.inputs("rollout", "us", us, (None, self.nu))
         knot, xs, reports, contacts = self._calls.roll(state, inputs)
@@ -168,7 +182,7 @@ class Simulator(States):
             x[knot + 1 :] = x[knot]
         return Batch(xs, status, knots)
 
-    def closed_loop(
+    def closed_loop(  # noqa: PLR0913
         self,
         x0: ArrayLike,
         us: ArrayLike,
@@ -180,6 +194,7 @@ class Simulator(States):
         limits: tuple[ArrayLike, ArrayLike] | None = None,
         substeps: int = 1,
         kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Shot:
         """Rollout under a policy, each knot `substeps` steps with u held:
 
@@ -187,9 +202,12 @@ class Simulator(States):
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
         us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
-        of u.
+        of u; wrenches (T, nbody, 6) as in `rollout`, held over a knot.
         It stops at the first knot that cannot be solved.
         """
+        if wrenches is not None:
+            gains: dict[str, Any] = {"xs": xs, "ks": ks, "Ks": Ks, "gaps": gaps, "alpha": alpha, "limits": limits}
+            return pushed.closed_loop(self, x0, us, wrenches, substeps=substeps, kappa=kappa, **gains)
         call = "closed_loop"
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
         name = f"Simulator.{call}"
@@ -215,11 +233,20 @@ class Simulator(States):
 
     # ---- derivatives
 
-    def linearize(self, x: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None) -> tuple[Floats, Floats]:
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+    ) -> tuple[Floats, Floats]:
         """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
 
         By the implicit function theorem, in tangent coordinates. An unsolved step raises SimulationError.
+        wrenches (nbody, 6) as in `rollout` are constants.
         """
+        if wrenches is not None:
+            return pushed.linearize(self, x, u, wrenches, kappa)
         state = self._border.state("linearize", x)
         us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         A, B, _, report = self._calls.linearize_one(state, us, self._border.kappa("linearize", kappa))
@@ -242,12 +269,19 @@ class Simulator(States):
         return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
 
     def linearize_trajectory(
-        self, xs: ArrayLike, us: ArrayLike, substeps: int = 1, kappa: float | None = None
+        self,
+        xs: ArrayLike,
+        us: ArrayLike,
+        substeps: int = 1,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Linearization:
         """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
 
-        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu).
+        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu); wrenches: (T, nbody, 6) as in `rollout`.
         """
+        if wrenches is not None:
+            return pushed.linearize_trajectory(self, xs, us, wrenches, substeps, kappa)
         call = "Simulator.linearize_trajectory"
         inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
         states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))

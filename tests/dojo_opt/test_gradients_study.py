@@ -106,7 +106,6 @@ def test_mujoco_jacobians_are_chained_as_its_motion_is_differenced():
 def test_drake_gets_the_same_robot():
     """A tumbling hopper in the air: one step of Drake, to first order ours; and its Jacobian against its differences."""
     pytest.importorskip("pydrake")
-    from dojo_opt.report.drake_scene import DrakeScene
     from dojo_opt.report.gradients.drake_step import DrakeStep
 
     h = 1e-4
@@ -114,24 +113,23 @@ def test_drake_gets_the_same_robot():
     x = sim.integrate(sim.neutral(), np.random.default_rng(1).normal(size=sim.ndx))
     x[2] += 5.0
     u = np.array([0.0, 0.0, 20.0])
-    step = DrakeStep(sim.model, h, "kLagged")
+    step = DrakeStep(sim.model, h, "Lagged")
     step.settle(x, u, 20)
     ours = sim.rollout(x, np.tile(u, (20, 1))).x[-1]
-    np.testing.assert_allclose(step._x, DrakeScene(sim.model, h).state(ours), atol=2e-2 * 20 * h)
+    np.testing.assert_allclose(step._x, step.state(ours), atol=2e-2 * 20 * h)
     assert relative_error(step.autodiff()(), step.reference().value) < 1e-8
 
 
 def test_what_drake_cannot_be_told_is_refused():
     pytest.importorskip("pydrake")
-    from dojo_opt.report.drake_scene import DrakeScene
     from dojo_opt.report.gradients.drake_step import DrakeStep
 
-    step = DrakeStep(dojo.Simulator(dojo.models.block()).model, 0.01, "kSap")
+    step = DrakeStep(dojo.Simulator(dojo.models.block()).model, 0.01, "Sap")
     with pytest.raises(ValueError, match="no input that does not act on a joint"):
         step.settle(np.zeros(13), np.ones(3), 1)
-    ball = dojo.Mechanism([dojo.Body("b", 1.0, inertia=np.ones(3))], [dojo.Joint("spherical", None, "b")])
-    with pytest.raises(ValueError, match="3 rotations"):
-        DrakeScene(dojo.Simulator(ball).model, 0.01)
+    ball = dojo.Mechanism([dojo.Body("b", 1.0, inertia=np.ones(3))], [dojo.Joint("spherical", None, "b", spring=1.0)])
+    with pytest.raises(ValueError, match="a ball joint has no spring"):
+        DrakeStep(dojo.Simulator(ball).model, 0.01, "Sap")
 
 
 def test_touch_down_is_half_way_at_the_touch_and_bounded_by_hard_contact():

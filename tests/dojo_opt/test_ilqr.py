@@ -14,6 +14,7 @@ from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.planner import Solver, ilqr
 from dojo_opt.problem import Problem
+from dojo_opt.problems import hop
 from dojo_opt.shooting import Shooting
 from solvers.status import MESSAGES, Status
 
@@ -420,3 +421,15 @@ def test_steps_of_all_states_are_taken_where_rollouts_are_lost():
     assert with_shooting.history[0]["alpha"] > 0.0 and with_shooting.history[0]["gap"] > 0.0
     assert without.history[0]["alpha"] == 0.0
     assert with_shooting.success and gaps(with_shooting.problem, with_shooting, 1e-4) < 1e-12
+
+
+def test_refined_keeps_knots_and_terms_and_cuts_the_steps():
+    problem = hop(substeps=2)
+    finer = problem.refined(3)
+    assert (finer.substeps, finer.horizon) == (6, problem.horizon)
+    assert finer.knot_time == pytest.approx(problem.knot_time) and problem.sim.time_step == 0.025
+    assert finer.costs[0] is not problem.costs[0]
+    np.testing.assert_array_equal(finer.costs[0].weight, problem.costs[0].weight)
+    for count in (0, 1.5, True):
+        with pytest.raises(ValueError, match="expected a positive number of steps per step"):
+            problem.refined(count)

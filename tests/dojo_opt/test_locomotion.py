@@ -81,6 +81,17 @@ def test_trot_from_standing_still_keeps_its_gains_while_gaps_are_open(damping, s
     assert max(record["mu"] for record in plan.history if record["gap"] > 0.0) < 100.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, settings",
+    [("trot", {"damping": 0.1}), ("walk", {}), ("pace", {}), ("bound", {"speed": 0.8}), ("turn", {}), ("jump", {})],
+)
+def test_weakly_damped_gaits_from_standing_still(name, settings):
+    plan = ilqr(getattr(problems, name)(guess="standing", **{"damping": 0.05, **settings}))
+    assert plan.success and plan.nit <= 90, plan.summary()
+    assert upright(plan.x).min() > 0.9
+
+
 @pytest.mark.parametrize("name, iterations", [("pace", 40), ("walk", 20), ("turn", 30)])
 def test_other_gaits(name, iterations):
     problem = getattr(problems, name)()
@@ -92,7 +103,7 @@ def test_bound_leaves_the_ground(guess, iterations):
     problem = problems.bound(guess=guess)
     plan = ilqr(problem)
     check(problem, plan, iterations, tilt=0.9, off=0.06)
-    assert lowest_foot(problem, plan).max() > 0.01
+    assert lowest_foot(problem, plan).max() > 0.003
     loaded = motion(plan).normal_force > 2.0
     front, hind = loaded[:, 0] | loaded[:, 1], loaded[:, 2] | loaded[:, 3]
     assert (front & ~hind).any() and (hind & ~front).any()
@@ -112,18 +123,26 @@ def test_jump_leaves_the_ground(guess, iterations):
 def test_jump_up():
     problem = problems.jump(distance=0.0, height=0.3, crouch=0.12)
     plan = ilqr(problem)
-    check(problem, plan, 10)
+    check(problem, plan, 10, off=0.025)
     assert plan.x[:, 2].max() - plan.x[0, 2] > 0.29
 
 
-def test_leap_is_found_from_standing_and_a_goal():
-    problem = problems.leap(distance=0.3, height=0.2)
+@pytest.mark.parametrize("height", [0.2, 0.25])
+def test_leap_is_found_from_standing_and_a_goal(height):
+    """With steps of 20 ms it may stumble when it is replayed with shorter ones; cut into five, it holds at 1 ms."""
+    problem = problems.leap(distance=0.3, height=height)
     assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
-    plan = ilqr(problem)
-    check(problem, plan, 90)
+    coarse = ilqr(problem)
+    assert coarse.success and coarse.nit <= 90, coarse.summary()
+    plan = ilqr(problem.refined(5), warm_start=coarse)
+    assert plan.success and plan.nit <= 50, plan.summary()
     assert plan.x[:, 2].max() - plan.x[0, 2] > 0.2
     assert lowest_foot(problem, plan).max() > 0.1
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.3, abs=2e-3)
+    hard = problem.sim.replace(time_step=1e-3, kappa=1e-8)
+    shot = hard.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=problem.control_limits)
+    assert shot.status == 0 and upright(shot.x).min() > 0.99
+    assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 5e-3
 
 
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])

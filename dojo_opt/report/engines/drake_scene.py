@@ -43,11 +43,14 @@ def load(model: Model, time_step: float, approximation: str = "") -> Plant:
     logging.getLogger("drake").setLevel(logging.ERROR)  # it warns of every half-space
     if len(model.coupling_body) + len(model.gear_dof):
         raise ValueError("Drake: collisions between bodies and closed loops and gears are not represented")
+    if model.contact_terrain.any() or model.contact_restitution.any():
+        raise ValueError("Drake: terrain and restitution are not represented")
     if not approximation and len(model.limit_dof):
         raise ValueError("Drake: a continuous plant has no limits of joints")
     builder = DiagramBuilder()
     plant, graph = AddMultibodyPlantSceneGraph(builder, time_step if approximation else 0.0)
     if approximation:
+        plant.SetUseSampledOutputPorts(False)  # a step is then an update of the discrete state alone
         plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, f"k{approximation}"))
     plant.mutable_gravity_field().set_gravity_vector(model.gravity)
     count = len(model.body_mass)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.drake_scene import DrakeScene
+from dojo_opt.report.engines.drake import write
+from dojo_opt.report.engines.drake_scene import load, scalar_joints
 from dojo_opt.report.gradients.differences import Reference, extrapolated
 from sim.model import InputKind, Model, Vector
 
 Matrix = NDArray[np.float64]
 
-APPROXIMATIONS = ("kLagged", "kSap")  # its default, and its convex one
+APPROXIMATIONS = ("Lagged", "Sap")  # its default, and its convex one
 
 
 class DrakeStep:
@@ -24,7 +24,7 @@ class DrakeStep:
     """
 
     def __init__(self, model: Model, time_step: float, approximation: str) -> None:
-        self._scene = DrakeScene(model, time_step, approximation)
+        self._model, self._scene = model, load(model, time_step, approximation)
         self._plant, self._diagram = self._scene.plant, self._scene.diagram
         self._root = self._diagram.CreateDefaultContext()
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
@@ -33,9 +33,14 @@ class DrakeStep:
         """Take the steps, and stay where they end."""
         self._force = self._generalized(u)
         self._plant.get_applied_generalized_force_input_port().FixValue(self._context, self._force)
-        self._x = self._scene.state(start)
+        self._x = self.state(start)
         for _ in range(steps):
             self._x = self._step(self._x)
+
+    def state(self, x: Vector) -> Vector:
+        """Drake's discrete state [q; v] of our state x (nx,)."""
+        write(self._model, self._scene, self._context, x)
+        return np.array(self._context.get_discrete_state_vector().value())
 
     def reference(self) -> Reference:
         """By extrapolated differences."""
@@ -72,11 +77,11 @@ class DrakeStep:
 
     def _generalized(self, u: Vector) -> Vector:
         """Inputs as forces on joints with one degree of freedom."""
-        model: Any = self._scene.model
+        joints = scalar_joints(self._model, self._scene)
         force = np.zeros(self._plant.num_velocities())
         for k in np.flatnonzero(u):
-            start = self._scene.velocity_of(int(model.input_index[k])) if model.input_kind[k] == InputKind.JOINT else -1
-            if start < 0:
+            dof = int(self._model.input_index[k])
+            if self._model.input_kind[k] != InputKind.JOINT or dof not in joints:
                 raise ValueError(f"DrakeStep: no input that does not act on a joint with one degree of freedom ({k})")
-            force[start] += u[k]
+            force[joints[dof].velocity_start()] += u[k]
         return force

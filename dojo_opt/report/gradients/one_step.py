@@ -209,7 +209,7 @@ def _drake(scene: Scene) -> tuple[list[Point], Cases]:
         step = DrakeStep(scene.sim.model, scene.sim.time_step, approximation)
         step.settle(scene.start, scene.u, scene.steps)
         jacobian, reference = step.autodiff(), step.reference()
-        name = f"Drake {approximation[1:]}, {AUTODIFF}"
+        name = f"Drake {approximation}, {AUTODIFF}"
         points.append(Point(name, None, None, relative_error(jacobian(), reference.value), reference.doubt, np.nan))
 
         def clocked(jacobian: Callable[[], Any] = jacobian) -> None:
