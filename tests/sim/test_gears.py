@@ -152,3 +152,19 @@ def test_couplings_of_mjcf() -> None:
     data.qpos[:] = x[:2]
     mujoco.mj_forward(model, data)
     assert mech.gears[0].name == "g" and abs(data.efc_pos[0]) < 1e-10
+
+
+def test_gears_and_acting_loops_come_along_when_mechanisms_are_added() -> None:
+    """Beside one another, and as alone."""
+    alone, both = robot(), robot().add(robot(), (2.0, 0.0, 0.0), prefix="b/")
+    assert [g.name for g in both.gears] == ["left", "rack", "b/left", "b/rack"]
+    linkage = fourbar("pin", spring=3.0)
+    loops = linkage.add(linkage, (3.0, 0.0, 0.0), prefix="b/")
+    for mech, single in ((both, alone), (loops, linkage)):
+        sim, one = (dojo.Simulator(m, time_step=0.01, tolerance=1e-11) for m in (mech, single))
+        t, r = (s.rollout(s.neutral(), np.full((10, s.nu), 0.1), throw=True).x[-1] for s in (sim, one))
+        assert sim.loop_rank().mobility == 2 * one.loop_rank().mobility
+        joint = mech.joint_names[-1]
+        at, own = mech.q_slice(joint), single.q_slice(single.joint_names[-1])
+        assert one.nq * 2 == sim.nq
+        np.testing.assert_allclose(t[at], r[own], atol=1e-8)
