@@ -47,6 +47,7 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
     add_bounce_derivatives(model, work)
     add_coupling_derivatives(model, work)
     add_swing_curvature(model, work, q)  # needs `subtree`, which the couplings use up
