@@ -26,6 +26,7 @@ __all__ = [
     "Contact",
     "Cylinder",
     "Disturbances",
+    "Gear",
     "HalfSpace",
     "Input",
     "Joint",
@@ -45,6 +46,7 @@ __all__ = [
     "Sphere",
     "Status",
     "String",
+    "Terrain",
     "Trajectory",
     "UrdfError",
     "UrdfMechanism",
@@ -78,6 +80,7 @@ _HOME: dict[str, str | None] = {
     "Disturbances": "dojo_opt.plant.disturbances",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
+    "Gear": "sim.gear",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
     "MPC": "dojo_opt.mpc.controller",
@@ -95,6 +98,7 @@ _HOME: dict[str, str | None] = {
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
     "String": "sim.shapes",
+    "Terrain": "sim.terrain",
     "Trajectory": "sim.results",
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
@@ -131,12 +135,14 @@ if TYPE_CHECKING:
     from dojo_opt.rest import equilibrium
     from dojo_opt.tracking import tracking_gains
     from sim.collisions import Collision
+    from sim.gear import Gear
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
     from sim.parts import Body, Contact, Input, Joint
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
+    from sim.terrain import Terrain
     from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status
 

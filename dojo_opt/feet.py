@@ -55,7 +55,8 @@ class Feet:
 
     def gaps(self, x: ArrayLike) -> Array:
         """Distances (..., k) of the balls from the ground [m]."""
-        return np.asarray(np.sum(self.positions(x) * self.normal, axis=-1) - self.height - self.radius)
+        at = self.positions(x)
+        return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
 
     def jacobian(self, x: ArrayLike) -> Array:
         """d(positions)/d(dq), (..., k, 3, nv), by central differences."""

@@ -17,11 +17,13 @@ from dojo_opt.motion import Motion, motion
 from sim import shapes
 from sim.parts import WORLD
 from sim.simulator import Simulator
+from sim.terrain import Terrain
 
 __all__ = ["save_html"]
 
 FRAMES = 60  # per second of the animation
 _THICK = 0.002  # of a drawn plane [m]
+_AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
 _PAGE = """<!DOCTYPE html>
 <html>
@@ -68,14 +70,19 @@ def _page(m: Motion, commands: list[Any]) -> str:
 
 
 def _ground(m: Motion) -> list[Any]:
-    """Commands that draw every plane that contacts touch; level ground at height zero is MeshCat's grid."""
+    """Commands that draw all ground that contacts touch; level ground at height zero is MeshCat's grid."""
     from meshcat import geometry
     from meshcat.commands import SetObject, SetTransform
     from meshcat.path import Path as Node
 
-    planes = dict.fromkeys((tuple(np.round(np.asarray(c.normal), 9)), c.height) for c in m.mechanism.contacts)
-    commands = []
+    level = [c for c in m.mechanism.contacts if c.terrain is None]
+    planes = dict.fromkeys((tuple(np.round(np.asarray(c.normal), 9)), c.height) for c in level)
     earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
+    hills = dict.fromkeys((c.terrain, c.height) for c in m.mechanism.contacts if c.terrain is not None)
+    commands = []
+    for k, (terrain, height) in enumerate(hills):
+        surface = geometry.TriangularMeshGeometry(*_surface(m, terrain, height))
+        commands.append(SetObject(surface, earth, Node(("meshcat", "ground", f"terrain{k}"))))
     for k, (normal, height) in enumerate(planes):
         if (normal, height) == ((0.0, 0.0, 1.0), 0.0):
             continue
@@ -88,6 +95,18 @@ def _ground(m: Motion) -> list[Any]:
         node = Node(("meshcat", "ground", str(k)))
         commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]
     return commands
+
+
+def _surface(m: Motion, terrain: Terrain, height: float) -> tuple[Any, Any]:
+    """Vertices (n, 3) and triangles (k, 3) of the ground around the motion."""
+    low = m.position[..., :2].min(axis=(0, 1)) - _AROUND
+    high = m.position[..., :2].max(axis=(0, 1)) + _AROUND
+    lines = [np.linspace(a, b, min(_LINES, int((b - a) / _FINE) + 2)) for a, b in zip(low, high, strict=True)]
+    X, Y = np.meshgrid(*lines, indexing="ij")
+    vertices = np.stack([X, Y, terrain.height(X, Y) + height], axis=-1).reshape(-1, 3)
+    corner = np.arange(X.size).reshape(X.shape)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
+    return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def _scene(m: Motion) -> list[Any]:

@@ -7,7 +7,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim import ball_spring, cone_limit, coupling, coupling_gradient, loops, pair_stiffness, pairs, pyramid, swing
+from sim import (
+    ball_spring,
+    cone_limit,
+    coupling,
+    coupling_gradient,
+    gears,
+    loops,
+    pair_stiffness,
+    pairs,
+    pyramid,
+    restitution,
+    swing,
+    terrain_contact,
+)
 from sim.contact_report import report_contacts, report_pairs, worst_contact
 from sim.gradients import gradient
 from sim.inequalities import add_stiffness
@@ -16,6 +29,7 @@ from sim.limits import add_limit_derivatives
 from sim.model import Law, Model
 from sim.newton import newton
 from sim.step import step
+from sim.terrain_far import evaluate_on_terrain
 from solvers.late import LateKernel
 
 _LOOPS = (
@@ -45,6 +59,14 @@ _PYRAMIDS = (
     pyramid.pyramid_constant,
     pyramid.recover_pyramid,
 )
+_TERRAIN = (
+    terrain_contact.place_on_terrain,
+    terrain_contact.turn_on_terrain,
+    terrain_contact.add_frame_matrix,
+    terrain_contact.terrain_gap,
+    evaluate_on_terrain,
+)
+_IMPACTS = (restitution.find_impacts, restitution.subtract_floors, restitution.gained_energy)
 _COUPLING_GRADIENT = (
     coupling_gradient.add_coupling_composites,
     coupling_gradient.add_coupling_derivatives,
@@ -70,6 +92,12 @@ def bind_poses(model: Model) -> None:
         _bind(model, (ball_spring.add_spring_block,))
 
 
+def bind_smooth(model: Model) -> None:
+    """What steps of higher order need."""
+    if np.any(model.joint_nrot == 2):
+        _bind(model, (swing.swing_curvature,))
+
+
 def bind_step(model: Model) -> None:
     """What a time step needs: the interior point only where there are contacts or limits."""
     hard = len(model.contact_body) + len(model.limit_dof) > 0
@@ -80,10 +108,16 @@ def bind_step(model: Model) -> None:
         _bind(model, (ball_spring.spring_impulse,))
     if np.any(model.contact_law == int(Law.LINEAR)):
         _bind(model, _PYRAMIDS)
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _LOOPS)
+    if len(model.gear_dof):
+        _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
+    if np.any(model.contact_terrain):
+        _bind(model, _TERRAIN)
+    if np.any(model.contact_restitution):
+        _bind(model, _IMPACTS)
 
 
 def bind_gradient(model: Model) -> None:
@@ -99,5 +133,9 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (swing.swing_curvature,))
     if _has_ball_springs(model):
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)
+    if np.any(model.contact_restitution):
+        _bind(model, (restitution.add_bounce_composites,))
+        if len(model.pair_kind):
+            _bind(model, (restitution.add_bounce_derivatives,))

@@ -13,6 +13,7 @@ from sim.mechanism import Mechanism
 from sim.model import InputKind, Law, Model
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
+from sim.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +24,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
     """Counts of a mechanism; a limit is one bound of one degree of freedom."""
     nlimit = sum(len(_bounds(j)) for j in mech.joints)
     npair, npairs = len(mech.touches), len(couples(mech.touches))
+    fields = list(height_fields(mech).values())
     return Sizes(
         nbody=mech.nbody,
         nq=mech.nq,
@@ -32,8 +34,11 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         nu=len(mech.inputs or ()),
         npair=npair,
         ncoupling=npairs + len(mech.loops),
-        nrow=6 * npairs + sum(6 - j.nv for j in mech.loops),
+        nrow=6 * npairs + sum(6 - j.nv for j in mech.loops) + len(mech.gears),
         nloop=len(mech.loops),
+        ngear=len(mech.gears),
+        nterrain=len(fields),
+        nheight=sum(f.coefficients.size for f in fields),
     )
 
 
@@ -42,9 +47,11 @@ def pack(mech: Mechanism) -> Model:
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
     _pack_joints(mech.joints, model)
+    _pack_terrain(mech, model)
     _pack_contacts(mech, model)
     pack_collisions(mech, model)
     _pack_loops(mech, model)
+    _pack_gears(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
     return model
@@ -130,6 +137,31 @@ def _law(contact: Contact) -> Law:
     return Law[contact.law.upper()] if contact.friction > 0.0 else Law.IMPACT
 
 
+def height_fields(mech: Mechanism) -> dict[tuple[int, float], Terrain]:
+    """What the centres of the balls cannot sink below: one surface per terrain and radius."""
+    keys = {(id(c.terrain), float(c.radius)): c for c in mech.contacts if c.terrain is not None}
+    return {key: c.terrain.surface(c.radius) for key, c in keys.items() if c.terrain is not None}
+
+
+def _pack_terrain(mech: Mechanism, model: Model) -> None:
+    fields = height_fields(mech)
+    first = 0
+    for k, surface in enumerate(fields.values()):
+        P = surface.coefficients
+        model.terrain_size[k] = first, *P.shape
+        model.terrain_heights[first : first + P.size] = P.ravel()
+        model.terrain_place[k] = (
+            *np.asarray(surface.direction),
+            *np.asarray(surface.origin),
+            *(1.0 / np.asarray(surface.spacing)),
+            *surface.bounds,
+        )
+        first += P.size
+    for c, contact in enumerate(mech.contacts):
+        if contact.terrain is not None:
+            model.contact_terrain[c] = 1 + list(fields).index((id(contact.terrain), float(contact.radius)))
+
+
 def _pack_contacts(mech: Mechanism, model: Model) -> None:
     for c, contact in enumerate(mech.contacts):
         model.contact_body[c] = mech.body_names.index(contact.body)
@@ -137,6 +169,7 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
         model.contact_point[c] = np.asarray(contact.point)
         model.contact_radius[c] = contact.radius
         model.contact_friction[c] = contact.friction
+        model.contact_restitution[c] = contact.restitution
         model.contact_frame[c] = contact_frame(contact.normal).ravel()
         model.contact_height[c] = contact.height
     _pack_clusters(model)
@@ -146,10 +179,13 @@ def _pack_clusters(model: Model) -> None:
     """Contacts that follow one another on one body, against one direction: the ball around them (far.py)."""
     first, count = 0, len(model.contact_height)
     while first < count:
-        same = (model.contact_body[:count] == model.contact_body[first]) & np.all(
-            model.contact_frame == model.contact_frame[first], axis=1
+        level = model.contact_terrain == 0
+        same = (
+            (model.contact_body[:count] == model.contact_body[first])
+            & level
+            & np.all(model.contact_frame == model.contact_frame[first], axis=1)
         )
-        end = first + int(np.argmin(np.append(same[first:], False)))
+        end = first + int(np.argmin(np.append(same[first:], False))) if not model.contact_terrain[first] else first + 1
         points, radii = model.contact_point[first:end], model.contact_radius[first:end]
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         around = float(np.max(np.linalg.norm(points - centre, axis=1) + radii))
@@ -193,6 +229,13 @@ def _pack_loops(mech: Mechanism, model: Model) -> None:
         model.loop_axes[m, : fixed.size] = fixed.ravel()
         axis, first_across, second_across = contact_frame(joint.axis)
         model.loop_axis[m] = np.concatenate([first_across, second_across, axis])
+
+
+def _pack_gears(mech: Mechanism, model: Model) -> None:
+    for k, gear in enumerate(mech.gears):
+        ends = ((gear.joint, gear.dof), (gear.other, gear.other_dof))
+        model.gear_dof[k] = [model.body_vadr[mech.joint_names.index(name)] + dof for name, dof in ends]
+        model.gear_ratio[k], model.gear_offset[k] = gear.ratio, gear.offset
 
 
 def _pack_inputs(mech: Mechanism, model: Model) -> None:

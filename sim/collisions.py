@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sim import checks
 from sim.collision import kinds
 from sim.model import Law, Model
-from sim.parts import LAWS, WORLD
+from sim.parts import LAWS, WORLD, share
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class Collision:
     shape_a, shape_b   Sphere, Capsule, Box, Cylinder, or HalfSpace of b; left out, that of the body. With String on
                        both sides the bodies are tied together instead: their points keep within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
-    friction, law      as in Contact
+    friction, law, restitution     as in Contact
     """
 
     a: str
@@ -39,6 +39,7 @@ class Collision:
     friction: float = 0.5
     law: str = "nonlinear"
     name: str = ""  # default: a-b
+    restitution: float = 0.0
 
     def __post_init__(self) -> None:
         checks.name("Collision(a=...)", self.a)
@@ -56,6 +57,7 @@ class Collision:
         friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
         object.__setattr__(self, "friction", friction)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
+        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Touch:
     places: Floats  # (2, 12) centre and rotation of the shapes in their bodies
     friction: float
     law: str
+    restitution: float
 
 
 def touches(mech: Mechanism) -> list[Touch]:
@@ -114,6 +117,7 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
             places,
             collision.friction,
             collision.law,
+            collision.restitution,
         )
         for feature in range(number)
     ]
@@ -160,6 +164,7 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.contact_body[c] = touch.bodies[0]
         model.contact_law[c] = Law[touch.law.upper()] if touch.friction > 0.0 else Law.IMPACT
         model.contact_friction[c] = touch.friction
+        model.contact_restitution[c] = touch.restitution
         model.pair_coupling[j] = bodies.index(touch.bodies)
         model.pair_kind[j], model.pair_feature[j] = touch.kind, touch.feature
         model.pair_sizes[j] = touch.sizes

@@ -1,4 +1,4 @@
-"""Geometry of a sphere or point against a half-space at configuration 3, and its part of the Newton matrix.
+"""Geometry of a sphere or point against the ground at configuration 3, and its part of the Newton matrix.
 
     gap   phi = n.(x3 + R3 p) - radius - height
     slip  v_t = T ((x3 - x2)/h + omega x r),   r = R3 p - radius n,   omega = (2/h) s   with (c, s) the turn from 2 to 3
@@ -6,14 +6,17 @@
 The impulse f = n gamma + T^T beta acts at r from the centre of mass, as the wrench (f, r x f) in world axes (expressing
 the torque in the frame of configuration 3, as Dojo does, breaks angular momentum at O(h |omega|)).
 
-Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, 9:18 rows of the Jacobian of (gap, slip) by the rotation
-about O. Its columns for the translation are n, T/h.
+Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, then rows of the Jacobian of (gap, slip), 9:18 by the
+rotation about O, 18:27 by the translation, which of a half-space are n, T/h.
+
+contact_frame holds the rows n, T: those of the half-space, or on terrain those of the place (terrain_contact.py).
 """
 
 from __future__ import annotations
 
 from sim.model import Matrix, Model, Work
 from sim.rotation import cross, rotate
+from sim.terrain_contact import place_on_terrain, turn_on_terrain
 from solvers.jit import kernel
 
 
@@ -24,7 +27,10 @@ def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int
     for c in range(first, last):
         i = model.contact_body[c]
         k = work.contact_kin[c]
-        f = model.contact_frame[c]
+        f = work.contact_frame[c]
+        curved = model.contact_terrain[c] > 0
+        if curved:
+            place_on_terrain(model, work, c)
         point = model.contact_point[c]
         px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
         rho = model.contact_radius[c]
@@ -34,8 +40,9 @@ def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int
         vx += (work.pos3[i, 0] - work.pos2[i, 0]) / h
         vy += (work.pos3[i, 1] - work.pos2[i, 1]) / h
         vz += (work.pos3[i, 2] - work.pos2[i, 2]) / h
-        X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
-        k[0] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
+        if not curved:
+            X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
+            k[0] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
         k[1] = f[3] * vx + f[4] * vy + f[5] * vz
         k[2] = f[6] * vx + f[7] * vy + f[8] * vz
         k[3], k[4], k[5] = x, y, z
@@ -44,20 +51,24 @@ def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int
 
 @kernel
 def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
-    """Rotation part of d(gap, slip)/d(twist of configuration 3), about O:
+    """d(gap, slip)/d(twist of configuration 3), about O: by the translation, and by the rotation
 
-    gap     (d3 + R3 p) x n
-    slip    (d3 x t + c y + s x y)/h - R3 p x (omega x t),   y = r x t
+    gap     n        (d3 + R3 p) x n
+    slip    t/h      (d3 x t + c y + s x y)/h - R3 p x (omega x t),   y = r x t
+
+    and what a terrain adds because its frame changes from place to place.
     """
     i = model.contact_body[c]
     k = work.contact_kin[c]
-    f = model.contact_frame[c]
+    f = work.contact_frame[c]
     dx = work.pos3[i, 0] - work.origin[0]
     dy = work.pos3[i, 1] - work.origin[1]
     dz = work.pos3[i, 2] - work.origin[2]
     k[9], k[10], k[11] = cross(dx + k[6], dy + k[7], dz + k[8], f[0], f[1], f[2])
     w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
     g = 2.0 / h
+    for e in range(3):
+        k[18 + e], k[21 + e], k[24 + e] = f[e], f[3 + e] / h, f[6 + e] / h
     for e in range(1, 3):
         tx, ty, tz = f[3 * e], f[3 * e + 1], f[3 * e + 2]
         ax, ay, az = cross(dx, dy, dz, tx, ty, tz)
@@ -68,6 +79,8 @@ def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
         k[9 + 3 * e] = (ax + w * yx + bx) / h - g * mx
         k[10 + 3 * e] = (ay + w * yy + by) / h - g * my
         k[11 + 3 * e] = (az + w * yz + bz) / h - g * mz
+    if model.contact_terrain[c] > 0:
+        turn_on_terrain(model, work, h, c)
 
 
 @kernel
@@ -75,7 +88,7 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
     """out[body] -= wrench about O of the impulse n fn + t1 f1 + t2 f2 at contact c (accumulated)."""
     i = model.contact_body[c]
     k = work.contact_kin[c]
-    f = model.contact_frame[c]
+    f = work.contact_frame[c]
     x = f[0] * fn + f[3] * f1 + f[6] * f2
     y = f[1] * fn + f[4] * f1 + f[7] * f2
     z = f[2] * fn + f[5] * f1 + f[8] * f2
@@ -92,9 +105,7 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
 
 
 @kernel
-def add_contact_matrix(
-    model: Model, work: Work, h: float, c: int, fn: float, f1: float, f2: float, out: Matrix
-) -> None:
+def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= B^T W C + geometric term, about O (accumulated):
 
     C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench;
@@ -102,18 +113,15 @@ def add_contact_matrix(
     """
     i = model.contact_body[c]
     k = work.contact_kin[c]
-    F = model.contact_frame[c]
+    F = work.contact_frame[c]
     W = work.contact_W[c]
     A = out[i]
     ax = work.pos2[i, 0] - work.origin[0] + k[3]
     ay = work.pos2[i, 1] - work.origin[1] + k[4]
     az = work.pos2[i, 2] - work.origin[2] + k[5]
-    ih = 1.0 / h
     for j in range(6):
-        if j < 3:
-            c0, c1, c2 = F[j], ih * F[3 + j], ih * F[6 + j]
-        else:
-            c0, c1, c2 = k[6 + j], k[9 + j], k[12 + j]
+        q = 18 + j if j < 3 else 6 + j
+        c0, c1, c2 = k[q], k[q + 3], k[q + 6]
         gn = W[0] * c0 + W[1] * c1 + W[2] * c2
         g1 = W[3] * c0 + W[4] * c1 + W[5] * c2
         g2 = W[6] * c0 + W[7] * c1 + W[8] * c2
@@ -143,13 +151,11 @@ def add_contact_matrix(
 
 
 @kernel
-def contact_rate(model: Model, work: Work, h: float, c: int) -> tuple[float, float, float]:
+def contact_rate(model: Model, work: Work, c: int) -> tuple[float, float, float]:
     """d(gap, slip) = C twist, with the twists of the last solve."""
-    F = model.contact_frame[c]
     k = work.contact_kin[c]
     t = work.twist[model.contact_body[c]]
-    ih = 1.0 / h
-    d0 = F[0] * t[0] + F[1] * t[1] + F[2] * t[2] + k[9] * t[3] + k[10] * t[4] + k[11] * t[5]
-    d1 = ih * (F[3] * t[0] + F[4] * t[1] + F[5] * t[2]) + k[12] * t[3] + k[13] * t[4] + k[14] * t[5]
-    d2 = ih * (F[6] * t[0] + F[7] * t[1] + F[8] * t[2]) + k[15] * t[3] + k[16] * t[4] + k[17] * t[5]
+    d0 = k[18] * t[0] + k[19] * t[1] + k[20] * t[2] + k[9] * t[3] + k[10] * t[4] + k[11] * t[5]
+    d1 = k[21] * t[0] + k[22] * t[1] + k[23] * t[2] + k[12] * t[3] + k[13] * t[4] + k[14] * t[5]
+    d2 = k[24] * t[0] + k[25] * t[1] + k[26] * t[2] + k[15] * t[3] + k[16] * t[4] + k[17] * t[5]
     return d0, d1, d2

@@ -36,7 +36,7 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
         first = work.far_first[m]
         contact_kinematics(model, work, h, first, model.cluster_end[first])
     for c in range(model.contact_height.shape[0]):
-        _report_contact(model, work, c, model.contact_frame[c], out[c])
+        _report_contact(model, work, c, work.contact_frame[c], out[c])
     report_pairs(model, work, out)
 
 
@@ -62,5 +62,5 @@ def _report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) ->
         out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
         out[3 + e] = work.pos3[i, e] + k[3 + e]
         out[8 + e] = F[e]
-    out[6] = k[0]
+    out[6] = k[0] + work.bounce[c, 0]
     out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

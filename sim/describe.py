@@ -10,6 +10,7 @@ from sim.build import mechanism_sizes
 from sim.left_out import reach
 from sim.mechanism import Mechanism
 from sim.parts import Joint
+from sim.tableau import tableau
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator
@@ -24,12 +25,13 @@ def describe(sim: Simulator) -> str:
         f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
         "joints",
         *(_joint_line(mech, j) for j in mech.joints),
+        *_loop_lines(sim),
         "inputs",
         *(f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)),
         "contacts",
         *_contact_lines(mech),
         "a step",
-        *(f"  {what:<18}{state}" for what, state in _parts(mech)),
+        *(f"  {what:<18}{state}" for what, state in _parts(mech, sim.order)),
         *_far_lines(sim),
     ]
     return "\n".join(lines)
@@ -62,6 +64,16 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
     return f"  {joint.name:<18}{joint.kind:<16}{joint.parent} -> {joint.child}:  {at}{tail}"
 
 
+def _loop_lines(sim: Simulator) -> list[str]:
+    """What closes loops, and how many of its constraints say something new."""
+    loops, gears = sim.mechanism.loops, sim.mechanism.gears
+    if not loops and not gears:
+        return []
+    lines = [f"  {j.name:<18}{j.kind:<16}{j.parent} -> {j.child}:  {6 - j.nv} constraints" for j in loops]
+    lines += [f"  {g.name:<18}{'gear':<16}{g.joint} = {g.ratio:g} {g.other} + {g.offset:g}" for g in gears]
+    return ["loops", *lines, f"  {sim.loop_rank()}"]
+
+
 def _contact_lines(mech: Mechanism) -> list[str]:
     lines = []
     for c in mech.contacts:
@@ -82,7 +94,7 @@ def _far_lines(sim: Simulator) -> list[str]:
     return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
 
 
-def _parts(mech: Mechanism) -> list[tuple[str, str]]:
+def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     """What a step computes, and what it leaves out."""
     nlimit = mechanism_sizes(mech).nlimit
     cones = sum(c.friction > 0 and c.law == "nonlinear" for c in mech.contacts)
@@ -91,6 +103,8 @@ def _parts(mech: Mechanism) -> list[tuple[str, str]]:
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if mech.contacts or nlimit else "Newton's method; interior point left out"
+    if order > 2:
+        solver = f"none: {len(tableau(order)[1])} evaluations of the equations of motion"
     counts = (
         ("contacts", len(mech.contacts), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
         ("joint limits", nlimit, f"{nlimit} bounds"),

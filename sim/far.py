@@ -28,17 +28,22 @@ Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: larges
 
 from __future__ import annotations
 
-from sim.model import Matrix, Model, Options, Work
+from sim.model import Model, Options, Work
 from sim.rotation import rotate
+from sim.terrain_contact import terrain_gap
 from solvers.jit import kernel
 
 STIFFNESS = 1000.0  # largest e, in units of the tolerance
 
 
 @kernel
-def cluster_gap(model: Model, c: int, pos: Matrix, rot: Matrix) -> float:
-    """Lower bound of the gaps of the cluster that begins at contact c, at the poses pos (nbody, 3), rot (nbody, 9)."""
+def cluster_gap(model: Model, work: Work, c: int, third: bool) -> float:
+    """Lower bound of the gaps of the cluster that begins at contact c, at configuration 3 or 2."""
+    if model.contact_terrain[c] > 0:
+        return terrain_gap(model, work, c, third)
     i = model.contact_body[c]
+    pos = work.pos3 if third else work.pos2
+    rot = work.rot3 if third else work.rot2
     n = model.contact_frame[c]
     p = model.cluster[c]
     height = model.contact_height[c]
@@ -67,6 +72,8 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         n = model.contact_frame[c]
         most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
         most = 0.5 * (most + model.cluster[c, 4])  # no contact has more: a quick no, for most
+        if model.contact_terrain[c] > 0:
+            most = 1e9
         a = 0.0
         if most > 0.0 and _stiffness(model, options.h, c, most) <= least * most * most:
             a = _half_gap_ahead(model, work, c)
@@ -114,7 +121,7 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
     travel = 0.0
     for k in range(3):
         travel += abs(work.pos2[i, k] - work.pos1[i, k]) + 2.0 * model.cluster[c, 4] * abs(work.turn_in[i, 1 + k])
-    return 0.5 * (cluster_gap(model, c, work.pos2, work.rot2) - travel)
+    return 0.5 * (cluster_gap(model, work, c, False) - travel)
 
 
 @kernel
@@ -130,7 +137,7 @@ def came_near(model: Model, work: Work) -> bool:
     found = False
     for m in range(work.counts[1]):
         c = work.far_first[m]
-        if cluster_gap(model, c, work.pos3, work.rot3) < work.far[c, 0]:
+        if cluster_gap(model, work, c, True) < work.far[c, 0]:
             found = True
             work.far[c, 0] = 0.0
             work.far[c, 23] = 0.0

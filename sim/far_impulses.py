@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.far_bounds import NEARER, bound_changes, keep_motion
 from sim.friction import contact_impulse, start_contact
-from sim.model import Law, Matrix, Model, Vector, Work
+from sim.model import Law, Matrix, Model, Work
 from sim.rotation import Vec3, cross, rotate
+from sim.terrain_far import evaluate_on_terrain
 from solvers.jit import kernel
 
 _LINEAR = int(Law.LINEAR)
-_NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulses are evaluated again
 _ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
@@ -35,7 +36,7 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
         w += abs(omega)
     arm = model.cluster[c, 4]
     turn = _ANGLE * dq
-    if dx + arm * turn > _NEARER * row[23]:
+    if dx + arm * turn > NEARER * row[23]:
         return True
     change = row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)) + row[3] * turn
     return not change <= work.far_law[1]
@@ -47,7 +48,10 @@ def far_impulses(model: Model, work: Work, h: float) -> None:
     for m in range(work.counts[1]):
         c = work.far_first[m]
         if moved(model, work, h, c):
-            _evaluate(model, work, h, c)
+            if model.contact_terrain[c] > 0:
+                evaluate_on_terrain(model, work, h, c)
+            else:
+                _evaluate(model, work, h, c)
 
 
 @kernel
@@ -61,34 +65,6 @@ def _to_body(R: Matrix, i: int, x: float, y: float, z: float) -> Vec3:
 
 
 @kernel
-def _keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
-    """The motion of body i at which its far impulses are evaluated."""
-    row[7] = work.quat3[i, 0]
-    for k in range(3):
-        row[4 + k] = work.pos3[i, k]
-        row[8 + k] = work.quat3[i, 1 + k]
-        row[11 + k] = (work.pos3[i, k] - work.pos2[i, k]) / h
-        row[14 + k] = 2.0 / h * work.turn[i, 1 + k]
-
-
-@kernel
-def _bound_changes(model: Model, work: Work, c: int, gap: float) -> None:
-    """far[c, 1:3]: how much the wrench of a cluster can change beyond this gap, with the lever about O.
-
-    d gamma <= kappa/gap^2 d(gap),   d beta <= mu d gamma + mu^2 kappa/gap^2 d(slip)
-    """
-    i = model.contact_body[c]
-    mu = model.cluster[c, 6]
-    lever = 1.0 + model.cluster[c, 4]
-    for k in range(3):
-        lever += abs(work.pos2[i, k] - work.origin[k])
-    push = (model.cluster_end[c] - c) * work.far_law[0] / gap
-    row = work.far[c]
-    row[1] = lever * push * (1.0 + mu) / gap
-    row[2] = lever * push * mu * mu / gap
-
-
-@kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     """far[c, 4:24] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
 
@@ -97,7 +73,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     """
     i = model.contact_body[c]
     row = work.far[c]
-    _keep_motion(work, h, i, row)
+    keep_motion(work, h, i, row)
     f = model.contact_frame[c]
     R = work.rot3
     x, y, z = cross(f[3], f[4], f[5], row[14], row[15], row[16])
@@ -139,9 +115,9 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
         X0, X1, X2 = X0 + fx * p[0], X1 + fx * p[1], X2 + fx * p[2]
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
     row[23] = least
-    _bound_changes(model, work, c, (1.0 - _NEARER) * least)
+    bound_changes(model, work, c, (1.0 - NEARER) * least)
     turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
-    row[3] = turning / (1.0 - _NEARER)  # the arms of the impulses turn with the body
+    row[3] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
     nx, ny, nz = cross(*rotate(R, i, N0, N1, N2), f[0], f[1], f[2])
     ax, ay, az = cross(*rotate(R, i, X0, X1, X2), f[3], f[4], f[5])
     bx, by, bz = cross(*rotate(R, i, Y0, Y1, Y2), f[6], f[7], f[8])

@@ -185,12 +185,12 @@ def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
 
 
 @kernel
-def recover_contact(model: Model, work: Work, h: float, c: int, share: float) -> None:
+def recover_contact(model: Model, work: Work, c: int, share: float) -> None:
     """cone_step of contact c from the body twists of the last solve."""
     z = work.cone[c]
     d = work.cone_step[c]
     if c < model.contact_height.shape[0]:
-        a, x, y = contact_rate(model, work, h, c)
+        a, x, y = contact_rate(model, work, c)
     else:
         a, x, y = pair_rate(model, work, c)
     d[0] = a + share * (work.contact_kin[c, 0] - z[0])

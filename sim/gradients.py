@@ -16,6 +16,7 @@ from sim.kinematics import velocity_columns
 from sim.limits import add_limit_derivatives
 from sim.model import InputKind, Late, Matrix, Model, Vector, Work
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
+from sim.restitution import add_bounce_composites, add_bounce_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
 from solvers.jit import kernel
 from solvers.late import late
@@ -35,6 +36,7 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     joint_blocks(model, work, h, q, v)
     add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
+    add_bounce_composites(model, work)
     for i in range(work.A.shape[0]):
         for k in range(36):
             work.A[i, k] = work.A3[i, k]
@@ -43,10 +45,11 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
+    add_bounce_derivatives(model, work)
     add_coupling_derivatives(model, work)
     if not factor_coupling(model, work):
         return False
-    add_swing_curvature(model, work, q)
     add_spring_derivatives(model, work, h, q, v)
     _joint_columns(model, work, h, v)
     _input_columns(model, work, h)

@@ -5,7 +5,12 @@ Far contacts (far.py) have no part in its variables and its matrix.
 
 from __future__ import annotations
 
-from sim.contact import add_contact_matrix, add_contact_wrench, contact_jacobian, contact_kinematics
+from sim.contact import (
+    add_contact_matrix,
+    add_contact_wrench,
+    contact_jacobian,
+    contact_kinematics,
+)
 from sim.elimination import subtree_sums
 from sim.far_impulses import add_far_wrenches, far_impulses
 from sim.friction import (
@@ -27,6 +32,8 @@ from sim.model import Goal, Late, Matrix, Model, Work
 from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
+from sim.restitution import subtract_floors
+from sim.terrain_contact import add_frame_matrix
 from solvers.cones import orthant_step
 from solvers.jit import kernel
 from solvers.late import late
@@ -42,6 +49,7 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
     pair_kinematics(model, work, h)
+    subtract_floors(model, work)
     limit_gaps(model, work, h)
 
 
@@ -118,7 +126,9 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
             contact_jacobian(model, work, h, c)
             condense_contact(model, work, c, kappa, share)
             fn, f1, f2 = contact_impulse(model, work, c)
-            add_contact_matrix(model, work, h, c, share * fn, share * f1, share * f2, out)
+            add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+            if model.contact_terrain[c] > 0:
+                add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
     condense_pairs(model, work, h, kappa, share)
 
 
@@ -163,7 +173,7 @@ def recover_inequalities(model: Model, work: Work, h: float, share: float) -> No
     """Steps of all cone variables from the twists and rates of the last solve."""
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            recover_contact(model, work, h, c, share)
+            recover_contact(model, work, c, share)
     recover_limits(model, work, h, share)
 
 

@@ -25,6 +25,7 @@ from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
+from sim.restitution import find_impacts, gained_energy
 from solvers.jit import inlined, kernel
 from solvers.late import late
 from solvers.status import Status
@@ -117,11 +118,14 @@ def interior_point(
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
     choose_far(model, work, options)
+    find_impacts(model, work, options.h)
     while True:
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
             if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
                 break
-        if not came_near(model, work):
+        if came_near(model, work):
+            continue
+        if out.status != _SOLVED or not gained_energy(model, work, options.h):
             return out

@@ -26,8 +26,10 @@ MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
     dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
+    contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
-    loop_ntrans nloop, loop_nrot nloop, limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
+    loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
+    limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
     """
 )
 
@@ -36,9 +38,11 @@ MODEL_FLOATS = _shapes(
     body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_swing_axes nbody 6, dof_spring nv,
     dof_damper nv, dof_armature nv, dof_rest nv,
-    contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_frame nground 9,
+    contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
+    contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, loop_point nloop 6,
-    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9, limit_sign nlimit, limit_bound nlimit,
+    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
+    gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit,
     input_wrench nu 6, gravity 3
     """
 )
@@ -52,7 +56,9 @@ WORK_FLOATS = _shapes(
     S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, body_impulse nbody 6, turn_in nbody 4, turn nbody 4,
     balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
-    contact_kin ncontact 24, contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
+    contact_kin ncontact 27, contact_frame nground 9,
+    contact_turn nground 18, bounce ncontact 16, bounce_share 1,
+    contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12,
@@ -60,7 +66,7 @@ WORK_FLOATS = _shapes(
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 1,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
-    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
+    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 24, far_law 2
@@ -84,6 +90,9 @@ class Sizes(NamedTuple):
     ncoupling: int = 0  # two bodies with pairs, and closed loops
     nrow: int = 0  # unknown forces of the couplings
     nloop: int = 0
+    ngear: int = 0
+    nterrain: int = 0  # height fields: one per terrain and radius of its contacts
+    nheight: int = 0  # their coefficients
 
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
@@ -138,8 +147,11 @@ def sizes_of(model: Model) -> Sizes:
         nu=len(model.input_kind),
         npair=len(model.pair_kind),
         ncoupling=len(model.coupling_body),
-        nrow=int(model.coupling_row[-1]),
+        nrow=int(model.coupling_row[-1]) + len(model.gear_dof),
         nloop=len(model.loop_ntrans),
+        ngear=len(model.gear_dof),
+        nterrain=len(model.terrain_size),
+        nheight=len(model.terrain_heights),
     )
 
 

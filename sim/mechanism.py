@@ -11,15 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.closing import carried
 from sim.collisions import Collision, Touch, touches
+from sim.gear import Gear, check_gears
 from sim.parts import WORLD, Body, Contact, Input, Joint
+from sim.shapes import Solid
+from sim.terrain import Terrain
 
 
 @dataclass(frozen=True)
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones
+    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+              those that close loops
     neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
               or all of q
     """
@@ -33,6 +38,7 @@ class Mechanism:
     neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
     collisions: Sequence[Collision] = ()
     loops: Sequence[Joint] = ()  # joints with close=True are moved here
+    gears: Sequence[Gear] = ()
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
@@ -41,12 +47,19 @@ class Mechanism:
             if field != "inputs" or self.inputs is not None:
                 object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
         loops = (*self.loops, *(j for j in self.joints if j.close))
-        object.__setattr__(self, "joints", tuple(j for j in self.joints if not j.close))
+        tree = tuple(j for j in self.joints if not j.close)
+        if self.inputs is None:
+            object.__setattr__(self, "inputs", _every_dof(tree))
+        driven = {part.joint for part in self.inputs or () if part.joint is not None}
+        bodies, tree, loops = carried(f"{call})", self.bodies, tree, loops, driven)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", tree)
         object.__setattr__(self, "loops", _check_loops(f"{call})", loops, self.bodies, self.joints))
         bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
         _check_masses(f"{call})", bodies, joints)
+        check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
         for c in self.collisions:
@@ -117,15 +130,49 @@ class Mechanism:
         start = sum(j.nv for j in self.joints[:i])
         return slice(start, start + self.joints[i].nv)
 
+    def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
+        """This mechanism and another one, in one: its bodies, joints, contacts, inputs and collisions after ours.
+
+        pose     where the world of `other` is put: translation (3,) [m], or with a quaternion (7,). Its joints with the
+                 world, its obstacles and its neutral state move there; its contacts touch the ground that they touched
+                 before, and inputs along world axes keep them
+        prefix   put before every name of `other`; a ValueError says which name both have
+        """
+        from sim.scene import added
+
+        return added(self, other, pose, prefix, name or self.name)
+
+    def on(self, terrain: Terrain, contacts: Sequence[str] | None = None) -> Mechanism:
+        """The same on other ground, under all contacts or those named; it stands there as high as it touches.
+
+        Contacts keep their friction; what normal and height they had is replaced.
+        """
+        from sim.scene import on_terrain
+
+        return on_terrain(self, terrain, contacts)
+
+    def with_collisions(self, *collisions: Collision) -> Mechanism:
+        """The same with more collisions."""
+        from sim.scene import with_collisions
+
+        return with_collisions(self, collisions)
+
+    def with_obstacle(
+        self, shape: Solid, bodies: Sequence[str] | None = None, name: str = "obstacle", **options: Any
+    ) -> Mechanism:
+        """The same with a fixed obstacle, placed in world axes by its centre and orientation.
+
+        What touches the ground touches it too: the balls of the contacts; or, when given, the shapes of `bodies`.
+        options: of Collision (friction, law, restitution).
+        """
+        from sim.scene import with_obstacle
+
+        return with_obstacle(self, shape, bodies, name, **options)
+
     def _name_inputs(self, call: str) -> tuple[Input, ...]:
         """The inputs with names, after a look at what they act on."""
-        if self.inputs is None:
-            free = [j for j in self.joints if j.kind != "floating"]
-            given = [Input(j.name, dof=d) for j in free for d in range(j.nv)]
-        else:
-            given = list(self.inputs)
         out = []
-        for part in given:
+        for part in self.inputs or ():
             if part.joint is not None:
                 label = checks.one_of(f"{call}, inputs=...): joint", part.joint, self.joint_names)
                 nv = self.joints[self.joint_names.index(label)].nv
@@ -168,7 +215,13 @@ _KINDS = {
     "inputs": Input,
     "collisions": Collision,
     "loops": Joint,
+    "gears": Gear,
 }
+
+
+def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
+    """An input for every degree of freedom of every joint but the floating ones."""
+    return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
 
 
 def _check_loops(

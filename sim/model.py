@@ -92,6 +92,20 @@ class Late(IntEnum):
     SPRING_IMPULSE = 36
     SPRING_BLOCK = 37
     SPRING_DERIVATIVE = 38
+    # terrain
+    TERRAIN_PLACE = 39
+    TERRAIN_TURN = 40
+    TERRAIN_MATRIX = 41
+    TERRAIN_GAP = 42
+    TERRAIN_FAR = 43
+    # restitution
+    FIND_IMPACTS = 44
+    SUBTRACT_FLOORS = 45
+    GAINED_ENERGY = 46
+    BOUNCE_COMPOSITES = 47
+    BOUNCE_DERIVATIVES = 48
+    # gears
+    APPLY_GEARS = 49
 
 
 class Model(NamedTuple):
@@ -109,6 +123,8 @@ class Model(NamedTuple):
     contact_body: Integers  # (ncontact,) contacts with the ground come first, then the pairs
     contact_law: Integers  # (ncontact,) Law
     late: Integers  # addresses of kernels, by `Late`; 0 where the scene has no use for one, or had none so far
+    contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
+    terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
     cluster_end: Integers  # (nground,) of the cluster whose first contact this is, one past its last; see far.py
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
@@ -117,6 +133,7 @@ class Model(NamedTuple):
     coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
     loop_ntrans: Integers  # (nloop,) free translations
     loop_nrot: Integers  # (nloop,) free rotations
+    gear_dof: IntegerMatrix  # (ngear, 2) the degree of freedom that follows, and the one that leads
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
@@ -137,8 +154,11 @@ class Model(NamedTuple):
     contact_point: Matrix  # (nground, 3) sphere centre in the body, from its centre of mass [m]
     contact_radius: Vector  # (nground,) [m], 0 for a point
     contact_friction: Vector  # (ncontact,) coefficient
+    contact_restitution: Vector  # (ncontact,) share of the normal velocity that an impact gives back
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
-    contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]
+    contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
+    terrain_place: Matrix  # (nterrain, 8) see height_field.py
+    terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
@@ -146,6 +166,8 @@ class Model(NamedTuple):
     loop_offset: Matrix  # (nloop, 9) orientation of the joint frame on b, rotation matrix
     loop_axes: Matrix  # (nloop, 9) translations that are not free, one per row, joint frame
     loop_axis: Matrix  # (nloop, 9) two directions across the free axis, and the axis, joint frame
+    gear_ratio: Vector  # (ngear,)
+    gear_offset: Vector  # (ngear,) [m, rad]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
@@ -203,7 +225,11 @@ class Work(NamedTuple):
     cone: Matrix  # (ncontact, 12) cone variables, see contact.py
     cone_step: Matrix  # (ncontact, 12)
     cone_trial: Matrix  # (ncontact, 12)
-    contact_kin: Matrix  # (ncontact, 24) gap, tangential velocity, arms and their Jacobian
+    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
+    contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
+    contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
+    bounce: Matrix  # (ncontact, 16) see restitution.py
+    bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same
     contact_scale: Matrix  # (ncontact, 16) scaling of the cone
@@ -240,6 +266,7 @@ class Work(NamedTuple):
     couple_wrench: Vector  # (6,) scratch
     loop_frame: Matrix  # (nloop, 12)
     loop_turn: Matrix  # (nloop, 9)
+    gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
     bound: Matrix  # (nlimit, 2) slack, impulse
     bound_step: Matrix  # (nlimit, 2)

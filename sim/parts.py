@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.shapes import Shape, Solid
+from sim.terrain import Terrain
 
 WORLD = "world"
 # free translations and free rotations of each kind of joint
@@ -118,7 +119,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
-    close: bool = False  # closes a loop: child hangs on another joint already
+    close: bool = False  # closes a loop: child hangs on another joint already; see sim/closing.py
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -134,11 +135,6 @@ class Joint:
             object.__setattr__(self, field, self._per_dof(call, field))
         object.__setattr__(self, "limits", self._limits(call))
         self._check_cone(f"{call}, cone=...)")
-        limited = any(np.isfinite(b) for pair in self.limits or () for b in pair) or self.cone is not None
-        if self.close and (any((*self.spring, *self.damper, *self.armature)) or limited):  # type: ignore[misc]
-            raise ValueError(
-                f"{call}): a joint that closes a loop has no spring, damper, armature or limits; give them to others"
-            )
 
     @property
     def ntrans(self) -> int:
@@ -232,6 +228,8 @@ class Contact:
     """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
 
     law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
+    terrain: ground that is no half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
+    restitution: share of the normal velocity that an impact gives back, see sim/restitution.py.
     """
 
     body: str
@@ -242,6 +240,8 @@ class Contact:
     normal: ArrayLike = (0.0, 0.0, 1.0)
     height: float = 0.0  # [m]
     name: str = ""  # default: that of the body, numbered when it has several
+    terrain: Terrain | None = None
+    restitution: float = 0.0
 
     def __post_init__(self) -> None:
         checks.name("Contact(body=...)", self.body)
@@ -253,6 +253,44 @@ class Contact:
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
         object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
+        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
+        if self.terrain is not None:
+            self._put_on(f"{call}, terrain=...)", self.terrain)
+
+    def _put_on(self, call: str, terrain: Terrain) -> None:
+        """A slope is a half-space; other terrain lies above and below the level plane."""
+        if not isinstance(terrain, Terrain):
+            raise ValueError(f"{call}: expected a Terrain, got {terrain!r}")
+        if self.normal != (0.0, 0.0, 1.0):
+            raise ValueError(f"{call}: a contact with terrain has no normal of its own, got normal={self.normal}")
+        if terrain.plane is not None:
+            normal, height = terrain.plane
+            object.__setattr__(self, "normal", normal)
+            object.__setattr__(self, "height", height + self.height * normal[2])
+            object.__setattr__(self, "terrain", None)
+
+    def gap(self, centres: ArrayLike) -> NDArray[np.float64]:
+        """Distance from the ground of the ball with its centre at `centres` (..., 3), world axes [m]."""
+        at = np.asarray(centres, dtype=np.float64)
+        if self.terrain is None:
+            return np.asarray(at @ np.asarray(self.normal) - self.radius - self.height)
+        surface = self.terrain.surface(float(self.radius))
+        return (at[..., 2] - surface.height(at[..., 0], at[..., 1]) - self.height) * self.normal_at(at)[..., 2]
+
+    def normal_at(self, centres: ArrayLike) -> NDArray[np.float64]:
+        """Outward normal of the ground at the ball with its centre at `centres` (..., 3), (..., 3)."""
+        at = np.asarray(centres, dtype=np.float64)
+        if self.terrain is None:
+            return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
+        return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])
+
+
+def share(call: str, value: Any) -> float:
+    """A number from 0 to 1."""
+    share = checks.number(call, value, at_least=0.0)
+    if share > 1.0:
+        raise ValueError(f"{call}: expected a number from 0 to 1, got {share:g}")
+    return share
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
     """
     i = model.contact_body[c]
     k = work.contact_kin[c]
-    F = model.contact_frame[c]
+    F = work.contact_frame[c]
     W = work.contact_W[c]
     A = work.A2[i]
     w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]

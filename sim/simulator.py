@@ -9,14 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim import wrenches as pushed
 from sim.border import whole
 from sim.calls import Settings
 from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
-from sim.results import Batch, Linearization, Shot, StepResult, Trajectory, contacts_of, error_of
+from sim.reactions import Reactions, reactions
+from sim.results import (
+    Batch,
+    Linearization,
+    Shot,
+    SimulationError,
+    StepResult,
+    Trajectory,
+    contacts_of,
+    error_of,
+)
 from sim.states import States
+from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
@@ -34,7 +46,9 @@ class Simulator(States):
                     .01 m g^2 h^3
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
-    order           of a step; 4, 6, 8 for mechanisms without contacts and limits: each composed of 5, 9, 15 of order 2
+    order           of a step; 4, 6, 8 for mechanisms without contacts and limits: explicit, with 4, 7, 12 evaluations
+                    of the equations of motion. Momentum is exact with all; order 2 bounds the energy over any time,
+                    the others keep it to a much smaller error that grows with time
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
     With order 2, v is the mean velocity over the interval that led to q; with a higher order the velocity at the node.
@@ -100,14 +114,18 @@ class Simulator(States):
         """
         return left_out(self, x, u)
 
-    def step(self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False) -> StepResult:
-        """One time step from x under the input u (zero when left out)."""
+    def step(
+        self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False, wrenches: Wrenches | None = None
+    ) -> StepResult:
+        """One time step from x under the input u (zero when left out); wrenches (nbody, 6) as in `rollout`."""
+        if wrenches is not None:
+            return pushed.step(self, x, u, wrenches, throw)
         state = self._border.state("step", x)
         us = self._border.inputs("step", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         knot, xs, reports, contacts = self._calls.roll(state, us[None])
         status, iterations, residual, violation = reports[0, :4]
         if knot == 0 and throw:
-            raise error_of(self.mechanism, "Simulator.step", reports[0], self.tolerance)
+            raise self._error("Simulator.step", reports[0])
         out = xs[knot] if knot else state
         return StepResult(
             out,
@@ -118,18 +136,22 @@ class Simulator(States):
             contacts_of(self.mechanism, self.time_step, contacts[0]),
         )
 
-    def rollout(self, x: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Trajectory:
-        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so."""
+    def rollout(
+        self, x: ArrayLike, us: ArrayLike, *, throw: bool = False, wrenches: Wrenches | None = None
+    ) -> Trajectory:
+        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so.
+
+        wrenches: external ones, (T, nbody, 6), or {body: (6,) or (T, 6)}; a force at the centre of mass [N], then a
+        torque [N m], both in world axes and constant over a step.
+        """
+        if wrenches is not None:
+            return pushed.rollout(self, x, us, wrenches, throw)
         state = self._border.state("rollout", x)
         inputs = self._border.inputs("rollout", "us", us, (None, self.nu))
         knot, xs, reports, contacts = self._calls.roll(state, inputs)
         last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
         status = Status(int(last[0]))
-        error = (
-            None
-            if status == Status.SOLVED
-            else error_of(self.mechanism, f"Simulator.rollout: step {knot}", last, self.tolerance)
-        )
+        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last)
         if error and throw:
             raise error
         return Trajectory(
@@ -145,6 +167,13 @@ class Simulator(States):
             message=str(error) if error else MESSAGES[status],
         )
 
+    def _error(self, where: str, report: Floats) -> SimulationError:
+        """Why the last step of this thread was not solved."""
+        mech = self.mechanism
+        names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
+        gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
+        return error_of(mech, where, report, self.tolerance, max(gaps, default=None))
+
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
         call = "Simulator.rollout_batch"
@@ -155,7 +184,7 @@ class Simulator(States):
             x[knot + 1 :] = x[knot]
         return Batch(xs, status, knots)
 
-    def closed_loop(
+    def closed_loop(  # noqa: PLR0913
         self,
         x0: ArrayLike,
         us: ArrayLike,
@@ -167,6 +196,7 @@ class Simulator(States):
         limits: tuple[ArrayLike, ArrayLike] | None = None,
         substeps: int = 1,
         kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Shot:
         """Rollout under a policy, each knot `substeps` steps with u held:
 
@@ -174,9 +204,12 @@ class Simulator(States):
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
         us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
-        of u.
+        of u; wrenches (T, nbody, 6) as in `rollout`, held over a knot.
         It stops at the first knot that cannot be solved.
         """
+        if wrenches is not None:
+            gains: dict[str, Any] = {"xs": xs, "ks": ks, "Ks": Ks, "gaps": gaps, "alpha": alpha, "limits": limits}
+            return pushed.closed_loop(self, x0, us, wrenches, substeps=substeps, kappa=kappa, **gains)
         call = "closed_loop"
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
         name = f"Simulator.{call}"
@@ -191,13 +224,31 @@ class Simulator(States):
         )
         return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
+    def reactions(self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world") -> Reactions:
+        """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
+
+        x (..., nx) and u (..., nu), zero when left out, with the same leading axes: `sim.reactions(t.x[:-1], t.u)` has
+        those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
+        ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
+        """
+        return reactions(self, x, u, frame)
+
     # ---- derivatives
 
-    def linearize(self, x: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None) -> tuple[Floats, Floats]:
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+    ) -> tuple[Floats, Floats]:
         """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
 
         By the implicit function theorem, in tangent coordinates. An unsolved step raises SimulationError.
+        wrenches (nbody, 6) as in `rollout` are constants.
         """
+        if wrenches is not None:
+            return pushed.linearize(self, x, u, wrenches, kappa)
         state = self._border.state("linearize", x)
         us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
         A, B, _, report = self._calls.linearize_one(state, us, self._border.kappa("linearize", kappa))
@@ -220,12 +271,19 @@ class Simulator(States):
         return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
 
     def linearize_trajectory(
-        self, xs: ArrayLike, us: ArrayLike, substeps: int = 1, kappa: float | None = None
+        self,
+        xs: ArrayLike,
+        us: ArrayLike,
+        substeps: int = 1,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Linearization:
         """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
 
-        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu).
+        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu); wrenches: (T, nbody, 6) as in `rollout`.
         """
+        if wrenches is not None:
+            return pushed.linearize_trajectory(self, xs, us, wrenches, substeps, kappa)
         call = "Simulator.linearize_trajectory"
         inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
         states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))

@@ -21,7 +21,7 @@ __all__ = ["Ground"]
 
 
 class Ground:
-    """The half-spaces under the contacts of a simulator, as that simulator believes them to be.
+    """The ground under the contacts of a simulator, as that simulator believes it to be.
 
     `learn` moves them: to the height of every contact that is planned to stand and does not move. It writes into the
     model of this simulator, so give it one of its own (`sim.replace()`).
@@ -36,6 +36,7 @@ class Ground:
         self._point = np.array([c.point for c in contacts], dtype=np.float64).reshape(-1, 3)
         self._normal = sim.mechanism.contact_normals
         self._lowest = np.array([c.radius for c in contacts], dtype=np.float64)[:, None] * self._normal
+        self._surfaces = [(k, c.terrain.surface(c.radius)) for k, c in enumerate(contacts) if c.terrain is not None]
         self.height = sim.model.contact_height  # (ncontact,) [m], a view
         self._flat = self.height.copy()
 
@@ -56,8 +57,12 @@ class Ground:
         return np.asarray(z[..., :3] + self._point + w * twice + _cross(r, twice) - self._lowest)
 
     def gaps(self, points: Stack) -> Matrix:
-        """Distances of the points (..., ncontact, 3) of the contacts from their half-spaces, (..., ncontact) [m]."""
-        return np.asarray((self._normal * points).sum(axis=-1) - self.height)
+        """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""
+        out = np.asarray((self._normal * points).sum(axis=-1) - self.height)
+        for k, surface in self._surfaces:  # vertically: the height that is learnt is added to it
+            centres = points[..., k, :] + self._lowest[k]
+            out[..., k] = centres[..., 2] - surface.height(centres[..., 0], centres[..., 1]) - self.height[k]
+        return out
 
     def touching(self, x: Vector) -> tuple[str, ...]:
         """Names of the contacts that touch at x."""

@@ -97,6 +97,8 @@ class Perturbation:
             bodies[i] = replace(bodies[i], mass=bodies[i].mass + self.payload, inertia=inertia)
         joints = [replace(j, damper=self.damping * np.asarray(j.damper)) for j in mechanism.joints]
         contacts: Any = mechanism.contacts
+        if self.slope and any(c.terrain is not None for c in contacts):
+            raise ValueError("Perturbation(slope=...): a slope is for contacts with half-spaces, not on terrain")
         if self.slope or self.ground_height:
             turn = _rotation(self.slope, self.slope_heading)
             contacts = [

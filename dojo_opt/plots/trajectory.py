@@ -97,10 +97,24 @@ def paths(m: Motion, ax: Axes) -> Axes:
     for label, path in drawn:
         (line,) = ax.plot(path[:, side], path[:, 2], marker=".", markersize=4, label=label)
         ax.plot(path[-1, side], path[-1, 2], marker="o", color=line.get_color())
-    if any(np.allclose(c.normal, (0, 0, 1)) for c in m.mechanism.contacts):
-        ax.axhline(m.mechanism.contacts[0].height, color="0.6", linewidth=1)
+    _ground(m, side, ax)
     ax.set_aspect("equal", adjustable="datalim")
     return _finish(ax, "height [m]", f"{'xy'[side]} [m]")
+
+
+def _ground(m: Motion, side: int, ax: Axes) -> None:
+    """Level ground, or the profile of the terrain below the path of the first body."""
+    first = next((c for c in m.mechanism.contacts if np.allclose(c.normal, (0, 0, 1))), None)
+    if first is None:
+        return
+    if first.terrain is None:
+        ax.axhline(first.height, color="0.6", linewidth=1)
+        return
+    path = m.position[:, 0]
+    along = np.linspace(path[:, side].min() - 0.5, path[:, side].max() + 0.5, 400)
+    across = np.full_like(along, np.median(path[:, 1 - side]))
+    x, y = (across, along) if side else (along, across)
+    ax.plot(along, first.terrain.height(x, y) + first.height, color="0.6", linewidth=1)
 
 
 def _coordinates(m: Motion) -> list[tuple[str, Any]]:

@@ -12,12 +12,12 @@ Floats = NDArray[np.float64]
 
 
 def gaps(mechanism: Mechanism, run: Run) -> Floats:
-    """Distance of every contact to its half-space, (n, ncontact) [m]; negative is penetration."""
+    """Distance of every contact to its ground, (n, ncontact) [m]; negative is penetration."""
     bodies = [mechanism.body_names.index(contact.body) for contact in mechanism.contacts]
     out = np.empty((len(run.time), len(bodies)))
     for c, (body, contact) in enumerate(zip(bodies, mechanism.contacts, strict=True)):
         arm = _rotated(run.quaternion[:, body], np.asarray(contact.point))
-        out[:, c] = (run.position[:, body] + arm) @ np.asarray(contact.normal) - contact.radius - contact.height
+        out[:, c] = contact.gap(run.position[:, body] + arm)
     return out
 
 

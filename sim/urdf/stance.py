@@ -47,13 +47,9 @@ def _motion(joint: Joint, q: Floats) -> Pose:
 
 
 def gaps(mech: Mechanism, q: Floats) -> Floats:
-    """(ncontact,) distance of every contact from its half-space [m]."""
+    """(ncontact,) distance of every contact from its ground [m]."""
     at = poses(mech, q)
-    out = [
-        float(np.dot(np.asarray(c.normal), at[c.body].at(c.point))) - float(c.radius) - float(c.height)
-        for c in mech.contacts
-    ]
-    return np.array(out, dtype=np.float64)
+    return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 
 def lifted(mech: Mechanism, base: str) -> Floats:

@@ -1,0 +1,271 @@
+"""Restitution: Moreau's impact law on the velocity of the gap, joined to the condition on the gap itself.
+
+A contact whose gap closes, and would be closed at the next configuration if it went on like that, is an impact:
+
+    phi2 < phi1,   2 phi2 - phi1 < 0        then   phi3 - phi2 >= -e (phi2 - phi1),   complementary to its impulse
+
+The mean velocities of the gap over the two intervals stand for those before and after, so the body turns back at most
+the way of one step above the ground. It is the usual law, with a floor that impacts raise,
+
+    s = phi3 - floor,   s gamma = kappa,      floor = (1 - e) phi2 + e phi1 of an impact, 0 otherwise
+
+so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. What comes
+slower than max(2 g h, sqrt(kappa / (m h))) is no impact: it would be back within a few steps, or the forces of the
+central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
+example). Where the impulses of a step did work in all,
+
+    sum of 1/2 (gamma (v_n + v_n') + beta (v_t + v_t')) > 0,     ' before,
+
+its restitutions are halved, all of them, and it is solved again: without restitution they never do.
+
+Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
+of 2, 14 phi1, 15 phi2. Derivatives of a step are those of the branch that was taken.
+
+Scenes without restitution do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact import contact_jacobian, contact_kinematics
+from sim.friction import contact_impulse
+from sim.model import Late, Matrix, Model, Vector, Work
+from sim.pairs import is_absent, pair_arm, pair_force, pair_kinematics
+from sim.rotation import Vec3, cross
+from solvers.dense import dot
+from solvers.jit import kernel
+from solvers.late import late
+
+_NOISE = 1e-6  # of the work of all impulses: what counts as none
+_LEAST = 0.1  # of the restitution; below, there is none
+_NEVER = 1e9  # [m]
+
+
+@kernel
+def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
+    """Gaps of the near contacts at an earlier configuration, and their rows; configuration 3 is used up."""
+    first = configuration == 1
+    pos = work.pos1 if first else work.pos2
+    rot = work.rot1 if first else work.rot2
+    for i in range(pos.shape[0]):
+        for k in range(3):
+            work.pos3[i, k] = pos[i, k]
+        for k in range(9):
+            work.rot3[i, k] = rot[i, k]
+    for m in range(work.counts[0]):
+        contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
+    pair_kinematics(model, work, h)
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            k = work.contact_kin[c]
+            b[14 if first else 15] = k[0]
+            row = b[2:8] if first else b[8:14]
+            if c < model.contact_height.shape[0]:
+                contact_jacobian(model, work, h, c)
+                for r in range(3):
+                    row[r], row[3 + r] = k[18 + r], k[9 + r]
+                continue
+            F = work.pair_frame[c - model.contact_height.shape[0]]
+            o = work.origin
+            row[0], row[1], row[2] = F[0], F[1], F[2]
+            row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], F[0], F[1], F[2])
+            if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
+                b[14 if first else 15] = -_NEVER if first else _NEVER
+
+
+@kernel
+def least_closing(model: Model, work: Work, h: float, c: int) -> float:
+    """How much a gap closes in a step, at least, in an impact [m]."""
+    g = model.gravity
+    fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    m = model.body_mass[model.contact_body[c]]
+    return h * sqrt(max(fall, work.far_law[0] / (h * m) if m > 0.0 else 0.0))
+
+
+@kernel
+def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
+    """Floors of the impacts of this step, with a share of the restitution."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            e = share * model.contact_restitution[c]
+            floor = (1.0 - e) * b[15] + e * b[14]
+            fast = b[14] - b[15] > least_closing(model, work, h, c)
+            impact = e > 0.0 and fast and 2.0 * b[15] < b[14] and floor > 0.0
+            b[0] = floor if impact else 0.0
+            b[1] = e if impact else 0.0
+
+
+@late(Late.FIND_IMPACTS)
+def find_impacts(model: Model, work: Work, h: float) -> None:
+    """Which near contacts are impacts in this step, and their floors."""
+    for c in range(work.bounce.shape[0]):
+        work.bounce[c, 0] = 0.0
+        work.bounce[c, 1] = 0.0
+    work.bounce_share[0] = 1.0
+    look_back(model, work, h, 1)
+    look_back(model, work, h, 2)
+    raise_floors(model, work, h, 1.0)
+
+
+@late(Late.SUBTRACT_FLOORS)
+def subtract_floors(model: Model, work: Work) -> None:
+    """contact_kin: gaps above the floors."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            work.contact_kin[c, 0] -= work.bounce[c, 0]
+
+
+@kernel
+def earlier_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity over the interval 1-2 of the point of body i at (x, y, z) from its centre of mass; 0 for the world."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    w = work.turn_in[i]
+    q = 2.0 / h
+    vx, vy, vz = cross(q * w[1], q * w[2], q * w[3], x, y, z)
+    a = work.pos1[i]
+    b = work.pos2[i]
+    return (b[0] - a[0]) / h + vx, (b[1] - a[1]) / h + vy, (b[2] - a[2]) / h + vz
+
+
+@kernel
+def tangential_work(model: Model, work: Work, h: float, c: int, f1: float, f2: float) -> float:
+    """1/2 beta (v_t + v_t')"""
+    ground = model.contact_height.shape[0]
+    k = work.contact_kin[c]
+    a = model.contact_body[c]
+    F = work.contact_frame[c] if c < ground else work.pair_frame[c - ground]
+    x, y, z = earlier_velocity(work, h, a, k[3], k[4], k[5])
+    if c >= ground:
+        b = model.coupling_body[model.pair_coupling[c - ground], 1]
+        if b >= 0:
+            p = work.pos3
+            r0, r1, r2 = k[3] + p[a, 0] - p[b, 0], k[4] + p[a, 1] - p[b, 1], k[5] + p[a, 2] - p[b, 2]
+            u, v, w = earlier_velocity(work, h, b, r0, r1, r2)
+            x, y, z = x - u, y - v, z - w
+    t1 = k[1] + F[3] * x + F[4] * y + F[5] * z
+    t2 = k[2] + F[6] * x + F[7] * y + F[8] * z
+    return 0.5 * (f1 * t1 + f2 * t2)
+
+
+@late(Late.GAINED_ENERGY, False)
+def gained_energy(model: Model, work: Work, h: float) -> bool:
+    """Whether there were impacts, and the impulses of the solved step did work; floors are lower then."""
+    gain = 0.0
+    size = 0.0
+    impacts = False
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            impacts = impacts or b[1] > 0.0
+            fn, f1, f2 = contact_impulse(model, work, c)
+            gap = work.contact_kin[c, 0] + b[0]
+            gain += 0.5 * fn * (gap - b[14]) / h + tangential_work(model, work, h, c, f1, f2)
+            size += 0.5 * fn * (abs(gap - b[15]) + abs(b[15] - b[14])) / h
+    if not impacts or not gain > _NOISE * size:
+        return False
+    share = 0.5 * work.bounce_share[0]
+    if share < _LEAST:
+        share = 0.0
+    work.bounce_share[0] = share
+    raise_floors(model, work, h, share)
+    return True
+
+
+@kernel
+def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
+    """Wrench about O, on the first body, of contact c per unit of its gap, by its condensed law."""
+    W = work.contact_W[c]
+    ground = model.contact_height.shape[0]
+    if c >= ground:
+        f = pair_force(work, c - ground, W[0], W[3], W[6])
+        a = pair_arm(model, work, c - ground)
+    else:
+        F = work.contact_frame[c]
+        k = work.contact_kin[c]
+        i = model.contact_body[c]
+        f = (
+            F[0] * W[0] + F[3] * W[3] + F[6] * W[6],
+            F[1] * W[0] + F[4] * W[3] + F[7] * W[6],
+            F[2] * W[0] + F[5] * W[3] + F[8] * W[6],
+        )
+        o = work.origin
+        p = work.pos2[i]
+        a = (p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5])
+    return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
+
+
+@late(Late.BOUNCE_COMPOSITES)
+def add_bounce_composites(model: Model, work: Work) -> None:
+    """A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            if b[1] == 0.0:
+                continue
+            f, t = gap_wrench(model, work, c)
+            for side in range(1 if c < model.contact_height.shape[0] else 2):
+                i = model.contact_body[c]
+                if c >= model.contact_height.shape[0]:
+                    i = model.coupling_body[model.pair_coupling[c - model.contact_height.shape[0]], side]
+                if i >= 0:
+                    _add_outer(work.A1[i], f, t, b[1], b[2:8])
+                    _add_outer(work.A2[i], f, t, 1.0 - b[1], b[8:14])
+
+
+@kernel
+def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
+    """A (6 x 6) += scale (f, t) row^T."""
+    for k in range(6):
+        x = scale * row[k]
+        for r in range(3):
+            A[6 * r + k] += f[r] * x
+            A[18 + 6 * r + k] += t[r] * x
+
+
+@late(Late.BOUNCE_DERIVATIVES)
+def add_bounce_derivatives(model: Model, work: Work) -> None:
+    """dR_dq, dR_dv -= the same across the two bodies of an impact."""
+    ground = model.contact_height.shape[0]
+    for j in range(model.pair_kind.shape[0]):
+        b = work.bounce[ground + j]
+        one = model.coupling_body[model.pair_coupling[j], 0]
+        two = model.coupling_body[model.pair_coupling[j], 1]
+        if b[1] == 0.0 or two < 0:
+            continue
+        f, t = gap_wrench(model, work, ground + j)
+        for side in range(2):
+            i = one if side == 0 else two
+            k = two if side == 0 else one
+            _fill(work.couple_wrench, f, t)
+            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dq)
+            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dv)
+            _across(model, work, (i, k), b[1] - 1.0, b[8:14], work.S2, work.dR_dq)
+
+
+@kernel
+def _fill(out: Vector, f: Vec3, t: Vec3) -> None:
+    """out = (f, t)"""
+    for r in range(3):
+        out[r] = f[r]
+        out[3 + r] = t[r]
+
+
+@kernel
+def _across(
+    model: Model, work: Work, bodies: tuple[int, int], scale: float, row: Vector, S: Matrix, out: Matrix
+) -> None:
+    """out[j, k] += scale (S2[j].w) (row.S[k]), w in couple_wrench; j and k from the bodies up to the root."""
+    k = bodies[1]
+    while k >= 0:
+        for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
+            x = scale * dot(row, S[e])
+            j = bodies[0]
+            while j >= 0:
+                for d in range(model.body_vadr[j], model.body_vadr[j + 1]):
+                    out[d, e] += x * dot(work.S2[d], work.couple_wrench)
+                j = model.body_parent[j]
+        k = model.body_parent[k]

@@ -1,0 +1,270 @@
+"""Terrain: ground that is no level plane, as what a user writes; a slope, steps, or any smooth height z = f(x, y).
+
+A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). What the centre
+of a ball cannot sink below, the surface at its radius, is a height field too,
+
+    F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2),
+
+and is computed here, once for every radius: kernels then know points only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+
+Floats = NDArray[np.float64]
+
+_EDGE = 16  # grid lines across an edge of a step
+_MARGIN = 8  # level grid lines around what is not smooth: the waves of a spline fade by .27 per line
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
+
+    heights    (nx, ny) above the lines of a grid, a C2 spline in between [m]; one column (nx, 1): the same for all y.
+               Beyond the grid the ground goes on level, at the height of its edge
+    origin     (x, y) of heights[0, 0] [m]
+    spacing    (dx, dy) of the grid [m]
+    direction  (x, y) of the first grid axis in the plane
+    plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
+    """
+
+    heights: ArrayLike = ((0.0,),)
+    origin: ArrayLike = (0.0, 0.0)
+    spacing: ArrayLike = (1.0, 1.0)
+    direction: ArrayLike = (1.0, 0.0)
+    plane: tuple[Any, float] | None = None
+    coefficients: Floats = field(init=False, repr=False)  # (nx + 2, ny + 2) of the spline
+
+    def __post_init__(self) -> None:
+        heights = np.array(checks.array("Terrain(heights=...)", self.heights, (None, None)))
+        if heights.size == 0:
+            raise ValueError(f"Terrain(heights=...): expected one height at least, got shape {heights.shape}")
+        heights.flags.writeable = False
+        object.__setattr__(self, "heights", heights)
+        object.__setattr__(self, "origin", checks.vector("Terrain(origin=...)", self.origin, 2))
+        spacing = checks.vector("Terrain(spacing=...)", self.spacing, 2)
+        if min(spacing) <= 0.0:
+            raise ValueError(f"Terrain(spacing=...): expected numbers > 0, got {spacing}")
+        object.__setattr__(self, "spacing", spacing)
+        object.__setattr__(self, "direction", _heading("Terrain(direction=...)", self.direction))
+        if self.plane is not None:
+            normal = checks.direction("Terrain(plane=...): normal", self.plane[0])
+            if normal[2] <= 0.0:
+                raise ValueError(f"Terrain(plane=...): expected a normal that points up, got {normal}")
+            object.__setattr__(self, "plane", (normal, checks.number("Terrain(plane=...): height", self.plane[1])))
+        object.__setattr__(self, "coefficients", spline_coefficients(heights))
+
+    @staticmethod
+    def from_function(f: Callable[[Floats, Floats], ArrayLike], x: ArrayLike, y: ArrayLike) -> Terrain:
+        """The spline through f at the grid lines x (nx,) and y (ny,), equally spaced [m].
+
+        f takes and returns arrays: f(X, Y) with X and Y of shape (nx, ny). A spline is off by about
+        (spacing / wavelength)^4 of the height of a wave; `terrain.height(x, y)` tells.
+        """
+        lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
+        X, Y = np.meshgrid(*lines, indexing="ij")
+        values = np.array(np.broadcast_to(np.asarray(f(X, Y), dtype=np.float64), X.shape))
+        heights = checks.array("Terrain.from_function(f)", values, X.shape)
+        spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
+        return Terrain(heights, (lines[0][0], lines[1][0]), spacing)
+
+    @staticmethod
+    def slope(angle: float, direction: ArrayLike = (1.0, 0.0), height: float = 0.0) -> Terrain:
+        """A plane that rises by `angle` [rad] towards `direction` (x, y), and has this height at x = y = 0 [m]."""
+        angle = checks.number("Terrain.slope(angle)", angle)
+        if not abs(angle) < 0.5 * np.pi:
+            raise ValueError(f"Terrain.slope(angle): expected less than a right angle, got {angle:g} rad")
+        u, w = _heading("Terrain.slope(direction)", direction)
+        normal = (-np.sin(angle) * u, -np.sin(angle) * w, np.cos(angle))
+        return Terrain(plane=(normal, checks.number("Terrain.slope(height)", height) * normal[2]))
+
+    @staticmethod
+    def steps(
+        rises: Sequence[float],
+        depth: float = 0.3,
+        start: float = 0.0,
+        edge: float = 0.04,
+        direction: ArrayLike = (1.0, 0.0),
+    ) -> Terrain:
+        """Stairs across `direction`: the ground rises by rises[k] at start + k depth [m]; it is level before and after.
+
+        Each rise is spread over `edge` [m] by the quintic 6 t^5 - 15 t^4 + 10 t^3, so that its edges are rounded with
+        the radius edge^2 / (5.77 |rise|) [m] and its face is 1.875 |rise| / edge steep.
+        """
+        call = "Terrain.steps"
+        jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
+        depth, edge = (checks.number(f"{call}({n}=...)", v, above=0.0) for n, v in (("depth", depth), ("edge", edge)))
+        start = checks.number(f"{call}(start=...)", start)
+        if edge > depth:
+            raise ValueError(f"{call}(edge=...): expected at most the depth {depth:g}, got {edge:g}")
+        dx = edge / _EDGE
+        margin = 0.5 * edge + _MARGIN * dx
+        s = np.arange(-margin, (len(jumps) - 1) * depth + margin + 0.5 * dx, dx)
+        t = np.clip((s[:, None] - depth * np.arange(len(jumps))) / edge + 0.5, 0.0, 1.0)
+        heights = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2)) @ jumps
+        u, w = _heading(f"{call}(direction=...)", direction)
+        place = start + s[0]
+        return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Height of the ground at (x, y), any shape [m]."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if self.plane is not None:
+            (a, b, c), d = self.plane
+            return np.asarray((d - a * x - b * y) / c)
+        return self._spline(self.coefficients, x, y)[0]
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Outward normal of the ground at (x, y), (..., 3)."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        if self.plane is not None:
+            return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
+        _, fx, fy = self._spline(self.coefficients, x, y)
+        n = np.stack([-fx, -fy, np.ones_like(fx)], axis=-1)
+        return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
+
+    def _spline(self, coefficients: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+        """(F, F_x, F_y) of the spline with these coefficients."""
+        (ox, oy), (dx, dy), (C, S) = (np.asarray(a, float) for a in (self.origin, self.spacing, self.direction))
+        s, t = (C * (x - ox) + S * (y - oy)) / dx, (C * (y - oy) - S * (x - ox)) / dy
+        f, fs, ft = spline(coefficients, s, t)
+        fs, ft = fs / dx, ft / dy
+        return f, C * fs - S * ft, S * fs + C * ft
+
+    def offset(self, radius: float) -> Terrain:
+        """The surface that the centre of a ball of this radius cannot sink below, over a grid that is as much wider."""
+        if radius == 0.0 or self.plane is not None:
+            return self
+        spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
+        pads = [0 if n == 1 else int(np.ceil(radius / d)) + _MARGIN for n, d in zip(self.shape, spacing, strict=True)]
+        lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
+        heights = _raised(self.coefficients, spacing, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), radius)
+        x, y = (-p * d for p, d in zip(pads, spacing, strict=True))
+        start = np.asarray(self.origin) + x * direction + y * np.array([-direction[1], direction[0]])
+        return Terrain(heights, start, spacing, direction)
+
+    def surface(self, radius: float) -> Terrain:
+        """`offset`, computed once per radius."""
+        kept = self.__dict__.setdefault("_surfaces", {})
+        if radius not in kept:
+            kept[radius] = self.offset(radius)
+        surface: Terrain = kept[radius]
+        return surface
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of sqrt(1 + |grad F|^2) and of |second derivative| [1/m], from the differences of coefficients."""
+        P, (dx, dy) = np.pad(self.coefficients, 2, mode="edge"), np.asarray(self.spacing, float)
+        slopes = np.abs(np.diff(P, axis=0)).max() / dx, np.abs(np.diff(P, axis=1)).max() / dy
+        xx, yy = np.abs(np.diff(P, 2, axis=0)).max() / dx**2, np.abs(np.diff(P, 2, axis=1)).max() / dy**2
+        xy = np.abs(np.diff(np.diff(P, axis=0), axis=1)).max() / (dx * dy)
+        return float(np.sqrt(1.0 + np.dot(slopes, slopes))), float(np.sqrt(xx**2 + 2.0 * xy**2 + yy**2))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of grid lines across both axes."""
+        nx, ny = self.coefficients.shape
+        return nx - 2, ny - 2
+
+
+def _heading(call: str, direction: ArrayLike) -> tuple[float, float]:
+    """A unit vector in the plane."""
+    x, y, _ = checks.direction(call, (*checks.vector(call, direction, 2), 0.0))
+    return x, y
+
+
+def _lines(call: str, given: ArrayLike) -> Floats:
+    """Equally spaced grid lines."""
+    lines = checks.array(call, given, (None,))
+    if len(lines) == 0 or (len(lines) > 1 and not lines[0] < lines[1]):
+        raise ValueError(f"{call}: expected growing numbers, got {lines.tolist()[:3]}...")
+    if not np.allclose(np.diff(lines), lines[-1] - lines[-2] if len(lines) > 1 else 0.0, rtol=1e-6, atol=0.0):
+        raise ValueError(f"{call}: expected equally spaced grid lines, as of np.linspace")
+    return lines
+
+
+def spline_coefficients(heights: ArrayLike) -> Floats:
+    """(nx + 2, ny + 2) coefficients of the cubic B-spline through heights (nx, ny); not-a-knot at the edges."""
+    out = np.asarray(heights, dtype=np.float64)
+    for _ in range(2):
+        out = np.linalg.solve(_collocation(len(out)), np.concatenate([out, np.zeros((2, out.shape[1]))])).T
+    return np.ascontiguousarray(out)
+
+
+def _collocation(n: int) -> Floats:
+    """(n + 2, n + 2): values at the grid lines, then the conditions at both edges.
+
+    Four lines and more: no jump of the third derivative at the second line. Fewer: as straight as they can be.
+    """
+    A = np.zeros((n + 2, n + 2))
+    for k in range(n):
+        A[k, k : k + 3] = 1 / 6, 4 / 6, 1 / 6
+    end = [1.0, -4.0, 6.0, -4.0, 1.0] if n >= 4 else [1.0, -2.0, 1.0] if n > 1 else [1.0, -1.0]
+    A[n, : len(end)] = end
+    A[n + 1, n + 2 - len(end) :] = end
+    return A
+
+
+def spline(coefficients: Floats, s: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
+    """(F, F_s, F_t) of a cubic B-spline at grid coordinates; see height_field.py."""
+    bs, ds, rows = _basis(s, coefficients.shape[0])
+    bt, dt, columns = _basis(t, coefficients.shape[1])
+    c = coefficients[rows[..., :, None], columns[..., None, :]]
+    pick = "...i,...ij,...j->..."
+    return np.einsum(pick, bs, c, bt), np.einsum(pick, ds, c, bt), np.einsum(pick, bs, c, dt)
+
+
+def _basis(s: Floats, count: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Weights of four coefficients, their derivatives, and which coefficients they are."""
+    s = np.clip(s, -4.0, count + 2.0)
+    i = np.floor(s)
+    t = s - i
+    u = 1.0 - t
+    b = [u**3 / 6, (4 + t * t * (3 * t - 6)) / 6, (4 + u * u * (3 * u - 6)) / 6, t**3 / 6]
+    d = [-0.5 * u * u, t * (1.5 * t - 2), -u * (1.5 * u - 2), 0.5 * t * t]
+    index = np.clip(i.astype(np.int64)[..., None] + np.arange(4), 0, count - 1)
+    return np.stack(b, axis=-1), np.stack(d, axis=-1), index
+
+
+def _raised(coefficients: Floats, spacing: Floats, here: Floats, radius: float) -> Floats:
+    """Heights of the surface at a distance: the highest that a ball over every place here (..., 2) comes to lie.
+
+    The best of 97 directions from the centre to the ground, then steps to where that direction is the normal.
+    """
+
+    def reach(arm: Floats) -> tuple[Floats, Floats, Floats]:
+        """Height of a ball that touches the ground `arm` away from below its centre, gradient there, and its rise."""
+        at = (here + arm) / spacing
+        f, fs, ft = spline(coefficients, at[..., 0], at[..., 1])
+        rise = np.sqrt(np.maximum(radius**2 - np.sum(arm**2, axis=-1), 0.0))
+        return f + rise, np.stack([fs, ft], axis=-1) / spacing, rise
+
+    best, arm = reach(np.zeros_like(here))[0], np.zeros_like(here)
+    for tilt in np.linspace(0.15, 1.5, 8):
+        for turn in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
+            other = np.broadcast_to(radius * np.sin(tilt) * np.array([np.cos(turn), np.sin(turn)]), here.shape)
+            value = reach(other)[0]
+            better = value > best
+            best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
+    share = np.ones(best.shape)
+    for _ in range(100):
+        slope = reach(arm)[1]
+        goal = radius * slope / np.sqrt(1.0 + np.sum(slope**2, axis=-1, keepdims=True))
+        other = arm + share[..., None] * (goal - arm)
+        value = reach(other)[0]
+        better = value >= best
+        gain = float(np.max(value - best))
+        best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
+        share = np.where(better, np.minimum(1.0, 1.5 * share), 0.5 * share)
+        if gain < 1e-14:
+            break
+    return best

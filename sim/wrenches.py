@@ -1,0 +1,121 @@
+"""External wrenches: forces and torques on bodies over time, in the calls of a Simulator.
+
+A body that is pushed gets six inputs more, in a simulator of its own that is made when it is first needed. So wrenches
+are exact in a step and in its derivatives, and cost nothing where there are none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.parts import Input
+from sim.results import Linearization, Shot, StepResult, Trajectory
+
+if TYPE_CHECKING:
+    from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+Wrenches = ArrayLike | Mapping[str, ArrayLike]
+
+__all__ = ["Wrenches", "closed_loop", "linearize", "linearize_trajectory", "rollout", "step"]
+
+
+def _table(sim: Simulator, call: str, wrenches: Any, steps: int) -> dict[str, Floats]:
+    """(steps, 6) force and torque of every body that is pushed at all."""
+    names = sim.mechanism.body_names
+    if isinstance(wrenches, Mapping):
+        for name in wrenches:
+            checks.one_of(f"{call}: body", name, names)
+        given = {name: (value, (6,)) for name, value in wrenches.items()}
+    else:
+        shape = (len(names), 6)
+        lead = (steps,) if np.ndim(wrenches) == 3 else ()
+        all_of_them = checks.array(call, wrenches, (*lead, *shape))
+        given = {name: (all_of_them[..., i, :], (6,)) for i, name in enumerate(names)}
+    table = {}
+    for name, (value, last) in given.items():
+        lead = (steps,) if np.ndim(value) == 2 else ()
+        rows = checks.array(f"{call}: body {name!r}", value, (*lead, *last))
+        if rows.any():
+            table[name] = np.broadcast_to(rows, (steps, 6))
+    return table
+
+
+def _pushed(sim: Simulator, method: str, wrenches: Any, us: Floats) -> tuple[Simulator, Floats]:
+    """The simulator with six inputs more for every body that is pushed, and its inputs (steps, nu + 6 n)."""
+    table = _table(sim, f"Simulator.{method}(wrenches=...)", wrenches, len(us))
+    if not table:
+        return sim, us
+    kept: dict[tuple[str, ...], Simulator] = sim.__dict__.setdefault("_pushed", {})
+    key = tuple(table)
+    if key not in kept:
+        unit = np.eye(6)
+        more = [
+            Input(body=body, force=row[:3], torque=row[3:], name=f"wrench on {body} [{k}]")
+            for body in key
+            for k, row in enumerate(unit)
+        ]
+        kept[key] = sim.replace(mechanism=replace(sim.mechanism, inputs=[*(sim.mechanism.inputs or ()), *more]))
+    return kept[key], np.concatenate([us, *table.values()], axis=1)
+
+
+def _inputs(sim: Simulator, method: str, name: str, us: ArrayLike) -> Floats:
+    """Inputs (steps, nu), checked."""
+    return checks.array(f"Simulator.{method}({name})", us, (None, sim.nu))
+
+
+def step(sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches, throw: bool) -> StepResult:
+    """`Simulator.step` under wrenches (nbody, 6)."""
+    us = _inputs(sim, "step", "u", np.zeros((1, sim.nu)) if u is None else np.asarray(u)[None])
+    other, inputs = _pushed(sim, "step", wrenches, us)
+    return other.step(x, inputs[0], throw=throw)
+
+
+def rollout(sim: Simulator, x: ArrayLike, us: ArrayLike, wrenches: Wrenches, throw: bool) -> Trajectory:
+    """`Simulator.rollout` under wrenches (T, nbody, 6)."""
+    other, inputs = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
+    found = other.rollout(x, inputs, throw=throw)
+    return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]))
+
+
+def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches, **options: Any) -> Shot:
+    """`Simulator.closed_loop` under wrenches (T, nbody, 6), which no gain changes."""
+    other, inputs = _pushed(sim, "closed_loop", wrenches, _inputs(sim, "closed_loop", "us", us))
+    more = other.nu - sim.nu
+    for name, axis in (("ks", 1), ("Ks", 1)):
+        if options.get(name) is not None:
+            part = np.asarray(options[name], dtype=np.float64)
+            pad = [(0, more if k == axis else 0) for k in range(part.ndim)]
+            options[name] = np.pad(part, pad)
+    if options.get("limits") is not None:
+        free = np.full(more, np.inf)
+        low, high = (np.broadcast_to(np.asarray(b, dtype=np.float64), (sim.nu,)) for b in options["limits"])
+        options["limits"] = np.concatenate([low, -free]), np.concatenate([high, free])
+    found = other.closed_loop(x0, inputs, **options)
+    return replace(found, u=np.ascontiguousarray(found.u[:, : sim.nu]))
+
+
+def linearize(
+    sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches, kappa: float | None
+) -> tuple[Floats, Floats]:
+    """`Simulator.linearize` of the step under wrenches (nbody, 6)."""
+    us = _inputs(sim, "linearize", "u", np.zeros((1, sim.nu)) if u is None else np.asarray(u)[None])
+    other, inputs = _pushed(sim, "linearize", wrenches, us)
+    A, B = other.linearize(x, inputs[0], kappa)
+    return A, np.ascontiguousarray(B[:, : sim.nu])
+
+
+def linearize_trajectory(
+    sim: Simulator, xs: ArrayLike, us: ArrayLike, wrenches: Wrenches, substeps: int, kappa: float | None
+) -> Linearization:
+    """`Simulator.linearize_trajectory` under wrenches (T, nbody, 6)."""
+    method = "linearize_trajectory"
+    other, inputs = _pushed(sim, method, wrenches, _inputs(sim, method, "us", us))
+    found = other.linearize_trajectory(xs, inputs, substeps, kappa)
+    return replace(found, B=np.ascontiguousarray(found.B[..., : sim.nu]))

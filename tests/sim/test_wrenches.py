@@ -1,0 +1,88 @@
+"""External wrenches: what they do to momentum, that they are constants of derivatives, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scenes import ball, chain, random_state
+
+import dojo_opt as dojo
+
+
+def floating(rng):
+    """Three free bodies in a chain, and wrenches on all of them at all times."""
+    sim = dojo.Simulator(chain("spherical", 2), time_step=0.01)
+    return sim, random_state(sim, rng), rng.normal(size=(20, 3, 6))
+
+
+def test_momentum_is_their_integral(rng):
+    """Forces add to the linear momentum, moments about the origin to the angular one, exactly."""
+    sim, x, W = floating(rng)
+    t = sim.rollout(x, np.zeros((20, sim.nu)), wrenches=W, throw=True)
+    assert t.simulator is sim and t.u.shape == (20, sim.nu)
+    linear, angular = sim.momentum(t.x)
+    force, arms = W[:, :, :3], sim.maximal(t.x)[:-1, :, :3]
+    moment = np.cross(arms, force) + W[:, :, 3:]
+    expected = 0.01 * np.concatenate([force, moment], axis=2).sum(axis=1)
+    np.testing.assert_allclose(np.diff(np.concatenate([linear, angular], axis=1), axis=0), expected, atol=1e-9)
+
+
+def test_one_body_by_name_and_as_a_table_are_the_same(rng):
+    sim, x, _ = floating(rng)
+    wrench = rng.normal(size=6)
+    table = np.zeros((20, 3, 6))
+    table[:, 1] = wrench
+    us = np.zeros((20, sim.nu))
+    expected = sim.rollout(x, us, wrenches=table).x
+    np.testing.assert_array_equal(sim.rollout(x, us, wrenches={"body1": wrench}).x, expected)
+    np.testing.assert_array_equal(sim.rollout(x, us, wrenches={"body1": np.tile(wrench, (20, 1))}).x, expected)
+    np.testing.assert_array_equal(sim.rollout(x, us, wrenches=table[0]).x, expected)
+    np.testing.assert_array_equal(sim.step(x, wrenches={"body1": wrench}).x, expected[1])
+    shot = sim.closed_loop(x, us, wrenches=table)
+    np.testing.assert_allclose(shot.x, expected, atol=1e-7)
+    assert shot.u.shape == (20, sim.nu)
+
+
+def test_none_and_zero_are_the_same_simulator(rng):
+    sim, x, W = floating(rng)
+    us = np.zeros((20, sim.nu))
+    np.testing.assert_array_equal(sim.rollout(x, us, wrenches=0.0 * W).x, sim.rollout(x, us).x)
+    assert not sim.__dict__.get("_pushed")
+
+
+def test_derivatives_are_those_of_the_pushed_step(rng):
+    """A and B of a ball that is pressed onto the ground, with gains of a policy beside it."""
+    sim = dojo.Simulator(ball(), time_step=0.01, kappa=1e-4, tolerance=1e-13)
+    x = sim.neutral()
+    x[2] = 0.1
+    push = {"ball": np.array([0.5, 0.2, -20.0, 0.1, 0.0, 0.3])}
+    A, B = sim.linearize(x, wrenches=push)
+    after = sim.step(x, wrenches=push).x
+    for J, change, n in ((A, lambda d: (sim.integrate(x, d), None), sim.ndx), (B, lambda d: (x, d), sim.nu)):
+        for column, d in zip(J.T, 1e-5 * np.eye(n), strict=True):
+            ends = [sim.step(*change(s * d), wrenches=push).x for s in (1.0, -1.0)]
+            slope = (sim.difference(x1=ends[0], x0=after) - sim.difference(x1=ends[1], x0=after)) / 2e-5
+            np.testing.assert_allclose(column, slope, atol=1e-5 * np.abs(J).max())
+    lines = sim.linearize_trajectory(x[None], np.zeros((1, sim.nu)), wrenches=push)
+    np.testing.assert_allclose(lines.B[0], B, atol=1e-9)
+    K = np.zeros((3, sim.nu, sim.ndx))
+    K[:, 2, 2] = -50.0
+    shot = sim.closed_loop(
+        x, np.zeros((3, sim.nu)), xs=np.tile(x, (4, 1)), Ks=K, limits=(-1.0, 1.0), wrenches={"ball": (1, 0, 0, 0, 0, 0)}
+    )
+    assert shot.knot == 3 and shot.x[-1, sim.nq] > 0.02 and np.abs(shot.u).max() <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("wrenches", "message"),
+    [
+        ({"leg": np.zeros(6)}, r"Simulator.rollout\(wrenches=...\): body: 'leg' is not one of: ball"),
+        ({"ball": np.zeros(5)}, r"body 'ball': expected shape \(6,\), got \(5,\)"),
+        (np.zeros((4, 1, 6)), r"expected shape \(3, 1, 6\), got \(4, 1, 6\)"),
+        ({"ball": np.full(6, np.nan)}, "expected finite numbers"),
+    ],
+)
+def test_bad_wrenches_are_refused(wrenches, message):
+    sim = dojo.Simulator(ball(), time_step=0.01)
+    with pytest.raises(ValueError, match=message):
+        sim.rollout(sim.neutral(), np.zeros((3, sim.nu)), wrenches=wrenches)
