@@ -12,6 +12,7 @@ from sim import (
     cone_limit,
     coupling,
     coupling_gradient,
+    gears,
     loops,
     pair_choice,
     pair_far,
@@ -115,8 +116,10 @@ def bind_step(model: Model) -> None:
         _bind(model, (ball_spring.spring_impulse,))
     if np.any(model.contact_law == int(Law.LINEAR)):
         _bind(model, _PYRAMIDS)
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _LOOPS)
+    if len(model.gear_dof):
+        _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
     if np.any(model.contact_terrain):
@@ -138,7 +141,7 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (swing.swing_curvature,))
     if _has_ball_springs(model):
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)
     if len(model.pair_kind):
         _bind(model, (pair_far.all_near,))

@@ -13,12 +13,14 @@ zeta_0 answers the right-hand side and Z the unit forces:
 
 so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row; couple_live names those
 that the dense system has: not those of far pairs, nor those without stiffness. Constraints that say nothing
-new (a planar loop in space) are found by the pivots, and their forces set to zero.
+new (a planar loop in space) are found by the pivots, and their forces set to zero; their rows are rounding, and kept so
+by a scale that does not look at directions.
 """
 
 from __future__ import annotations
 
 from sim.elimination import solve
+from sim.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
 from sim.model import Late, Matrix, Model, Vector, Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
@@ -101,47 +103,93 @@ def response(model: Model, work: Work, k: int, row: int) -> float:
 
 
 @kernel
-def _row_scale(T: Matrix, row: int) -> float:
-    """1 over the largest entry of a row of the dense system."""
-    largest = 0.0
+def response_size(model: Model, work: Work, k: int, row: int) -> float:
+    """|R||zeta| instead of R zeta, translations and rotations apart: a response far below it is rounding."""
+    R = work.couple_R[row]
+    t = 0.0
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i >= 0:
+            for part in range(2):
+                r = 0.0
+                z = 0.0
+                for c in range(3 * part, 3 * part + 3):
+                    r += R[6 * side + c] ** 2
+                    z += work.twist[i, c] ** 2
+                t += (r * z) ** 0.5
+    return t
+
+
+@kernel
+def _row_scale(T: Matrix, row: int, size: float) -> float:
+    """1 over the largest entry of a row of the dense system, or over `size` when that is larger."""
+    largest = size
     for col in range(T.shape[1]):
         largest = max(largest, abs(T[row, col]))
     return 1.0 / largest if largest > 0.0 else 1.0
 
 
-@late(Late.FACTOR_COUPLING, True)
-def factor_coupling(model: Model, work: Work) -> bool:
-    """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
+@kernel
+def live_rows(model: Model, work: Work) -> int:
+    """Fills couple_live, after `take_apart`: row, and its coupling, or -1 - k for gear k; returns their number."""
     n = 0
     for k in range(model.coupling_body.shape[0]):
-        if not is_loop(model, k):
-            if work.coupling_live[k] == 0:
-                continue
-            take_apart(work, k, model.coupling_row[k])
+        if not is_loop(model, k) and work.coupling_live[k] == 0:
+            continue
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            if is_loop(model, k) or work.couple_E[row] > 0.0 or work.couple_E[row] < 0.0:
+            if is_loop(model, k) or abs(work.couple_E[row]) > 0.0:
                 work.couple_live[n, 0] = row
                 work.couple_live[n, 1] = k
                 n += 1
+    for k in range(model.gear_dof.shape[0]):
+        work.couple_live[n, 0] = gear_row(model, k)
+        work.couple_live[n, 1] = -1 - k
+        n += 1
+    return n
+
+
+@kernel
+def answer(model: Model, work: Work, p: int, y: Vector) -> float:
+    """R zeta of live row p, with the twists of the last solve, whose answer is y."""
+    k = work.couple_live[p, 1]
+    return response(model, work, k, work.couple_live[p, 0]) if k >= 0 else gear_response(model, work, -1 - k, y)
+
+
+@late(Late.FACTOR_COUPLING, True)
+def factor_coupling(model: Model, work: Work) -> bool:
+    """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
+    for k in range(model.coupling_body.shape[0]):
+        if not is_loop(model, k) and work.coupling_live[k] == 1:
+            take_apart(work, k, model.coupling_row[k])
+    n = live_rows(model, work)
     T = work.couple_T[:n, :n]
     pairs = 0
+    for row in range(work.couple_scale.shape[0]):
+        work.couple_scale[row] = 0.0
     for q in range(n):
         col, k = work.couple_live[q, 0], work.couple_live[q, 1]
-        for d in range(work.rhs.shape[0]):
-            work.rhs[d] = 0.0
-        add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
-        add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
+        if k >= 0:
+            for d in range(work.rhs.shape[0]):
+                work.rhs[d] = 0.0
+            add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
+            add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
+        else:
+            unit_gear_impulse(model, -1 - k, work.rhs)
         solve(model, work, work.rhs, work.couple_Y[col])
         for p in range(n):
-            T[p, q] = -response(model, work, work.couple_live[p, 1], work.couple_live[p, 0])
-        if not is_loop(model, k):
+            row, m = work.couple_live[p, 0], work.couple_live[p, 1]
+            T[p, q] = -answer(model, work, p, work.couple_Y[col])
+            if k >= 0 and m >= 0 and is_loop(model, m):
+                work.couple_scale[row] = max(work.couple_scale[row], response_size(model, work, m, row))
+        if k >= 0 and not is_loop(model, k):
             T[q, q] += work.couple_E[col]
             pairs += 1
     for p in range(n):
-        work.couple_scale[p] = _row_scale(T, p)
+        row = work.couple_live[p, 0]
+        work.couple_scale[row] = _row_scale(T, p, work.couple_scale[row])
         for q in range(n):
-            T[p, q] *= work.couple_scale[p]
-    least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
+            T[p, q] *= work.couple_scale[row]
+    least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
     rank = full_lu_factor(T, work.couple_pivots, least)
     work.couple_rank[0] = rank
     work.couple_rank[1] = n
@@ -158,9 +206,7 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
     x = work.couple_x[:n]
     for p in range(n):
         row = work.couple_live[p, 0]
-        x[p, 0] = work.couple_scale[p] * (
-            share * work.couple_gap[row] + response(model, work, work.couple_live[p, 1], row)
-        )
+        x[p, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + answer(model, work, p, out))
     full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), x)
     for row in range(work.couple_step.shape[0]):
         work.couple_step[row] = 0.0
@@ -191,11 +237,11 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
     n = int(work.couple_rank[1])
-    X = work.couple_panel[:n]
+    X = work.couple_panel
     for p in range(n):
         row, k = work.couple_live[p, 0], work.couple_live[p, 1]
-        for m in range(X.shape[1]):
-            X[p, m] = work.couple_panel[row, m]  # p <= row
+        if k < 0:
+            continue
         for side in range(2):
             i = model.coupling_body[k, side]
             if i < 0:
@@ -204,10 +250,15 @@ def solve_coupling_panel(model: Model, work: Work) -> None:
                 f = work.couple_R[row, 6 * side + c]
                 z = work.panel[6 * i + c]
                 for m in range(X.shape[1]):
-                    X[p, m] += f * z[m]
+                    X[row, m] += f * z[m]
         for m in range(X.shape[1]):
-            X[p, m] *= work.couple_scale[p]
-    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X)
+            X[row, m] *= work.couple_scale[row]
+    add_gear_columns(model, work, X)
+    for p in range(n):
+        row = work.couple_live[p, 0]
+        for m in range(X.shape[1]):
+            X[p, m] = X[row, m]  # p <= row
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X[:n])
     for p in range(n):
         Y = work.couple_Y[work.couple_live[p, 0]]
         for d in range(work.columns.shape[0]):

@@ -47,11 +47,11 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
+    add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
     add_bounce_derivatives(model, work)
     add_coupling_derivatives(model, work)
     if not factor_coupling(model, work):
         return False
-    add_swing_curvature(model, work, q)
     add_spring_derivatives(model, work, h, q, v)
     _joint_columns(model, work, h, v)
     _input_columns(model, work, h)
