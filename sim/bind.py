@@ -91,6 +91,12 @@ def bind_poses(model: Model) -> None:
         _bind(model, (ball_spring.add_spring_block,))
 
 
+def bind_smooth(model: Model) -> None:
+    """What steps of higher order need."""
+    if np.any(model.joint_nrot == 2):
+        _bind(model, (swing.swing_curvature,))
+
+
 def bind_step(model: Model) -> None:
     """What a time step needs: the interior point only where there are contacts or limits."""
     hard = len(model.contact_body) + len(model.limit_dof) > 0

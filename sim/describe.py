@@ -10,6 +10,7 @@ from sim.build import mechanism_sizes
 from sim.left_out import reach
 from sim.mechanism import Mechanism
 from sim.parts import Joint
+from sim.tableau import tableau
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator
@@ -29,7 +30,7 @@ def describe(sim: Simulator) -> str:
         "contacts",
         *_contact_lines(mech),
         "a step",
-        *(f"  {what:<18}{state}" for what, state in _parts(mech)),
+        *(f"  {what:<18}{state}" for what, state in _parts(mech, sim.order)),
         *_far_lines(sim),
     ]
     return "\n".join(lines)
@@ -82,7 +83,7 @@ def _far_lines(sim: Simulator) -> list[str]:
     return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
 
 
-def _parts(mech: Mechanism) -> list[tuple[str, str]]:
+def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     """What a step computes, and what it leaves out."""
     nlimit = mechanism_sizes(mech).nlimit
     cones = sum(c.friction > 0 and c.law == "nonlinear" for c in mech.contacts)
@@ -91,6 +92,8 @@ def _parts(mech: Mechanism) -> list[tuple[str, str]]:
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if mech.contacts or nlimit else "Newton's method; interior point left out"
+    if order > 2:
+        solver = f"none: {len(tableau(order)[1])} evaluations of the equations of motion"
     counts = (
         ("contacts", len(mech.contacts), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
         ("joint limits", nlimit, f"{nlimit} bounds"),

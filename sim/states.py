@@ -20,13 +20,13 @@ from solvers.status import MESSAGES, Status
 Floats = NDArray[np.float64]
 
 
-def _composed(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
+def _high_order(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
     """Calls of a higher order; their module is imported by those who ask for it."""
-    from sim.composed import Composed, check
+    from sim.high_order import HighOrder, check
 
     check(mechanism, settings)
-    calls = Composed(model, settings)
-    calls.check_dampers(mechanism)
+    calls = HighOrder(model, settings)
+    calls.check_stiffness(mechanism)
     return calls
 
 
@@ -40,7 +40,7 @@ class States:
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._calls = Calls(self.model, settings) if self.order == 2 else _composed(self.model, mechanism, settings)
+        self._calls = Calls(self.model, settings) if self.order == 2 else _high_order(self.model, mechanism, settings)
         self._border = Border(mechanism, self._calls)
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -69,7 +69,10 @@ class States:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
 
         The velocity of a state is the mean one of the interval before it; this one has the momentum M(q) v at its end,
-        so that a simulation started with it is right to second order from its first step.
+        so that a simulation started with it is right to second order from its first step. That takes the motion to be
+        free of contacts: start(q, 0) on the ground has the velocity g h/2 that gravity alone would take away, a little
+        hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as that of
+        `neutral` and of `equilibrium`.
         """
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))

@@ -1,0 +1,305 @@
+"""Simulators of order 4, 6, 8: the order is there, momentum stays, and what they cannot do is refused."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mechanisms import random_body, random_state, unit_quaternion
+
+import dojo_opt as dojo
+from sim.mechanism import Mechanism
+from sim.parts import KINDS, Input, Joint
+from sim.tableau import stable, tableau
+
+ORDERS = (4, 6, 8)
+
+
+def branch(kind: str, on_world: bool, *, spring: float = 3.0, damper: float = 0.0, free: bool = False) -> Mechanism:
+    """A joint of one kind with a branch behind it, every frame skewed, pushed by inputs of every sort."""
+    rng = np.random.default_rng(4)
+    names = ["a", "b", "c"]
+    kinds = [kind, "revolute", "spherical"] if on_world else ["floating", kind, "revolute"]
+
+    def joint(k: int) -> Joint:
+        n = sum(KINDS[kinds[k]])
+        loose = free or kinds[k] == "floating"
+        return Joint(
+            kinds[k], None if k == 0 else "a", names[k], parent_point=0.3 * rng.normal(size=3),
+            child_point=0.3 * rng.normal(size=3), axis=rng.normal(size=3), orientation=unit_quaternion(rng),
+            spring=0.0 if loose else spring, damper=0.0 if loose else damper, rest=0.2 * rng.normal(size=n),
+        )  # fmt: skip
+
+    inputs = [
+        Input("joint1", dof=0) if sum(KINDS[kinds[1]]) else Input(body="b", force=(0, 1, 0)),
+        Input(body="c", force=(1.0, 0.5, -2.0), torque=(0.1, 0.2, 0.3), frame="body"),
+        Input(body="b", force=(0.3, 0.1, -0.4), torque=(0.3, -0.2, 0.1), frame="world"),
+    ]
+    joints = [replace(joint(k), name=f"joint{k}") for k in range(3)]
+    return Mechanism([random_body(rng, n) for n in names], joints, inputs=inputs)
+
+
+def end(mech: Mechanism, order: int, h: float, duration: float, u: np.ndarray | None = None) -> np.ndarray:
+    sim = dojo.Simulator(mech, time_step=h, order=order, tolerance=1e-13)
+    q, v = random_state(np.random.default_rng(3), mech, speed=1.0)
+    steps = round(duration / h)
+    us = np.zeros((steps, sim.nu)) if u is None else np.tile(u, (steps, 1))
+    return np.asarray(sim.rollout(sim.start(q, v), us, throw=True).x[-1])
+
+
+def apart(mech: Mechanism, a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.abs(dojo.Simulator(mech, time_step=1.0).difference(a, b)).max())
+
+
+def trees(size: int) -> list[tuple]:
+    """Rooted trees of so many nodes, as sorted tuples of the trees below the root."""
+    if size == 1:
+        return [()]
+    parts = {()}
+    for _ in range(size - 1):  # hang one more leaf anywhere
+        parts = {tuple(sorted(t)) for old in parts for t in _grown(old)}
+    return sorted(parts)
+
+
+def _grown(tree: tuple) -> list[tuple]:
+    below = [(*tree[:k], new, *tree[k + 1 :]) for k in range(len(tree)) for new in _grown(tree[k])]
+    return [tuple(sorted(t)) for t in ((*tree, ()), *below)]
+
+
+def _size(tree: tuple) -> int:
+    return 1 + sum(map(_size, tree))
+
+
+def _density(tree: tuple) -> int:
+    return _size(tree) * int(np.prod([_density(t) for t in tree], dtype=int))
+
+
+def _weight(tree: tuple, a: np.ndarray) -> np.ndarray:
+    out = np.ones(len(a))
+    for t in tree:
+        out = out * (a @ _weight(t, a))
+    return out
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_coefficients_meet_the_order_conditions(order: int) -> None:
+    """Sum of b_i over every rooted tree is 1 over its density (Butcher): 200 conditions for order 8."""
+    a, b = tableau(order)
+    assert np.all(np.triu(a) == 0.0)
+    for size in range(1, order + 1):
+        for tree in trees(size):
+            assert abs(b @ _weight(tree, a) - 1.0 / _density(tree)) < 1e-13, tree
+    assert any(abs(b @ _weight(tree, a) - 1.0 / _density(tree)) > 1e-7 for tree in trees(order + 1))
+
+
+@pytest.mark.parametrize("kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "prismatic", "fixed"])
+@pytest.mark.parametrize("on_world", [True, False])
+def test_fourth_order_with_springs_dampers_and_inputs(kind: str, on_world: bool) -> None:
+    mech = branch(kind, on_world, damper=0.1)
+    u = np.array([0.5, 0.3, -0.7])
+    exact = end(mech, 8, 0.01, 0.4, u)
+    errors = [apart(mech, end(mech, 4, h, 0.4, u), exact) for h in (0.04, 0.02)]
+    assert errors[1] > 1e-9
+    assert abs(np.log2(errors[0] / errors[1]) - 4.0) < 0.5, errors
+
+
+@pytest.mark.parametrize(("order", "h"), [(6, 0.05), (8, 0.1)])
+def test_higher_orders(order: int, h: float) -> None:
+    mech = branch("spherical", False)
+    exact = end(mech, 8, 0.01, 0.8)
+    errors = [apart(mech, end(mech, order, step, 0.8), exact) for step in (h, h / 2)]
+    assert errors[1] > 1e-11
+    assert np.log2(errors[0] / errors[1]) > order - 1.0, errors
+
+
+@pytest.mark.parametrize("kind", ["spherical", "orbital", "planar_axis"])
+@pytest.mark.parametrize("on_world", [True, False])
+def test_it_is_the_same_motion_as_that_of_second_order(kind: str, on_world: bool) -> None:
+    mech = branch(kind, on_world, damper=0.1)
+    exact = end(mech, 8, 0.01, 0.2)
+    sim = dojo.Simulator(mech, time_step=1e-3)
+    q, v = random_state(np.random.default_rng(3), mech)
+    coarse, fine = (
+        dojo.Simulator(mech, time_step=h).rollout(
+            dojo.Simulator(mech, time_step=h).start(q, v), np.zeros((round(0.2 / h), sim.nu))
+        ).x[-1][: sim.nq]
+        for h in (5e-4, 2.5e-4)
+    )  # fmt: skip
+    np.testing.assert_allclose(2.0 * fine - coarse, exact[: sim.nq], atol=1e-6)  # dampers are of first order there
+
+
+@pytest.mark.parametrize("kind", ["spherical", "revolute", "prismatic"])
+def test_momentum_stays_to_rounding(kind: str) -> None:
+    mech = replace(branch(kind, False, spring=2.0), gravity=(0.0, 0.0, 0.0))
+    sim = dojo.Simulator(mech, time_step=0.02, order=6)
+    q, v = random_state(np.random.default_rng(1), mech)
+    x = sim.rollout(sim.start(q, v), np.zeros((200, sim.nu)), throw=True).x
+    for part in sim.momentum(x):
+        assert np.abs(part - part[0]).max() < 1e-12 * max(1.0, np.abs(part[0]).max())
+
+
+@pytest.mark.parametrize(("order", "h", "bound"), [(4, 0.005, 1e-6), (6, 0.01, 1e-7), (8, 0.02, 1e-9)])
+def test_energy_over_a_hundred_seconds(order: int, h: float, bound: float) -> None:
+    sim = dojo.Simulator(dojo.models.npendulum(2), time_step=h, order=order)
+    x = sim.rollout(sim.start([0.4, 0.3], [0.0, 0.0]), np.zeros((round(100.0 / h), sim.nu)), throw=True).x
+    assert np.abs(sim.energy(x) - sim.energy(x[0])).max() < bound
+
+
+def test_armature_is_in_the_motion_and_in_the_energy() -> None:
+    mech = dojo.models.npendulum(2)
+    mech = replace(mech, joints=[replace(j, armature=0.3) for j in mech.joints])
+    sim, second = dojo.Simulator(mech, time_step=0.01, order=8), dojo.Simulator(mech, time_step=2e-4)
+    x = sim.rollout(sim.start([1.0, 0.3], [0.0, 0.5]), np.zeros((50, sim.nu)), throw=True).x
+    y = second.rollout(second.start([1.0, 0.3], [0.0, 0.5]), np.zeros((2500, sim.nu)), throw=True).x
+    np.testing.assert_allclose(x[-1, :2], y[-1, :2], atol=1e-6)
+    assert np.abs(sim.energy(x) - sim.energy(x[0])).max() < 1e-10
+
+
+def test_states_have_the_velocity_of_the_node() -> None:
+    mech = branch("cylindrical_free", False)
+    sim, second = dojo.Simulator(mech, time_step=0.02, order=4), dojo.Simulator(mech, time_step=0.02)
+    q, v = random_state(np.random.default_rng(5), mech)
+    x, y = sim.start(q, v), second.start(q, v)
+    np.testing.assert_array_equal(x, np.r_[q, v])
+    np.testing.assert_array_equal(sim.velocity(x), v)
+    assert abs(sim.energy(x) - second.energy(y)) < 1e-9
+    np.testing.assert_allclose(np.hstack(sim.momentum(x)), np.hstack(second.momentum(y)), atol=1e-10)
+    z = sim.maximal(x)
+    np.testing.assert_allclose(z, second.bodies(q, v), atol=1e-12)
+    assert np.abs(sim.difference(sim.minimal(z), x)).max() < 1e-10
+    assert np.abs(second.maximal(y) - z).max() > 1e-4
+    slow = sim.minimal(z + np.r_[0, 0, 0, 1e-3, np.zeros(9)], joint_tolerance=np.inf)
+    assert 1e-5 < np.abs(sim.difference(slow, x)).max() < 1e-1
+
+
+def test_batches_steps_and_copies_agree_with_rollouts() -> None:
+    mech = branch("revolute", False)
+    sim = dojo.Simulator(mech, time_step=0.01, order=4)
+    q, v = random_state(np.random.default_rng(6), mech)
+    us = np.random.default_rng(7).normal(size=(2, 5, sim.nu))
+    x = sim.start(q, v)
+    batch = sim.rollout_batch(np.tile(x, (2, 1)), us)
+    copies = [pickle.loads(pickle.dumps(sim)), sim.replace(order=6).replace(order=4)]
+    for run in (sim, *copies):
+        np.testing.assert_array_equal(run.rollout(x, us[1]).x, batch.x[1])
+    one = sim.step(x, us[0, 0])
+    assert one.success and one.iterations == 4
+    np.testing.assert_allclose(one.x, batch.x[0, 1], atol=1e-12)
+    assert "order 4" in sim.describe()
+
+
+def test_a_body_that_turns_too_far_is_reported() -> None:
+    sim = dojo.Simulator(dojo.models.npendulum(1), time_step=0.1, order=4)
+    result = sim.step(sim.start([0.0], [300.0]))
+    assert not result.success
+    assert result.status in (dojo.Status.ANGULAR_STEP, dojo.Status.NO_PROGRESS)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_springs_and_dampers_are_refused_where_they_would_be_unstable(order: int) -> None:
+    bodies = [dojo.Body("cart", 2.0, (0.1, 0.1, 0.1))]
+    for field, rate in (("spring", np.sqrt(500.0 / 2.0)), ("damper", 500.0 / 2.0)):
+        joint = dojo.Joint("prismatic", None, "cart", axis=(1, 0, 0), **{field: 500.0})
+        mech = dojo.Mechanism(bodies, [joint], gravity=(0, 0, 0))
+        with pytest.raises(ValueError, match=rf"joint .*: its {field} acts at .* use a time step below"):
+            dojo.Simulator(mech, time_step=1.02 * stable(order) / rate, order=order)
+        sim = dojo.Simulator(mech, time_step=0.98 * stable(order) / rate, order=order)
+        x = sim.rollout(sim.start([0.1], [0.1]), np.zeros((2000, sim.nu)), throw=True).x
+        assert np.abs(x).max() < 10.0 and np.abs(x[-1]).max() < 2.0
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "what"),
+    [
+        (dojo.models.block(), r"'block' has the contact '.*' and 7 more"),
+        (replace(dojo.models.quadruped(), contacts=()), "limits of joint '.*' and 11 more"),
+        (
+            dojo.models.npendulum(2, damper=500.0),
+            "joint 'joint_1': its damper acts at .* use a time step below",
+        ),
+    ],
+)
+def test_what_is_not_smooth_or_too_fast_is_refused(mechanism: Mechanism, what: str) -> None:
+    with pytest.raises(ValueError, match=what):
+        dojo.Simulator(mechanism, time_step=0.01, order=4)
+
+
+@pytest.mark.parametrize(
+    "kind", ["floating", "spherical", "revolute", "cylindrical_free", "planar_axis", "prismatic", "fixed"]
+)
+@pytest.mark.parametrize("on_world", [True, False])
+def test_derivatives_are_those_of_central_differences(kind: str, on_world: bool) -> None:
+    mech = branch(kind, on_world, damper=0.1)
+    sim = dojo.Simulator(mech, time_step=0.05, order=4)
+    x = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
+    u = np.array([0.5, 0.3, -0.7])
+    A, B = sim.linearize(x, u)
+
+    def difference(dx: np.ndarray, du: np.ndarray) -> np.ndarray:
+        ends = (sim.step(sim.integrate(x, s * dx), u + s * du, throw=True).x for s in (1e-5, -1e-5))
+        return np.asarray(sim.difference(*ends)) / 2e-5
+
+    for k, column in enumerate(np.eye(sim.ndx)):
+        np.testing.assert_allclose(A[:, k], difference(column, 0.0 * u), atol=1e-8 * np.abs(A).max(), rtol=0)
+    for k, column in enumerate(np.eye(sim.nu)):
+        np.testing.assert_allclose(B[:, k], difference(np.zeros(sim.ndx), column), atol=1e-8, rtol=0)
+
+
+def test_knots_of_several_steps_are_products_and_policies_follow_trajectories() -> None:
+    mech = branch("spherical", False)
+    sim = dojo.Simulator(mech, time_step=0.02, order=6)
+    x0 = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
+    us = np.random.default_rng(1).normal(size=(4, sim.nu))
+    fine = sim.rollout(x0, np.repeat(us, 2, axis=0), throw=True).x
+    line = sim.linearize_trajectory(fine[::2], us, substeps=2)
+    np.testing.assert_allclose(line.x_next, fine[2::2], atol=1e-12)
+    (A1, B1), (A2, B2) = (sim.linearize(x, us[0]) for x in fine[:2])
+    np.testing.assert_allclose(line.A[0], A2 @ A1, atol=1e-10)
+    np.testing.assert_allclose(line.B[0], A2 @ B1 + B2, atol=1e-10)
+    xs, rolled = sim.linearize_rollout(x0, us[:2])
+    np.testing.assert_allclose(xs, sim.rollout(x0, us[:2]).x, atol=1e-12)
+    np.testing.assert_allclose(rolled.A[0], A1, atol=1e-10)
+    Ks = np.random.default_rng(2).normal(size=(4, sim.nu, sim.ndx))
+    shot = sim.closed_loop(x0, us, fine[::2], Ks=Ks, substeps=2)
+    np.testing.assert_allclose(shot.x, fine[::2], atol=1e-10)
+    dx = 1e-6 * np.random.default_rng(4).normal(size=sim.ndx)
+    shot = sim.closed_loop(sim.integrate(x0, dx), us, fine[::2], Ks=Ks, substeps=2)
+    np.testing.assert_allclose(sim.difference(shot.x[1], fine[2]), (line.A[0] + line.B[0] @ Ks[0]) @ dx, atol=1e-9)
+
+
+def test_a_swing_up_is_planned() -> None:
+    problem = dojo.problems.swingup("cartpole")
+    costs, constraints = problem.specs
+    sim = problem.sim.replace(order=4)
+    plan = dojo.ilqr(
+        dojo.Problem(
+            sim, problem.start, problem.horizon, cost=costs, constraints=constraints, controls0=problem.controls0
+        )
+    )
+    assert plan.success, plan.message
+
+
+def test_what_order_two_alone_has_and_unknown_orders_are_refused() -> None:
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=4)
+    x = sim.neutral()
+    for call in (lambda: sim.maximal_jacobian(x), lambda: sim.minimal_jacobian(sim.maximal(x))):
+        with pytest.raises(ValueError, match=r"order 4: .* those of order 2; use replace\(order=2\)"):
+            call()
+    swing = dojo.Simulator(branch("orbital", True), time_step=0.01, order=4)
+    with pytest.raises(ValueError, match=r"derivatives through joint 0, with two rotations"):
+        swing.linearize(swing.neutral())
+    with pytest.raises(ValueError, match=r"expected one of \(2, 4, 6, 8\), got 3"):
+        dojo.Simulator(dojo.models.pendulum(), order=3)
+
+
+def test_second_order_does_not_know_of_the_others() -> None:
+    program = (
+        "import sys, numpy as np, dojo_opt as dojo; sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01); "
+        "sim.rollout(sim.neutral(), np.zeros((2, 1))); print([m for m in sys.modules if m in ('sim.high_order', 'sim.runge_kutta', 'sim.hamilton')])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
