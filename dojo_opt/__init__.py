@@ -26,6 +26,7 @@ __all__ = [
     "Contact",
     "Cylinder",
     "Disturbances",
+    "Gear",
     "HalfSpace",
     "Input",
     "Joint",
@@ -79,6 +80,7 @@ _HOME: dict[str, str | None] = {
     "Disturbances": "dojo_opt.plant.disturbances",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
+    "Gear": "sim.gear",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
     "MPC": "dojo_opt.mpc.controller",
@@ -133,6 +135,7 @@ if TYPE_CHECKING:
     from dojo_opt.rest import equilibrium
     from dojo_opt.tracking import tracking_gains
     from sim.collisions import Collision
+    from sim.gear import Gear
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
     from sim.parts import Body, Contact, Input, Joint

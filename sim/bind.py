@@ -12,6 +12,7 @@ from sim import (
     cone_limit,
     coupling,
     coupling_gradient,
+    gears,
     loops,
     pair_stiffness,
     pairs,
@@ -107,8 +108,10 @@ def bind_step(model: Model) -> None:
         _bind(model, (ball_spring.spring_impulse,))
     if np.any(model.contact_law == int(Law.LINEAR)):
         _bind(model, _PYRAMIDS)
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _LOOPS)
+    if len(model.gear_dof):
+        _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
     if np.any(model.contact_terrain):
@@ -130,7 +133,7 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (swing.swing_curvature,))
     if _has_ball_springs(model):
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
-    if len(model.coupling_body):
+    if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)
     if np.any(model.contact_restitution):
         _bind(model, (restitution.add_bounce_composites,))

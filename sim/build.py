@@ -34,8 +34,9 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         nu=len(mech.inputs or ()),
         npair=npair,
         ncoupling=npairs + len(mech.loops),
-        nrow=6 * npairs + sum(6 - j.nv for j in mech.loops),
+        nrow=6 * npairs + sum(6 - j.nv for j in mech.loops) + len(mech.gears),
         nloop=len(mech.loops),
+        ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),
     )
@@ -50,6 +51,7 @@ def pack(mech: Mechanism) -> Model:
     _pack_contacts(mech, model)
     pack_collisions(mech, model)
     _pack_loops(mech, model)
+    _pack_gears(mech, model)
     _pack_inputs(mech, model)
     model.gravity[:] = np.asarray(mech.gravity)
     return model
@@ -227,6 +229,13 @@ def _pack_loops(mech: Mechanism, model: Model) -> None:
         model.loop_axes[m, : fixed.size] = fixed.ravel()
         axis, first_across, second_across = contact_frame(joint.axis)
         model.loop_axis[m] = np.concatenate([first_across, second_across, axis])
+
+
+def _pack_gears(mech: Mechanism, model: Model) -> None:
+    for k, gear in enumerate(mech.gears):
+        ends = ((gear.joint, gear.dof), (gear.other, gear.other_dof))
+        model.gear_dof[k] = [model.body_vadr[mech.joint_names.index(name)] + dof for name, dof in ends]
+        model.gear_ratio[k], model.gear_offset[k] = gear.ratio, gear.offset
 
 
 def _pack_inputs(mech: Mechanism, model: Model) -> None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sim import coordinates, coordinates_jacobian, energy, linear_rollout, rollout, start, state, velocity
 from sim.bind import bind_gradient, bind_poses, bind_step
 from sim.layout import allocate_work, sizes_of, table, work_view
-from sim.model import Integers, Model, Vector
+from sim.model import Integers, Model, Vector, Work
 from sim.policy import Path, Policy, closed_loop
 from solvers.status import Status
 
@@ -205,6 +205,17 @@ class Calls:
         for first, last in work.near[: work.counts[2]]:
             out[first:last] = False
         return out
+
+    def last(self) -> Work:
+        """What the last step of this thread has left."""
+        return work_view(self._work())
+
+    def open_loops(self) -> list[float]:
+        """How far loops, then gears, were open in the last iterate of this thread [m, or sine of an angle]."""
+        ends = self.model.coupling_row[len(self.model.coupling_body) - self.sizes.nloop :]
+        ends = np.concatenate([ends, ends[-1] + 1 + np.arange(self.sizes.ngear)])
+        gap = np.abs(self.last().couple_gap)
+        return [float(gap[a:b].max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
         """(status, state) with the velocity v at the node q."""

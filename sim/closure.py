@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.build import contact_frame, fixed_axes
 from sim.calls import Calls
+from sim.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
 from sim.shapes import rotation_matrix
@@ -17,6 +19,33 @@ Floats = NDArray[np.float64]
 
 _STEP = 1e-6  # of central differences [m, rad]
 _CLOSED = 1e-11  # [m], and as much of an angle
+_APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
+_DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
+
+
+class LoopRank(NamedTuple):
+    """How many constraints the loops of a mechanism have, and how many of them say something new."""
+
+    constraints: dict[str, int]  # by loop joint
+    redundant: dict[str, int]  # by loop joint: what those before it, and its own, say already
+    mobility: int  # degrees of freedom that the loops leave
+    weakest: float  # least singular value of the independent constraints, over the largest
+    leftover: float  # largest one of the redundant constraints, over the largest
+
+    def __str__(self) -> str:
+        total, idle = sum(self.constraints.values()), sum(self.redundant.values())
+        which = ", ".join(f"{name} {n} of {self.constraints[name]}" for name, n in self.redundant.items() if n)
+        return (
+            f"{self.mobility} degrees of freedom left by {total} constraints, {idle} redundant"
+            + (f" ({which}) to {self.leftover:.0e}" if idle else "")
+            + f"; the weakest has {self.weakest:.1e} of the strongest"
+        )
+
+
+def _angle(sine: Floats, cosine: float) -> Floats:
+    """The rotation vector along sin(angle) direction."""
+    size = float(np.linalg.norm(sine))
+    return sine * (np.arctan2(size, cosine) / size) if size > 0.0 else sine
 
 
 class Closure:
@@ -28,9 +57,17 @@ class Closure:
         self._h = calls.settings.time_step
 
     def gaps(self, x: Floats) -> dict[str, Floats]:
-        """By loop joint, what its constraints miss: distances [m], then sines of angles; at the configuration of x."""
-        z = self._calls.maximal(x[None], self._mechanism.nbody)[0]
-        return {joint.name: self._gap(joint, z) for joint in self._mechanism.loops}
+        """By loop joint and gear, what its constraints miss at x: distances [m], then angles [rad].
+
+        Angles and not the sines of the step (sim/loops.py), which vanish after half a turn as well.
+        """
+        mech = self._mechanism
+        z = self._calls.maximal(x[None], mech.nbody)[0]
+        out = {joint.name: self._gap(joint, z) for joint in mech.loops}
+        for gear in mech.gears:
+            a, b = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
+            out[f"gear {gear.name}"] = np.array([x[a] - gear.ratio * x[b] - gear.offset])
+        return out
 
     def _gap(self, joint: Joint, z: Floats) -> Floats:
         names = self._mechanism.body_names
@@ -45,9 +82,10 @@ class Closure:
         E = Q.T @ Ra
         if joint.nrot == 1:
             frame = contact_frame(joint.axis)
-            turned = frame[1:] @ (E @ frame[0])
+            turned = _angle(frame[1:] @ (E @ frame[0]), float(frame[0] @ E @ frame[0]))
         else:
-            turned = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+            sine = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+            turned = _angle(sine, 0.5 * (float(np.trace(E)) - 1.0))
         return np.concatenate([fixed_axes(joint) @ apart, turned if joint.nrot < 3 else turned[:0]])
 
     def close(self, x: Floats) -> Floats:
@@ -56,7 +94,7 @@ class Closure:
         ValueError: there is none near, with the loop that stays open and by how much.
         """
         nv = self._mechanism.nv
-        x = x.copy()
+        x = self._with_shares(x)
 
         def moved(dq: Floats) -> Floats:
             return self._calls.integrate(x[None], np.concatenate([dq, np.zeros(nv)])[None])[0]
@@ -69,6 +107,44 @@ class Closure:
 
         x[self._nq :] += self._solve(before, nv)
         return x
+
+    def _with_shares(self, x: Floats) -> Floats:
+        """A copy of x where shares of bodies (sim/closing.py) that are far from the rest of it are brought there."""
+        gaps = self.gaps(x)
+        far = [j for j in self._mechanism.loops if is_weld(j) and np.abs(gaps[j.name]).max() > _APART]
+        x = x.copy()
+        names = self._mechanism.body_names
+        for weld in far:
+            z = self._calls.maximal(x[None], self._mechanism.nbody)
+            z[0, names.index(weld.child)] = z[0, names.index(weld.parent or "")]
+            joint = self._mechanism.joints[names.index(weld.child)]
+            for at in (self._mechanism.q_slice(joint.name), self._v_slice(joint.name)):
+                x[at] = self._calls.minimal(z)[0][at]
+        return x
+
+    def _v_slice(self, joint: str) -> slice:
+        at = self._mechanism.v_slice(joint)
+        return slice(self._nq + at.start, self._nq + at.stop)
+
+    def rank(self, x: Floats) -> LoopRank:
+        """Which constraints are redundant at the configuration of x, loops in their order."""
+        nv = self._mechanism.nv
+
+        def gaps(d: Floats) -> dict[str, Floats]:
+            return self.gaps(self._calls.integrate(x[None], np.concatenate([d, np.zeros(nv)])[None])[0])
+
+        columns = [(gaps(e), gaps(-e)) for e in _STEP * np.eye(nv)]
+        rows, found, redundant = np.zeros((0, nv)), 0, {}
+        size = {name: len(gap) for name, gap in gaps(np.zeros(nv)).items()}
+        for name in size:
+            own = np.array([ahead[name] - back[name] for ahead, back in columns]).T / (2.0 * _STEP)
+            rows = np.concatenate([rows, own])
+            values = np.linalg.svd(rows, compute_uv=False)
+            independent = int(np.sum(values > _DEPENDENT * values[0]))
+            redundant[name] = size[name] - (independent - found)
+            found = independent
+        rest = values[found:].max() if found < len(values) else 0.0
+        return LoopRank(size, redundant, nv - found, float(values[found - 1] / values[0]), float(rest / values[0]))
 
     def _solve(self, place: Callable[[Floats], Floats], nv: int) -> Floats:
         """The small d with closed loops at the state place(d): Newton's method, least norm."""
@@ -87,6 +163,8 @@ class Closure:
         gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d)).items()}
         worst = max(gaps, key=lambda name: gaps[name])
         call = f"Mechanism({self._mechanism.name!r})"
+        what = worst if worst.startswith("gear ") else f"loop joint {worst!r}"
         raise ValueError(
-            f"{call}: loop joint {worst!r} cannot be closed near this state, it is off by {gaps[worst]:.2g}"
+            f"{call}: {what} cannot be closed near this state, it is off by {gaps[worst]:.2g}; give "
+            "neutral=... a configuration near one that closes, or see whether two loops contradict each other"
         )

@@ -12,12 +12,14 @@ zeta_0 answers the right-hand side and Z the unit forces:
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
 so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
-new (a planar loop in space) are found by the pivots, and their forces set to zero.
+new (a planar loop in space) are found by the pivots, and their forces set to zero; their rows are rounding, and kept so
+by a scale that does not look at directions.
 """
 
 from __future__ import annotations
 
 from sim.elimination import solve
+from sim.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
 from sim.model import Late, Matrix, Model, Vector, Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
@@ -100,9 +102,27 @@ def response(model: Model, work: Work, k: int, row: int) -> float:
 
 
 @kernel
-def _row_scale(work: Work, row: int) -> float:
-    """1 over the largest entry of a row of the dense system."""
-    largest = 0.0
+def response_size(model: Model, work: Work, k: int, row: int) -> float:
+    """|R||zeta| instead of R zeta, translations and rotations apart: a response far below it is rounding."""
+    R = work.couple_R[row]
+    t = 0.0
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i >= 0:
+            for part in range(2):
+                r = 0.0
+                z = 0.0
+                for c in range(3 * part, 3 * part + 3):
+                    r += R[6 * side + c] ** 2
+                    z += work.twist[i, c] ** 2
+                t += (r * z) ** 0.5
+    return t
+
+
+@kernel
+def _row_scale(work: Work, row: int, size: float) -> float:
+    """1 over the largest entry of a row of the dense system, or over `size` when that is larger."""
+    largest = size
     for col in range(work.couple_T.shape[1]):
         largest = max(largest, abs(work.couple_T[row, col]))
     return 1.0 / largest if largest > 0.0 else 1.0
@@ -112,6 +132,8 @@ def _row_scale(work: Work, row: int) -> float:
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
     pairs = 0
+    for row in range(work.couple_scale.shape[0]):
+        work.couple_scale[row] = 0.0
     for k in range(model.coupling_body.shape[0]):
         if not is_loop(model, k):
             take_apart(work, k, model.coupling_row[k])
@@ -125,14 +147,28 @@ def factor_coupling(model: Model, work: Work) -> bool:
             for m in range(model.coupling_body.shape[0]):
                 for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
                     work.couple_T[row, col] = -response(model, work, m, row)
+                    if is_loop(model, m):
+                        size = response_size(model, work, m, row)
+                        work.couple_scale[row] = max(work.couple_scale[row], size)
+            for m in range(model.gear_dof.shape[0]):
+                work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
             if not is_loop(model, k):
                 work.couple_T[col, col] += work.couple_E[col]
                 pairs += 1
+    for k in range(model.gear_dof.shape[0]):
+        col = gear_row(model, k)
+        unit_gear_impulse(model, k, work.rhs)
+        solve(model, work, work.rhs, work.couple_Y[col])
+        for m in range(model.coupling_body.shape[0]):
+            for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
+                work.couple_T[row, col] = -response(model, work, m, row)
+        for m in range(model.gear_dof.shape[0]):
+            work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
     for row in range(work.couple_T.shape[0]):
-        work.couple_scale[row] = _row_scale(work, row)
+        work.couple_scale[row] = _row_scale(work, row, work.couple_scale[row])
         for col in range(work.couple_T.shape[1]):
             work.couple_T[row, col] *= work.couple_scale[row]
-    least = _DEPENDENT if model.loop_ntrans.shape[0] > 0 else 1e-300
+    least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
     rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
     work.couple_rank[0] = rank
     return rank >= pairs
@@ -148,6 +184,9 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
     for k in range(model.coupling_body.shape[0]):
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
             x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + response(model, work, k, row))
+    for k in range(model.gear_dof.shape[0]):
+        row = gear_row(model, k)
+        x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + gear_response(model, work, k, out))
     full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), x)
     for row in range(x.shape[0]):
         f = x[row, 0]
@@ -188,6 +227,7 @@ def solve_coupling_panel(model: Model, work: Work) -> None:
                         X[row, m] += f * z[m]
             for m in range(X.shape[1]):
                 X[row, m] *= work.couple_scale[row]
+    add_gear_columns(model, work, X)
     full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), X)
     for row in range(X.shape[0]):
         for d in range(work.columns.shape[0]):

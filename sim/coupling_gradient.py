@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from sim.coupling import cross_block, is_loop
 from sim.friction import contact_impulse
+from sim.gears import gear_derivatives
 from sim.loops import loop_stiffness
 from sim.model import Late, Model, Work
 from sim.pair_stiffness import add_earlier_slip, centre_shift
@@ -81,6 +82,7 @@ def add_coupling_derivatives(model: Model, work: Work) -> None:
             cross_block(model, work, a, b, -1.0, work.coupling_K[2 * k + 1], work.S3)
             cross_block(model, work, b, a, 1.0, work.coupling_K[2 * k], work.S3)
     X = work.couple_panel
+    gear_derivatives(model, X)
     for k in range(model.coupling_body.shape[0]):
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
             for m in range(X.shape[1]):

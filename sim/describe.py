@@ -25,6 +25,7 @@ def describe(sim: Simulator) -> str:
         f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
         "joints",
         *(_joint_line(mech, j) for j in mech.joints),
+        *_loop_lines(sim),
         "inputs",
         *(f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)),
         "contacts",
@@ -61,6 +62,16 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
     at = f"q[{_span(mech.q_slice(joint.name))}], v[{_span(mech.v_slice(joint.name))}]"
     tail = f"  with {', '.join(extra)}" if extra else ""
     return f"  {joint.name:<18}{joint.kind:<16}{joint.parent} -> {joint.child}:  {at}{tail}"
+
+
+def _loop_lines(sim: Simulator) -> list[str]:
+    """What closes loops, and how many of its constraints say something new."""
+    loops, gears = sim.mechanism.loops, sim.mechanism.gears
+    if not loops and not gears:
+        return []
+    lines = [f"  {j.name:<18}{j.kind:<16}{j.parent} -> {j.child}:  {6 - j.nv} constraints" for j in loops]
+    lines += [f"  {g.name:<18}{'gear':<16}{g.joint} = {g.ratio:g} {g.other} + {g.offset:g}" for g in gears]
+    return ["loops", *lines, f"  {sim.loop_rank()}"]
 
 
 def _contact_lines(mech: Mechanism) -> list[str]:

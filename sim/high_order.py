@@ -205,8 +205,9 @@ def check(mechanism: Mechanism, settings: Settings) -> None:
         for j in mechanism.joints
         if j.cone is not None or any(np.isfinite(b) for pair in j.limits or () for b in pair)
     ]
-    loops = [j.name for j in mechanism.loops]
-    for what, names in (("contact", mechanism.contact_names), ("limits of joint", limited), ("loop joint", loops)):
+    loops, gears = [j.name for j in mechanism.loops], [g.name for g in mechanism.gears]
+    parts = (("contact", mechanism.contact_names), ("limits of joint", limited), ("loop joint", loops), ("gear", gears))
+    for what, names in parts:
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(

@@ -28,7 +28,8 @@ MODEL_INTS = _shapes(
     dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
-    loop_ntrans nloop, loop_nrot nloop, limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
+    loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
+    limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
     """
 )
 
@@ -40,7 +41,8 @@ MODEL_FLOATS = _shapes(
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, loop_point nloop 6,
-    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9, limit_sign nlimit, limit_bound nlimit,
+    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
+    gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit,
     input_wrench nu 6, gravity 3
     """
 )
@@ -64,7 +66,7 @@ WORK_FLOATS = _shapes(
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
     couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 1,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
-    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
+    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 24, far_law 2
@@ -88,6 +90,7 @@ class Sizes(NamedTuple):
     ncoupling: int = 0  # two bodies with pairs, and closed loops
     nrow: int = 0  # unknown forces of the couplings
     nloop: int = 0
+    ngear: int = 0
     nterrain: int = 0  # height fields: one per terrain and radius of its contacts
     nheight: int = 0  # their coefficients
 
@@ -144,8 +147,9 @@ def sizes_of(model: Model) -> Sizes:
         nu=len(model.input_kind),
         npair=len(model.pair_kind),
         ncoupling=len(model.coupling_body),
-        nrow=int(model.coupling_row[-1]),
+        nrow=int(model.coupling_row[-1]) + len(model.gear_dof),
         nloop=len(model.loop_ntrans),
+        ngear=len(model.gear_dof),
         nterrain=len(model.terrain_size),
         nheight=len(model.terrain_heights),
     )

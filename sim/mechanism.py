@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.closing import carried
 from sim.collisions import Collision, Touch, touches
+from sim.gear import Gear, check_gears
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
 from sim.terrain import Terrain
@@ -21,7 +23,8 @@ from sim.terrain import Terrain
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones
+    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+              those that close loops
     neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
               or all of q
     """
@@ -35,6 +38,7 @@ class Mechanism:
     neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
     collisions: Sequence[Collision] = ()
     loops: Sequence[Joint] = ()  # joints with close=True are moved here
+    gears: Sequence[Gear] = ()
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
@@ -43,12 +47,19 @@ class Mechanism:
             if field != "inputs" or self.inputs is not None:
                 object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
         loops = (*self.loops, *(j for j in self.joints if j.close))
-        object.__setattr__(self, "joints", tuple(j for j in self.joints if not j.close))
+        tree = tuple(j for j in self.joints if not j.close)
+        if self.inputs is None:
+            object.__setattr__(self, "inputs", _every_dof(tree))
+        driven = {part.joint for part in self.inputs or () if part.joint is not None}
+        bodies, tree, loops = carried(f"{call})", self.bodies, tree, loops, driven)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", tree)
         object.__setattr__(self, "loops", _check_loops(f"{call})", loops, self.bodies, self.joints))
         bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
         _check_masses(f"{call})", bodies, joints)
+        check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
         for c in self.collisions:
@@ -160,13 +171,8 @@ class Mechanism:
 
     def _name_inputs(self, call: str) -> tuple[Input, ...]:
         """The inputs with names, after a look at what they act on."""
-        if self.inputs is None:
-            free = [j for j in self.joints if j.kind != "floating"]
-            given = [Input(j.name, dof=d) for j in free for d in range(j.nv)]
-        else:
-            given = list(self.inputs)
         out = []
-        for part in given:
+        for part in self.inputs or ():
             if part.joint is not None:
                 label = checks.one_of(f"{call}, inputs=...): joint", part.joint, self.joint_names)
                 nv = self.joints[self.joint_names.index(label)].nv
@@ -209,7 +215,13 @@ _KINDS = {
     "inputs": Input,
     "collisions": Collision,
     "loops": Joint,
+    "gears": Gear,
 }
+
+
+def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
+    """An input for every degree of freedom of every joint but the floating ones."""
+    return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
 
 
 def _check_loops(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.elimination import project, subtree_sums
+from sim.gears import apply_gears
 from sim.inequalities import apply_inequalities, apply_limits, products, slip_error
 from sim.joints import joint_impulses
 from sim.loops import apply_loops
@@ -33,6 +34,7 @@ def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vecto
     project(model, work.S2, work.subtree, work.residual)
     joint_impulses(model, work, h, q, v, u)
     apply_limits(model, work)
+    e = max(e, apply_gears(model, work, h))
     return norm(work.residual), e
 
 

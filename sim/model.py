@@ -104,6 +104,8 @@ class Late(IntEnum):
     GAINED_ENERGY = 46
     BOUNCE_COMPOSITES = 47
     BOUNCE_DERIVATIVES = 48
+    # gears
+    APPLY_GEARS = 49
 
 
 class Model(NamedTuple):
@@ -131,6 +133,7 @@ class Model(NamedTuple):
     coupling_row: Integers  # (ncoupling + 1,) first row in the dense system
     loop_ntrans: Integers  # (nloop,) free translations
     loop_nrot: Integers  # (nloop,) free rotations
+    gear_dof: IntegerMatrix  # (ngear, 2) the degree of freedom that follows, and the one that leads
     limit_dof: Integers  # (nlimit,) a scalar degree of freedom; of a cone, the first of its three rotations
     limit_cone: Integers  # (nlimit,) 1 where the angle between the axes of parent and child is limited
     input_kind: Integers  # (nu,) InputKind
@@ -163,6 +166,8 @@ class Model(NamedTuple):
     loop_offset: Matrix  # (nloop, 9) orientation of the joint frame on b, rotation matrix
     loop_axes: Matrix  # (nloop, 9) translations that are not free, one per row, joint frame
     loop_axis: Matrix  # (nloop, 9) two directions across the free axis, and the axis, joint frame
+    gear_ratio: Vector  # (ngear,)
+    gear_offset: Vector  # (ngear,) [m, rad]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
     input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
@@ -261,6 +266,7 @@ class Work(NamedTuple):
     couple_wrench: Vector  # (6,) scratch
     loop_frame: Matrix  # (nloop, 12)
     loop_turn: Matrix  # (nloop, 9)
+    gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
     bound: Matrix  # (nlimit, 2) slack, impulse
     bound_step: Matrix  # (nlimit, 2)

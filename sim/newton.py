@@ -5,6 +5,7 @@ from __future__ import annotations
 from sim.coupling import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, project, solve, subtree_sums
+from sim.gears import apply_gears
 from sim.joints import joint_blocks, joint_impulses
 from sim.kinematics import velocity_columns
 from sim.loops import apply_loops, keep_loops, move_loops
@@ -83,6 +84,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         subtree_sums(model, work.wrench, work.subtree)
         project(model, work.S2, work.subtree, work.residual)
         joint_impulses(model, work, h, q, v, u)
+        gap = max(gap, apply_gears(model, work, h))
         r = max(norm(work.residual) / scale, gap)
         if not (inside and r < max(last, options.tolerance)):
             if inside and iterations > 0 and r < floor:

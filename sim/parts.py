@@ -119,7 +119,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
-    close: bool = False  # closes a loop: child hangs on another joint already
+    close: bool = False  # closes a loop: child hangs on another joint already; see sim/closing.py
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -135,11 +135,6 @@ class Joint:
             object.__setattr__(self, field, self._per_dof(call, field))
         object.__setattr__(self, "limits", self._limits(call))
         self._check_cone(f"{call}, cone=...)")
-        limited = any(np.isfinite(b) for pair in self.limits or () for b in pair) or self.cone is not None
-        if self.close and (any((*self.spring, *self.damper, *self.armature)) or limited):  # type: ignore[misc]
-            raise ValueError(
-                f"{call}): a joint that closes a loop has no spring, damper, armature or limits; give them to others"
-            )
 
     @property
     def ntrans(self) -> int:

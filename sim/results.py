@@ -134,8 +134,13 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     return Contacts(mech.contact_names, *parts)
 
 
-def error_of(mech: Mechanism, where: str, report: Floats, tolerance: float) -> SimulationError:
-    """The sentence of a status, with the numbers of the report of a kernel."""
+def error_of(
+    mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
+) -> SimulationError:
+    """The sentence of a status, with the numbers of the report of a kernel.
+
+    loop: by how much the one that is furthest open is, and which it is.
+    """
     status, iterations, residual, violation, contact = report
     reason = Status(int(status))
     text = f"{where}: {MESSAGES[reason]}"
@@ -143,4 +148,6 @@ def error_of(mech: Mechanism, where: str, report: Floats, tolerance: float) -> S
         text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})."
         if contact >= 0:
             text += f" Contact {mech.contact_names[int(contact)]!r} is worst, off by {violation:.1e}."
+        if loop is not None and not loop[0] < tolerance:
+            text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)

@@ -46,6 +46,7 @@ def added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name:
         neutral,
         [*mech.collisions, *collisions],
         [*mech.loops, *loops],
+        [*mech.gears, *parts["gears"]],
     )
 
 
@@ -74,6 +75,7 @@ def _renamed(mech: Mechanism, prefix: str) -> dict[str, list[Any]]:
         "inputs": ("name", "joint", "body"),
         "collisions": ("name", "a", "b"),
         "loops": ("name", "parent", "child"),
+        "gears": ("name", "joint", "other"),
     }
 
     def changed(part: Any, keys: Sequence[str]) -> Any:
@@ -87,7 +89,7 @@ def _refuse_clashes(call: str, mech: Mechanism, parts: dict[str, list[Any]], oth
     """Refuse names that both have."""
     joints = {j.name for j in (*mech.joints, *mech.loops)}
     taken = {field: {p.name for p in getattr(mech, field)} for field in parts} | {"joints": joints, "loops": joints}
-    singular = dict(zip(parts, ("body", "joint", "contact", "input", "collision", "joint"), strict=True))
+    singular = dict(zip(parts, ("body", "joint", "contact", "input", "collision", "joint", "gear"), strict=True))
     for field, found in parts.items():
         for part in found:
             if part.name in taken[field]:

@@ -17,7 +17,16 @@ from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
-from sim.results import Batch, Shot, StepResult, Trajectory, contacts_of, error_of
+from sim.reactions import Reactions, reactions
+from sim.results import (
+    Batch,
+    Shot,
+    SimulationError,
+    StepResult,
+    Trajectory,
+    contacts_of,
+    error_of,
+)
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
@@ -115,7 +124,7 @@ class Simulator(Derivatives):
         knot, xs, reports, contacts = self._calls.roll(state, us[None])
         status, iterations, residual, violation = reports[0, :4]
         if knot == 0 and throw:
-            raise error_of(self.mechanism, "Simulator.step", reports[0], self.tolerance)
+            raise self._error("Simulator.step", reports[0])
         out = xs[knot] if knot else state
         return StepResult(
             out,
@@ -141,11 +150,7 @@ class Simulator(Derivatives):
         knot, xs, reports, contacts = self._calls.roll(state, inputs)
         last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
         status = Status(int(last[0]))
-        error = (
-            None
-            if status == Status.SOLVED
-            else error_of(self.mechanism, f"Simulator.rollout: step {knot}", last, self.tolerance)
-        )
+        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last)
         if error and throw:
             raise error
         return Trajectory(
@@ -160,6 +165,13 @@ class Simulator(Derivatives):
             contacts=contacts_of(self.mechanism, self.time_step, contacts[:knot]),
             message=str(error) if error else MESSAGES[status],
         )
+
+    def _error(self, where: str, report: Floats) -> SimulationError:
+        """Why the last step of this thread was not solved."""
+        mech = self.mechanism
+        names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
+        gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
+        return error_of(mech, where, report, self.tolerance, max(gaps, default=None))
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
@@ -210,6 +222,15 @@ class Simulator(Derivatives):
             self._border.kappa(call, kappa),
         )
         return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+
+    def reactions(self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world") -> Reactions:
+        """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
+
+        x (..., nx) and u (..., nu), zero when left out, with the same leading axes: `sim.reactions(t.x[:-1], t.u)` has
+        those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
+        ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
+        """
+        return reactions(self, x, u, frame)
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of trajectories of so many knots, for a planner: see `sim.horizon`."""

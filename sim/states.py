@@ -11,7 +11,7 @@ from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls, Settings
-from sim.closure import Closure
+from sim.closure import Closure, LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.results import SimulationError
@@ -51,7 +51,7 @@ class States:
     def neutral(self) -> Floats:
         """The standing or hanging state of the mechanism, at rest, its loops closed."""
         x = np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
-        return self.close(x) if self.mechanism.loops else x
+        return self.close(x) if self._closes else x
 
     def close(self, x: ArrayLike) -> Floats:
         """The state near x that closes the loops of the mechanism, at both ends of its interval.
@@ -59,11 +59,25 @@ class States:
         Trees: x itself. ValueError: no such state is near.
         """
         state = self._border.state("close", x)
-        return Closure(self.mechanism, self._calls).close(state) if self.mechanism.loops else state
+        return Closure(self.mechanism, self._calls).close(state) if self._closes else state
+
+    @property
+    def _closes(self) -> bool:
+        """Whether there are loops, or gears."""
+        return bool(self.mechanism.loops or self.mechanism.gears)
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
-        """By loop joint, how far it is open: distances [m], then sines of angles."""
+        """By loop joint, and "gear NAME", how far it is open: distances [m], then angles [rad]."""
         return Closure(self.mechanism, self._calls).gaps(self._border.state("loop_gaps", x))
+
+    def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
+        """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
+        if not self._closes:
+            raise ValueError(
+                f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
+            )
+        state = self.neutral() if x is None else self._border.state("loop_rank", x)
+        return Closure(self.mechanism, self._calls).rank(state)
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).

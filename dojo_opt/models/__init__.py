@@ -11,12 +11,16 @@ from dojo_opt.models.block2d import block2d
 from dojo_opt.models.cartpole import cartpole
 from dojo_opt.models.catalogue import Entry as Entry
 from dojo_opt.models.catalogue import catalogue as catalogue
+from dojo_opt.models.delta import delta
 from dojo_opt.models.double_pendulum import double_pendulum
 from dojo_opt.models.dzhanibekov import dzhanibekov
 from dojo_opt.models.exoskeleton import exoskeleton
+from dojo_opt.models.fivebar import fivebar
+from dojo_opt.models.fourbar import fourbar
 from dojo_opt.models.halfcheetah import halfcheetah
 from dojo_opt.models.hopper import hopper
 from dojo_opt.models.humanoid import humanoid
+from dojo_opt.models.minitaur_leg import minitaur_leg
 from dojo_opt.models.npendulum import npendulum
 from dojo_opt.models.nslider import nslider
 from dojo_opt.models.orbital import orbital
@@ -28,6 +32,7 @@ from dojo_opt.models.raiberthopper import raiberthopper
 from dojo_opt.models.slider import slider
 from dojo_opt.models.snake import snake
 from dojo_opt.models.sphere import sphere
+from dojo_opt.models.stewart import stewart
 from dojo_opt.models.tennisracket import tennisracket
 from dojo_opt.models.tippetop import tippetop
 from dojo_opt.models.twister import twister
@@ -42,12 +47,16 @@ __all__ = [
     "block",
     "block2d",
     "cartpole",
+    "delta",
     "double_pendulum",
     "dzhanibekov",
     "exoskeleton",
+    "fivebar",
+    "fourbar",
     "halfcheetah",
     "hopper",
     "humanoid",
+    "minitaur_leg",
     "npendulum",
     "nslider",
     "orbital",
@@ -59,6 +68,7 @@ __all__ = [
     "slider",
     "snake",
     "sphere",
+    "stewart",
     "tennisracket",
     "tippetop",
     "twister",

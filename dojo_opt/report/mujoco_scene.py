@@ -42,8 +42,8 @@ def state(mj_model: Any, x: Vector) -> Any:
 
 def mjcf(model: Model, time_step: float, *, hinges: bool = False, **options: str) -> str:
     """MJCF text of the mechanism."""
-    if len(model.coupling_body):
-        raise ValueError("mjcf: collisions between bodies and closed loops are not written")
+    if len(model.coupling_body) + len(model.gear_dof):
+        raise ValueError("mjcf: collisions between bodies and closed loops and gears are not written")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("mjcf: terrain and restitution are not written")
     settings = {"timestep": repr(float(time_step)), "gravity": _numbers(model.gravity), "cone": "elliptic", **options}

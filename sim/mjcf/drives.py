@@ -54,10 +54,6 @@ def _bounds(model: Any, a: int, gear: float, plain: bool) -> tuple[float, float]
 
 def left_out(model: Any, notes: Notes) -> None:
     """Notes on what the file has and the mechanism does not."""
-    if model.neq:
-        notes.add(
-            "equality constraints are left out", [name_of(model, "equality", k) for k in range(model.neq)], warn=True
-        )
     if model.ntendon:
         notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)])
     if model.npair:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from sim import checks
 from sim.mjcf.contacts import find_contacts
 from sim.mjcf.drives import find_inputs, left_out
+from sim.mjcf.equalities import find_gears, find_loops
 from sim.mjcf.groups import Group, drawn, find_groups
 from sim.mjcf.joints import BALL, FREE, carry
 from sim.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
@@ -48,9 +49,11 @@ def load_mjcf(
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
     ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move; actuators on hinges and
-    slides as inputs in N and N m, u = report.gear * ctrl. Not represented, and listed in `mechanism.report.notes`:
-    equality constraints, tendons, collisions between bodies, dry friction of joints, servos, fluids, meshes, height
-    fields, explicit pairs. What changes the motion in a way that a user would not expect is also an MjcfWarning.
+    slides as inputs in N and N m, u = report.gear * ctrl; connect and weld as joints that close loops, and linear
+    couplings of two joints as gears, all of them rigid (sim/mjcf/equalities.py). Not represented, and listed in
+    `mechanism.report.notes`: other equality constraints, tendons, collisions between bodies, dry friction of joints,
+    servos, fluids, meshes, height fields, explicit pairs. What changes the motion in a way that a user would not expect
+    is also an MjcfWarning.
 
     ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
     whose inertia no rigid body has; OSError for a file that is not there.
@@ -78,12 +81,13 @@ def load_mjcf(
     left_out(model, notes)
     mech = MjcfMechanism(
         bodies,
-        joints,
+        [*joints, *find_loops(model, where, notes)],
         find_contacts(model, where, (mu, law, int(rim_points)), notes) if ground else [],
         inputs,
         gravity=model.opt.gravity if gravity is None else gravity,
         name=Path(file).stem,
         neutral=_neutral(model, keyframe, notes),
+        gears=find_gears(model, homes, notes),
     )
     mech = _without_constant_gaps(mech, notes)
     if keyframe is None:

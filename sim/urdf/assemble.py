@@ -14,9 +14,11 @@ from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.urdf.contacts import find_contacts
 from sim.urdf.drawing import drawn
 from sim.urdf.inertia import RigidInertia, combined, fault, repaired
+from sim.urdf.loops import UrdfLoop, closing_joint, zero_poses
+from sim.urdf.mimic import mimic_gears
 from sim.urdf.pose import HERE, Pose
 from sim.urdf.report import Frame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
-from sim.urdf.robot import Robot
+from sim.urdf.robot import Robot, UrdfJoint
 from sim.urdf.stance import gaps, lifted, resting
 from sim.urdf.tree import Group, Place, group, ordered
 from sim.urdf.xml import UrdfError
@@ -38,6 +40,7 @@ class Choices:
     fixed_base: bool
     merge: bool
     locked: frozenset[str]
+    geared: tuple[str, ...]  # joints that follow another one
     repair: bool
     neutral: Mapping[str, ArrayLike]
     position: tuple[float, ...]
@@ -49,7 +52,7 @@ class Choices:
     gravity: tuple[float, ...]
 
 
-def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
+def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
     """The mechanism, with its report."""
     root, order = ordered(robot, choices.file)
     if WORLD in robot.links and root != WORLD:
@@ -66,6 +69,7 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
     base = ROOT_JOINT[choices.fixed_base]
     base = base if base not in taken else f"{root}_{base}"
     joints = [_joint(body, places, coms, choices, base) for body in groups]
+    closing = _closing(loops, places, coms, zero_poses(root, order), choices, notes)
     for name in choices.neutral:
         checks.one_of("load_urdf(neutral=...): joint", name, dict.fromkeys([*robot.joints, *(j.name for j in joints)]))
     if not any(joint.nv for joint in joints):
@@ -75,18 +79,21 @@ def assemble(robot: Robot, choices: Choices, notes: Notes) -> UrdfMechanism:
     neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
     mech = UrdfMechanism(
         [_body(body, inertias[body.name]) for body in groups],
-        joints,
+        [*joints, *closing],
         found,
-        _inputs(joints, choices),
+        _inputs(joints, closing, choices),
         gravity=choices.gravity,
         name=robot.name,
         neutral=neutral,
+        gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
     )
     bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
-    report = _report(robot, mech, places, coms, choices.file, notes)
+    report = _report(
+        {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, mech, places, coms, choices.file, notes
+    )
     for note in report.notes:
         if note.warn:
             warnings.warn(f"load_urdf: {choices.file}: {note}", UrdfWarning, stacklevel=3)
@@ -161,14 +168,27 @@ def _body(body: Group, part: RigidInertia) -> Body:
     return Body(body.name, part.mass, part.inertia, drawn(body, part.com))
 
 
-def _inputs(joints: list[Joint], choices: Choices) -> list[Input]:
-    """One per degree of freedom of the actuated joints."""
-    by_name = {j.name: j for j in joints}
+def _closing(
+    loops: Mapping[str, UrdfLoop],
+    places: Mapping[str, Place],
+    coms: Mapping[str, Floats],
+    zero: Mapping[str, Pose],
+    choices: Choices,
+    notes: Notes,
+) -> list[Joint]:
+    """The joints that close loops."""
+    found = [closing_joint(loop, places, coms, zero, choices.position, notes) for loop in loops.values()]
+    return [joint for joint in found if joint is not None]
+
+
+def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list[Input]:
+    """One per degree of freedom of the actuated joints; those that close loops only when they are asked for."""
+    by_name = {j.name: j for j in (*joints, *closing)}
     if choices.actuated is None:
         chosen = [j for j in joints if j.kind != "floating"]
     else:
         for name in choices.actuated:
-            checks.one_of("load_urdf(actuated=...): joint that moves", name, [j.name for j in joints if j.nv])
+            checks.one_of("load_urdf(actuated=...): joint that moves", name, [j.name for j in by_name.values() if j.nv])
         chosen = [by_name[name] for name in choices.actuated]
     return [Input(j.name, dof=d) for j in chosen for d in range(j.nv)]
 
@@ -186,7 +206,7 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: 
 
 
 def _report(
-    robot: Robot,
+    joints: Mapping[str, UrdfJoint],
     mech: UrdfMechanism,
     places: Mapping[str, Place],
     coms: Mapping[str, Floats],
@@ -199,7 +219,7 @@ def _report(
         body = place.group.name if place.group.name in coms else None
         pose = Pose(place.pose.rotation, place.pose.point - (coms[body] if body else HERE.point))
         links[name] = Frame(body, tuple(float(x) for x in pose.point), pose.quaternion)
-    driven = [robot.joints[part.joint or ""] for part in mech.inputs or ()]
+    driven = [joints[part.joint or ""] for part in mech.inputs or ()]
     return UrdfReport(
         file,
         notes.close(),

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from sim import checks
 from sim.parts import LAWS, Contact
 from sim.urdf.assemble import Choices, assemble
+from sim.urdf.loops import read_loops
 from sim.urdf.report import Notes, UrdfMechanism
 from sim.urdf.robot import read_robot
 from sim.urdf.xml import parse
 
-MIMIC = ("free", "locked")
+MIMIC = ("free", "locked", "gear")
 
 
 def load_urdf(
@@ -49,7 +50,8 @@ def load_urdf(
                       no contacts.
         merge_fixed   whether links on fixed joints become one body; a link without mass always does
         locked        joints that are held at their neutral coordinate, as if they were fixed
-        mimic         what becomes of joints that follow another one, which is not modelled: "free" or "locked"
+        mimic         what becomes of joints that follow another one: "gear" couples them (see Gear), "free" and
+                      "locked" leave that out
         repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
                       more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
         neutral       coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their
@@ -60,17 +62,20 @@ def load_urdf(
 
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
     PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in
-    Dojo). A body's frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links`
-    has the pose of every link in
-    its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented
-    (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a UrdfWarning.
+    Dojo), and <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (sim/urdf/loops.py). A body's
+    frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links` has the pose of
+    every link in its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not
+    represented (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a
+    UrdfWarning.
 
     Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
     names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
     """
     file = Path(path)
     notes = Notes()
-    robot = read_robot(parse(file), notes)
+    root = parse(file)
+    robot = read_robot(root, notes)
+    loops = read_loops(root, robot, notes)
     checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
     checks.one_of("load_urdf(law=...)", law, LAWS)
     if not isinstance(rim_points, int | np.integer) or rim_points < 3:
@@ -79,14 +84,18 @@ def load_urdf(
     for name in held:
         checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
     if following := [name for name in robot.mimics if name not in held]:
-        fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
-        notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
+        if mimic == "gear":
+            notes.add("joints that follow another one, by a gear", following)
+        else:
+            fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
+            notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
         held += following if mimic == "locked" else []
     choices = Choices(
         file=file.name,
         fixed_base=not floating,
         merge=merge_fixed,
         locked=frozenset(held),
+        geared=tuple(following) if mimic == "gear" else (),
         repair=repair,
         neutral=dict(neutral or {}),
         position=checks.vector("load_urdf(position=...)", position, 3),
@@ -97,4 +106,4 @@ def load_urdf(
         rim_points=int(rim_points),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
     )
-    return assemble(robot, choices, notes)
+    return assemble(robot, loops, choices, notes)

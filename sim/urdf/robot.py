@@ -36,7 +36,7 @@ KINDS = {
 }
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 # elements that say nothing about the motion of bodies, or nothing that a step could use
-READ = {"link", "joint"}
+READ = {"link", "joint", "loop_joint"}
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,6 @@ def read_robot(root: Element, notes: Notes) -> Robot:
     for element in root.children:
         if element.tag.startswith("xacro:"):
             raise element.error("this is a xacro file; run xacro on it first")
-        if element.tag == "loop_joint":
-            raise element.error("closed loops are not supported")
     links = _by_name(root.all("link"), lambda e: _link(e, notes))
     joints = _by_name(root.all("joint"), lambda e: _joint(e, notes))
     if not links:
@@ -169,6 +167,11 @@ def _geometry(element: Element) -> Geometry:
 
 
 def _joint(element: Element, notes: Notes) -> UrdfJoint:
+    return read_joint(element, ("parent", "child"), _pose(element), notes)
+
+
+def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes) -> UrdfJoint:
+    """A joint between the links that the two elements `ends` name, with its frame at `pose` in the first."""
     name, given = element.text("name"), element.text("type")
     if given not in KINDS:
         raise element.error(f"type {given!r} is not one of: {', '.join(KINDS)}")
@@ -192,9 +195,9 @@ def _joint(element: Element, notes: Notes) -> UrdfJoint:
     return UrdfJoint(
         name,
         kind,
-        element.need("parent").text("link"),
-        element.need("child").text("link"),
-        _pose(element),
+        element.need(ends[0]).text("link"),
+        element.need(ends[1]).text("link"),
+        pose,
         axis,
         _limits(name, given, limit, notes),
         damping,

@@ -63,7 +63,7 @@ def ordered(robot: Robot, file: str) -> tuple[str, list[UrdfJoint]]:
             other = above[joint.child]
             raise joint.element.error(
                 f"link {joint.child!r} is the child of joint {other.name!r} of line {other.element.line} already; "
-                "closed loops are not supported"
+                "a joint that closes a loop is a <loop_joint>"
             )
         above[joint.child] = joint
     roots = [name for name in robot.links if name not in above]

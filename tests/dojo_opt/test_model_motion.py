@@ -27,7 +27,7 @@ def excited(sim: Simulator, seed: int, speed: float, spread: float = 0.0) -> np.
     """A state near the neutral one, on the move."""
     rng = np.random.default_rng(seed)
     dx = np.concatenate([spread * rng.normal(size=sim.nv), speed * rng.normal(size=sim.nv)])
-    return np.asarray(sim.integrate(sim.neutral(), dx))
+    return sim.close(sim.integrate(sim.neutral(), dx))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -224,11 +224,12 @@ def test_what_is_left_out_is_said() -> None:
     <mujoco><option density="1000"/><worldbody>
       <body name="a"><freejoint/><geom name="g" size="0.1"/></body>
       <body name="b" pos="0 0 1"><joint name="j" frictionloss="1"/><geom name="h" size="0.1" pos="1 0 0"/></body>
-    </worldbody><equality><weld name="w" body1="a" body2="b"/></equality></mujoco>"""
+      <body name="c" pos="0 0 2"><joint name="k"/><geom size="0.1" pos="1 0 0"/></body>
+    </worldbody><equality><joint name="w" joint1="j" joint2="k" polycoef="0 1 2 0 0"/></equality></mujoco>"""
     with pytest.warns(MjcfWarning):
         report = load_mjcf(text).report
     assert report is not None
-    for words in ("equality constraints are left out: w", "dry friction of joints is left out: j", "drag of a fluid",
+    for words in ("that hold one joint, or are not linear, are left out: w", "dry friction of joints is left out: j", "drag of a fluid",
                   "bodies do not collide"):  # fmt: skip
         assert words in str(report), words
 

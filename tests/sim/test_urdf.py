@@ -358,7 +358,7 @@ def test_mimics_move_freely_with_a_warning_or_are_locked(tmp_path: Path) -> None
     with pytest.warns(dojo.UrdfWarning, match="are held where they are: wrist"):
         assert dojo.load_urdf(path, ground=False, mimic="locked").joint_names == ("floating_base", "elbow")
     assert dojo.load_urdf(path, ground=False, locked=["wrist"]).joint_names == ("floating_base", "elbow")
-    with pytest.raises(ValueError, match=r"load_urdf\(mimic=\.\.\.\): 'follow' is not one of: free, locked"):
+    with pytest.raises(ValueError, match=r"load_urdf\(mimic=\.\.\.\): 'follow' is not one of: free, locked, gear"):
         dojo.load_urdf(path, mimic="follow")
 
 

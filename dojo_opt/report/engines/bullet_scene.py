@@ -38,8 +38,8 @@ class World:
 
 def check(model: Model) -> None:
     """ValueError: what this engine does not represent."""
-    if len(model.coupling_body):
-        raise ValueError("PyBullet: collisions between bodies and closed loops are not represented")
+    if len(model.coupling_body) + len(model.gear_dof):
+        raise ValueError("PyBullet: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("PyBullet: terrain and restitution are not represented")
     several = (model.joint_ntrans > 0) & (model.joint_ntrans + model.joint_nrot > 1)

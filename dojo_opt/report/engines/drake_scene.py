@@ -41,8 +41,8 @@ def load(model: Model, time_step: float, approximation: str = "") -> Plant:
     from pydrake.systems.framework import DiagramBuilder
 
     logging.getLogger("drake").setLevel(logging.ERROR)  # it warns of every half-space
-    if len(model.coupling_body):
-        raise ValueError("Drake: collisions between bodies and closed loops are not represented")
+    if len(model.coupling_body) + len(model.gear_dof):
+        raise ValueError("Drake: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("Drake: terrain and restitution are not represented")
     if not approximation and len(model.limit_dof):

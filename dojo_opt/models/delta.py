@@ -1,0 +1,87 @@
+"""Delta robot: three arms with parallelograms that hold a platform level."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.models.links import from_z
+from sim.mechanism import Mechanism
+from sim.parts import Body, Input, Joint
+from sim.shapes import Box, Cylinder, rotation_matrix
+from sim.urdf.pose import quaternion
+
+Floats = NDArray[np.float64]
+
+
+def delta(
+    *,
+    base_radius: float = 0.2,
+    platform_radius: float = 0.06,
+    arm: float = 0.3,
+    forearm: float = 0.7,
+    gap: float = 0.1,
+    angle: float = 0.3,
+    arm_mass: float = 0.4,
+    rod_mass: float = 0.05,
+    platform_mass: float = 0.3,
+    damper: float = 0.0,
+    limits: tuple[float, float] | None = (-1.0, 1.3),
+    height: float = 1.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """Three motors under the ceiling turn the arms; two parallel rods per arm carry the platform.
+
+        motor o---arm---o    z up    q  (19,) of arm 0 to 2: its angle from the horizontal, downwards [rad], and the
+                       //                 swings of its two rods (2 each) [rad]; then the attitude of the platform to
+        platform ====o//                  the first rod, a quaternion (4)
+                                     u  (3,) torque of each motor [N m], positive lowers the arm
+
+    Rods have universal joints at the arm and ball joints at the platform; five of the latter close loops, which leave
+    the platform its three translations. Lengths and radii [m], `gap` between the rods of an arm; masses [kg] of one
+    part; angle [rad] of the arms in the neutral state; damper [N m s/rad] and limits [rad] of each motor.
+    """
+    out = base_radius + arm * np.cos(angle) - platform_radius
+    drop = arm * np.sin(angle) + float(np.sqrt(forearm**2 - out**2))
+    bodies, joints, balls = [], [], []
+    for k in range(3):
+        yaw = 2.0 * np.pi * k / 3
+        radial, tangent = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (yaw, yaw + np.pi / 2))
+        turned = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
+        bodies.append(Body(f"arm_{k}", arm_mass, shape=Box(arm, 0.04, 0.04)))
+        pivot = base_radius * radial + np.array([0.0, 0.0, height])
+        start: dict[str, Any] = {"child_point": (-arm / 2, 0.0, 0.0), "axis": (0.0, 1.0, 0.0), "orientation": turned}
+        joints.append(Joint("revolute", None, f"arm_{k}", f"motor_{k}", pivot, damper=damper, limits=limits, **start))
+        # axes of the arm in the neutral state, and the rods from it to the platform
+        frame = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])
+        world = np.array([radial, tangent, [0.0, 0.0, 1.0]]).T @ frame
+        along = (-out * radial - np.array([0.0, 0.0, drop - arm * np.sin(angle)])) / forearm
+        rod_axes = _frame(along)
+        for side in (-0.5, 0.5):
+            name = f"rod_{k}_{'l' if side < 0 else 'r'}"
+            bodies.append(Body(name, rod_mass, shape=Cylinder(0.008, forearm)))
+            at = (arm / 2, side * gap, 0.0)
+            turn = quaternion(world.T @ rod_axes)
+            low = (0.0, 0.0, -forearm / 2)
+            joints.append(Joint("orbital", f"arm_{k}", name, "", at, low, orientation=turn))
+            corner = platform_radius * radial + side * gap * tangent
+            end = (0.0, 0.0, forearm / 2)
+            level = quaternion(rod_axes.T)
+            balls.append(Joint("spherical", name, "platform", f"ball{name[3:]}", end, corner, orientation=level))
+    bodies.append(Body("platform", platform_mass, shape=Cylinder(platform_radius + gap / 2, 0.02)))
+    return Mechanism(
+        bodies,
+        [*joints, balls[0], *(replace(ball, close=True) for ball in balls[1:])],
+        inputs=[Input(f"motor_{k}") for k in range(3)],
+        gravity=gravity,
+        name="delta",
+        neutral={f"motor_{k}": angle for k in range(3)},
+    )
+
+
+def _frame(along: Floats) -> Floats:
+    """Rotation (3, 3) that takes z to a unit vector, the shortest way."""
+    return rotation_matrix(from_z(along))

@@ -1,0 +1,67 @@
+"""A planar arm of two cranks on the ground whose forearms meet: both motors stand still."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Input, Joint
+from sim.shapes import Box
+
+Y = (0.0, 1.0, 0.0)
+
+
+def fivebar(
+    *,
+    crank: float = 0.3,
+    forearm: float = 0.4,
+    base: float = 0.2,
+    density: float = 2.0,
+    width: float = 0.03,
+    angle: float = 0.6,
+    limits: tuple[float, float] | None = (-0.3, 1.2),
+    spring: float = 0.0,
+    damper: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """It hangs below its motors, which are `base` apart; the forearms meet at a pin that closes the loop.
+
+        motor_l o---o motor_r      z up, x to the right
+               /     \\             q  (4,) angles about y [rad]: of the cranks from pointing down, left and right;
+              o       o                 of the forearms to their cranks, left and right
+               \\     /             u  (2,) torques of the two motors [N m]
+                 \\ /
+                  o pin
+
+    Lengths [m], density [kg/m] of the links; angle [rad] by which the cranks open outwards in the neutral state, and
+    limits of that angle [rad]: with the forearms in one line the arm would be singular. spring [N m/rad, rest at the
+    neutral angle] and damper [N m s/rad] of the motors.
+    """
+    up = {"crank": (0.0, 0.0, crank / 2), "forearm": (0.0, 0.0, forearm / 2)}
+    down = {"crank": (0.0, 0.0, -crank / 2), "forearm": (0.0, 0.0, -forearm / 2)}
+    length = {"crank": crank, "forearm": forearm}
+    inwards = float(np.arcsin((base / 2 + crank * np.sin(angle)) / forearm))
+    neutral: dict[str, float] = {}
+    bodies, joints = [], []
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        bodies += [Body(f"{k}_{side}", density * n, shape=Box(width, width, n)) for k, n in length.items()]
+        rest = -sign * angle
+        bounds = None if limits is None else sorted(-sign * bound for bound in limits)
+        motor: dict[str, Any] = {"axis": Y, "spring": spring, "damper": damper, "rest": rest, "limits": bounds}
+        where = (sign * base / 2, 0.0, crank + forearm)
+        joints.append(Joint("revolute", None, f"crank_{side}", f"motor_{side}", where, up["crank"], **motor))
+        ends = (f"crank_{side}", f"forearm_{side}", f"elbow_{side}", down["crank"], up["forearm"])
+        joints.append(Joint("revolute", *ends, axis=Y))
+        neutral |= {f"motor_{side}": rest, f"elbow_{side}": sign * (angle + inwards)}
+    pin = Joint("revolute", "forearm_l", "forearm_r", "pin", down["forearm"], down["forearm"], axis=Y, close=True)
+    return Mechanism(
+        bodies,
+        [*joints[::2], *joints[1::2], pin],
+        inputs=[Input("motor_l"), Input("motor_r")],
+        gravity=gravity,
+        name="fivebar",
+        neutral=neutral,
+    )

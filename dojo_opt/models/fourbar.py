@@ -1,0 +1,53 @@
+"""Four links in a ring that hangs from one of its corners."""
+
+from __future__ import annotations
+
+from math import pi
+
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Input, Joint
+from sim.shapes import Box
+
+X = (1.0, 0.0, 0.0)
+
+
+def fourbar(
+    *,
+    mass: float = 1.0,
+    length: float = 1.0,
+    width: float = 0.05,
+    opening: float = pi / 4,
+    damper: float = 1.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """A rhombus that swings and folds: four equal links, two degrees of freedom left by its loop.
+
+               o pivot         z up, y to the right
+        link_1 / \\ link_3      q  (5,) angles about x [rad]: of the ring, of link_3 to link_1, of link_2 to link_1,
+              o   o                of link_4 to link_3, of link_4 to link_2, the joint that closes the ring
+        link_2 \\ / link_4      u  (5,) torque at each of these joints [N m]
+                o
+
+    mass [kg] and length [m] of one link, opening [rad] of link_1 from the vertical in the neutral state; damper
+    [N m s/rad] of every joint, the closing one included.
+    """
+    up, down = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
+    shape = Box(width, width, length)
+    joints = [
+        Joint("revolute", None, "link_1", "pivot", (0.0, 0.0, 2.2 * length), up, axis=X, damper=damper),
+        Joint("revolute", "link_1", "link_3", "joint_13", up, up, axis=X, damper=damper),
+        Joint("revolute", "link_1", "link_2", "joint_12", down, up, axis=X, damper=damper),
+        Joint("revolute", "link_3", "link_4", "joint_34", down, up, axis=X, damper=damper),
+        Joint("revolute", "link_2", "link_4", "joint_24", down, down, axis=X, damper=damper, close=True),
+    ]
+    turn = 2.0 * opening
+    return Mechanism(
+        bodies=[Body(f"link_{k}", mass, shape=shape) for k in (1, 2, 3, 4)],
+        joints=joints,
+        inputs=[Input(j.name) for j in joints],
+        gravity=gravity,
+        name="fourbar",
+        neutral={"pivot": -opening, "joint_13": turn, "joint_12": turn, "joint_34": -turn, "joint_24": -turn},
+    )

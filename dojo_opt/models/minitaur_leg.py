@@ -1,0 +1,77 @@
+"""A hopper on one parallel leg: two motors at the hip, a diamond of four links, as the legs of Minitaur."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Contact, Input, Joint
+from sim.shapes import Box
+
+Y = (0.0, 1.0, 0.0)
+
+
+def minitaur_leg(
+    *,
+    body_mass: float = 2.0,
+    upper: float = 0.1,
+    lower: float = 0.2,
+    upper_mass: float = 0.05,
+    lower_mass: float = 0.05,
+    angle: float = 1.2,
+    damper: float = 0.01,
+    rotor: float = 1e-4,
+    straight: float = 0.3,
+    folded: float = 2.6,
+    foot_radius: float = 0.01,
+    friction: float = 0.8,
+    law: str = "nonlinear",
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """It moves in the x-z plane, the hip of the leg at the centre of mass of its body; the knees point fore and aft.
+
+          [body]         z up, x forward
+        back / \\ front    q  (7,) position x, z [m] and pitch of the body about y [rad]; angle of the front and of the
+            o   o             back thigh to the body from pointing down, of the front and of the back shank to its
+             \\ /              thigh [rad]
+              o foot     u  (2,) torque of the front and of the back motor, about y [N m]
+
+    Both motors turn together: the leg swings; against each other: it stretches. Lengths [m] and masses [kg] of one
+    thigh and one shank; angle [rad] of the thighs from the vertical where it stands; damper [N m s/rad] and rotor
+    inertia behind the gear [kg m^2] of each motor. The shanks meet at the foot, where a pin closes the loop. The knees
+    stop [rad] before the leg is straight or folded, where the two halves would lie on each other and part ways.
+    """
+    reach = upper * np.cos(angle) + np.sqrt(lower**2 - (upper * np.sin(angle)) ** 2)
+    knee = angle + float(np.arcsin(upper * np.sin(angle) / lower))
+    bodies = [Body("body", body_mass, shape=Box(0.2, 0.12, 0.08))]
+    neutral: dict[str, ArrayLike] = {"base": (0.0, float(reach) + foot_radius, 0.0)}
+    hips, knees = [], []
+    for side, sign in (("front", 1.0), ("back", -1.0)):
+        thigh, shank = f"{side}_thigh", f"{side}_shank"
+        bodies += [
+            Body(thigh, upper_mass, shape=Box(0.015, 0.015, upper)),
+            Body(shank, lower_mass, shape=Box(0.012, 0.012, lower)),
+        ]
+        top, bottom, start = (0.0, 0.0, upper / 2), (0.0, 0.0, -upper / 2), (0.0, 0.0, lower / 2)
+        motor: dict[str, Any] = {"axis": Y, "damper": damper, "armature": rotor}
+        hips.append(Joint("revolute", "body", thigh, f"{side}_hip", child_point=top, **motor))
+        bounds = sorted((sign * straight, sign * folded))
+        knees.append(Joint("revolute", thigh, shank, f"{side}_knee", bottom, start, axis=Y, limits=bounds))
+        neutral |= {f"{side}_hip": -sign * angle, f"{side}_knee": sign * knee}
+    end = (0.0, 0.0, -lower / 2)
+    pin = Joint("revolute", "front_shank", "back_shank", "foot", end, end, axis=Y, close=True)
+    return Mechanism(
+        bodies,
+        [Joint("planar_axis", None, "body", "base", axis=Y), *hips, *knees, pin],
+        contacts=[
+            Contact("front_shank", end, foot_radius, friction, law, name="foot"),
+            Contact("body", radius=0.05, friction=friction, law=law, name="hull"),
+        ],
+        inputs=[Input("front_hip"), Input("back_hip")],
+        gravity=gravity,
+        name="minitaur_leg",
+        neutral=neutral,
+    )

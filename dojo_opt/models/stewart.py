@@ -1,0 +1,78 @@
+"""Stewart platform: a plate on six legs that change their length."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.models.links import from_z
+from sim.mechanism import Mechanism
+from sim.parts import Body, Input, Joint
+from sim.shapes import Cylinder
+
+Floats = NDArray[np.float64]
+
+
+def stewart(
+    *,
+    base_radius: float = 0.5,
+    plate_radius: float = 0.3,
+    height: float = 0.6,
+    spread: float = 0.25,
+    plate_mass: float = 10.0,
+    leg_mass: float = 0.5,
+    spring: float = 0.0,
+    damper: float = 0.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> Mechanism:
+    """Six legs with universal joints on the ground, a slider each, and ball joints under the plate: 6-UPS.
+
+        ___plate___    z up    q  (22,) of leg 0 to 5: swing of its cylinder (2) [rad] and its extension [m]; then the
+         /\\ /\\ /\\                  attitude of the plate to rod 0, a quaternion (4)
+        /  X  X  \\             u  (6,) force of each slider [N], positive extends
+
+    The plate hangs on leg 0 in the tree; the ball joints of the other legs close five loops and leave its six degrees
+    of freedom. Radii of the circles of joints and height of the plate in the neutral state [m]; `spread` [rad] is half
+    the angle between neighbouring joints. leg_mass [kg] of each cylinder and each rod; spring [N/m] with its rest at
+    the neutral length, and damper [N s/m], of each slider.
+    """
+    feet, tops = _hexagon(base_radius, spread), _hexagon(plate_radius, np.pi / 3 - spread)
+    bodies, joints, closing = [], [], []
+    for k, (foot, top) in enumerate(zip(feet, tops, strict=True)):
+        leg = top + np.array([0.0, 0.0, height]) - foot
+        length = float(np.linalg.norm(leg))
+        half = length / 2
+        turn = np.array(from_z(leg / length))
+        bodies += [
+            Body(f"cylinder_{k}", leg_mass, shape=Cylinder(0.025, half)),
+            Body(f"rod_{k}", leg_mass, shape=Cylinder(0.015, half)),
+        ]
+        low, end = (0.0, 0.0, -half / 2), (0.0, 0.0, half / 2)
+        slider: dict[str, Any] = {
+            "spring": spring,
+            "damper": damper,
+            "parent_point": (0.0, 0.0, half),
+            "name": f"slider_{k}",
+        }
+        joints += [
+            Joint("orbital", None, f"cylinder_{k}", f"hinge_{k}", foot, low, orientation=turn),
+            Joint("prismatic", f"cylinder_{k}", f"rod_{k}", **slider),
+        ]
+        upright = turn * (1.0, -1.0, -1.0, -1.0)
+        closing.append(Joint("spherical", f"rod_{k}", "plate", f"ball_{k}", end, top, orientation=upright, close=k > 0))
+    bodies.append(Body("plate", plate_mass, shape=Cylinder(plate_radius, 0.03)))
+    return Mechanism(
+        bodies,
+        [*joints, *closing],
+        inputs=[Input(f"slider_{k}") for k in range(6)],
+        gravity=gravity,
+        name="stewart",
+    )
+
+
+def _hexagon(radius: float, spread: float) -> Floats:
+    """Six points on a circle, in three pairs that are `spread` to either side of 0, 120 and 240 degrees, (6, 3)."""
+    angles = np.ravel([[a - spread, a + spread] for a in np.radians((0.0, 120.0, 240.0))])
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(6)], axis=1)

@@ -1,0 +1,34 @@
+"""A planar four-bar on the ground whose loop may be cut at any of its joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sim.mechanism import Mechanism
+from sim.parts import Body, Input, Joint
+from sim.shapes import Box
+
+Y = (0.0, 1.0, 0.0)
+CRANK, COUPLER, ROCKER = 0.5, 1.0, 0.8  # [m]; the ground is 1 m long
+
+
+def bar(name: str, length: float) -> Body:
+    return Body(name, 2.0 * length, shape=Box(x=length, y=0.05, z=0.05))
+
+
+def fourbar(cut: str, inputs: tuple[str, ...] = (), **action: Any) -> Mechanism:
+    """Crank and rocker on the ground, the coupler between them; `cut` closes the loop, "pin" acts."""
+    ends = {
+        "crank": (None, "crank", (0, 0, 0), (-CRANK / 2, 0, 0)),
+        "coupler": ("crank", "coupler", (CRANK / 2, 0, 0), (-COUPLER / 2, 0, 0)),
+        "pin": ("coupler", "rocker", (COUPLER / 2, 0, 0), (ROCKER / 2, 0, 0)),
+        "rocker": (None, "rocker", (1.0, 0, 0), (-ROCKER / 2, 0, 0)),
+    }
+    joints = [
+        Joint("revolute", *e[:2], name, *e[2:], axis=Y, close=name == cut, **(action if name == "pin" else {}))
+        for name, e in ends.items()
+    ]
+    neutral = {"crank": -1.0, "coupler": 0.6, "rocker": -1.2, "pin": -0.6}
+    bodies = [bar("crank", CRANK), bar("coupler", COUPLER), bar("rocker", ROCKER)]
+    known = {name: q for name, q in neutral.items() if name != cut}
+    return Mechanism(bodies, joints, inputs=[Input(name) for name in inputs], neutral=known)
