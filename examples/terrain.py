@@ -14,7 +14,7 @@ import dojo_opt as dojo
 KNOT, HORIZON = 0.05, 20
 STEP = dojo.Terrain.steps([0.15], start=0.4, edge=0.06)
 LINES = np.linspace(-1.0, 2.0, 121)
-HILL = dojo.Terrain.from_function(lambda x, y: 0.15 * np.exp(-((x - 0.3) ** 2) / 0.02) + 0.0 * y, LINES, [0.0])
+HILL = dojo.Terrain.from_function(lambda x, y: 0.1 * np.exp(-((x - 0.35) ** 2) / 0.01) + 0.0 * y, LINES, [0.0])
 
 
 def onto(terrain, distance):
@@ -40,14 +40,14 @@ def onto(terrain, distance):
 
 
 figure, axes = plt.subplots(2, 1, sharex=True, figsize=(7, 6), layout="constrained")
-for ax, terrain, distance in zip(axes, (STEP, HILL), (0.7, 0.6), strict=True):
+for ax, name, terrain, distance in zip(axes, ("onto a step", "over a hill"), (STEP, HILL), (0.7, 0.6), strict=True):
     plan = dojo.ilqr(onto(terrain, distance), verbose=True)
     foot = plan.problem.sim.maximal(plan.x)[:, 1, :3]
     x = np.linspace(-0.3, 1.0, 500)
-    ax.fill_between(x, terrain.height(x, 0.0), -0.05, color="0.8")
+    ax.fill_between(x, terrain.height(x, 0.0), -0.1, color="0.8")
     ax.plot(plan.x[:, 0], plan.x[:, 2], ".-", label="body")
     ax.plot(foot[:, 0], foot[:, 2], ".-", label="foot")
-    ax.set(ylabel="height [m]", title=f"{plan.nit} iterations", aspect="equal")
+    ax.set(ylabel="height [m]", title=f"{name}: {plan.nit} iterations", xlim=(-0.3, 1.0), aspect="equal")
     clear = plan.problem.sim.mechanism.contacts[0].gap(foot).min()
     print(f"{plan.nit} iterations; lands at {plan.x[-1, 0]:.4f} m, {plan.x[-1, 2] - plan.x[0, 2]:.4f} m higher")
     assert plan.success, plan.message

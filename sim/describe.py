@@ -79,7 +79,9 @@ def _contact_lines(mech: Mechanism) -> list[str]:
     for c in mech.contacts:
         law = c.law if c.friction > 0 else "impact"
         shape = f"ball of {c.radius:g} m" if c.radius else "point"
-        lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}")
+        more = f", restitution {c.restitution:g}" if c.restitution else ""
+        more += ", on terrain" if c.terrain is not None else ""
+        lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}{more}")
     return lines
 
 

@@ -11,6 +11,7 @@ about a fixed axis is right to fourth order) and keeps the barrier at a half tur
 
 from __future__ import annotations
 
+from sim.advance import advance, follows_on
 from sim.kinematics import displace, tree_poses
 from sim.model import InputKind, Matrix, Model, Vector, Work
 from sim.rotation import Mat3, Vec3, quat_turn, rotate
@@ -120,17 +121,21 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
 
     False when a body turned by half a turn or more from 1 to 2: the state is not what it seems.
     """
+    before = (work.origin[0], work.origin[1], work.origin[2])
     if model.body_parent.shape[0] > 0 and model.body_parent[0] < 0 and model.joint_ntrans[0] == 3:
         for k in range(3):
             work.origin[k] = q[k]
     else:
         for k in range(3):
             work.origin[k] = model.joint_parent_point[0, k]
-    displace(model, q, v, -h, work.theta1)
-    tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
-    tree_poses(model, work.theta1, q, work.origin, work.pos1, work.quat1, work.rot1, work.S1)
+    if follows_on(work, q, v):
+        advance(model, work, h, v, before)
+    else:
+        displace(model, q, v, -h, work.theta1)
+        tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
+        tree_poses(model, work.theta1, q, work.origin, work.pos1, work.quat1, work.rot1, work.S1)
+        turns(work.quat1, work.quat2, work.turn_in)
     world_inertia(model, work.rot2, work.inertia_world)
-    turns(work.quat1, work.quat2, work.turn_in)
     representable = True
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]

@@ -41,7 +41,7 @@ def displace(model: Model, q: Vector, v: Vector, h: float, out: Vector) -> None:
 
 
 @kernel
-def _column(S: Matrix, d: int, a0: float, a1: float, a2: float, x: float, y: float, z: float) -> None:
+def axis_column(S: Matrix, d: int, a0: float, a1: float, a2: float, x: float, y: float, z: float) -> None:
     """S[d] = (r x a, a): rotation about the axis a through the point r from O."""
     v0, v1, v2 = cross(x, y, z, a0, a1, a2)
     S[d, 0] = v0
@@ -121,17 +121,17 @@ def tree_poses(
             rot[i, k] = r[k]
         if model.joint_nrot[i] == 1:  # the axis is the same before and after the rotation
             ax, ay, az = rotate(rot, i, t[0], t[1], t[2])
-            _column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
+            axis_column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
         elif model.joint_nrot[i] == 3:
             g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q2[a], q2[a + 1], q2[a + 2], q2[a + 3])
             r = quat_matrix(g0, g1, g2, g3)
             for k in range(3):
-                _column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
+                axis_column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
         elif model.joint_nrot[i] == 2:
             ax, ay, az = rotate(rot, i, first[0], first[1], first[2])
-            _column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
+            axis_column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
             ax, ay, az = rotate(rot, i, second[0], second[1], second[2])
-            _column(S, d + 1, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
+            axis_column(S, d + 1, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
         m = model.joint_child_point[i]
         cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])
         pos[i, 0] = ox - cx

@@ -47,7 +47,7 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-WORK_INTS = _shapes("counts 3, near ncontact 2, far_first nground")
+WORK_INTS = _shapes("counts 4, near ncontact 2, far_first nground")
 
 WORK_FLOATS = _shapes(
     """
@@ -117,8 +117,9 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
 def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
     extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
-    buffer: NDArray[Any] = np.zeros(sum(rows * cols for rows, cols in extents.values()), dtype=kind)
-    arrays, start = {}, 0
+    line = 128 // 8  # a pair of cache lines: what two threads write must not share one
+    buffer: NDArray[Any] = np.zeros(sum(rows * cols for rows, cols in extents.values()) + 2 * line, dtype=kind)
+    arrays, start = {}, -(buffer.ctypes.data // 8) % line
     for name, (rows, cols) in extents.items():
         flat = buffer[start : start + rows * cols]
         arrays[name] = flat if len(fields[name]) == 1 else flat.reshape(rows, cols)

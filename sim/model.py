@@ -216,7 +216,7 @@ class Work(NamedTuple):
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
     # near and far contacts
-    counts: Integers  # (3,) runs of near contacts with the ground, far clusters, runs with that of the pairs
+    counts: Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; whether advance.py may be used
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     far_first: Integers  # (nground,) first contacts of the far clusters
     far: Matrix  # (nground, 24) see far.py

@@ -40,6 +40,7 @@ class Linearized(NamedTuple):
 @kernel
 def begin(work: Work, settings: Vector) -> Options:
     """Settings of a motion that begins here."""
+    work.counts[3] = 0
     work.far_law[0] = 0.0  # what is known of far contacts (far.py) belongs to another motion
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 

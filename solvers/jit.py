@@ -187,6 +187,8 @@ def local_kernel(func: F) -> F:
 
 def parallel_kernel(func: F) -> F:
     """Compile `func` with `prange` over the cores; allowed to allocate. Only for loops over whole knots or rollouts."""
+    if numba.config.DISABLE_JIT:
+        return func
     compiled = _cached(numba.njit(parallel=True, **_FLAGS)(func))
     _REGISTRY.append(compiled)
     return cast(F, compiled)

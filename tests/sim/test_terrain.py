@@ -199,7 +199,7 @@ def test_without_friction_energy_stays_in_a_bowl():
 )
 def test_a_quadruped_stands(terrain):
     """Springs in its joints hold it; it neither creeps nor sinks in."""
-    mech = dojo.models.quadruped(spring=80.0, damper=2.0, stance=(0.9, -1.425)).on(terrain)
+    mech = dojo.models.quadruped(spring=200.0, damper=20.0, stance=(0.9, -1.425)).on(terrain)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
     t = sim.rollout(sim.neutral(), np.zeros((300, sim.nu)), throw=True)
     assert t.contacts.gap.min() > -1e-8

@@ -1,0 +1,80 @@
+"""From one step to the next of a motion: its configurations 2 and 3 are the next one's 1 and 2."""
+
+from __future__ import annotations
+
+from sim.kinematics import axis_column
+from sim.model import Matrix, Model, Vector, Work
+from sim.rotation import Vec3, cross, quat_exp, quat_matrix, rotate
+from solvers.jit import kernel
+
+
+@kernel
+def follows_on(work: Work, q: Vector, v: Vector) -> bool:
+    """Whether (q, v) is where the last step of this motion ended, with its configurations still in `work`."""
+    if work.counts[3] == 0:
+        return False
+    for k in range(q.shape[0]):
+        if q[k] != work.theta3[k]:
+            return False
+    for d in range(v.shape[0]):
+        if v[d] != work.nu[d]:
+            return False
+    return True
+
+
+@kernel
+def _move(pos: Matrix, quat: Matrix, rot: Matrix, to_pos: Matrix, to_quat: Matrix, to_rot: Matrix) -> None:
+    """Poses of all bodies, copied."""
+    for i in range(pos.shape[0]):
+        for k in range(3):
+            to_pos[i, k] = pos[i, k]
+        for k in range(4):
+            to_quat[i, k] = quat[i, k]
+        for k in range(9):
+            to_rot[i, k] = rot[i, k]
+
+
+@kernel
+def _shift(S: Matrix, x: float, y: float, z: float, out: Matrix) -> None:
+    """Columns about a point that lies (x, y, z) before the present one: v + (x, y, z) x a."""
+    for d in range(S.shape[0]):
+        s = S[d]
+        o = out[d]
+        u, v, w = cross(x, y, z, s[3], s[4], s[5])
+        o[0], o[1], o[2] = s[0] + u, s[1] + v, s[2] + w
+        o[3], o[4], o[5] = s[3], s[4], s[5]
+
+
+@kernel
+def _axis(model: Model, work: Work, i: int, d: int, a: Vec3, pos: Matrix, rot: Matrix, S: Matrix) -> None:
+    """Column d: rotation about the axis a through the joint of body i, at the poses pos and rot."""
+    c = model.joint_child_point[i]
+    o = work.origin
+    x, y, z = rotate(rot, i, c[0], c[1], c[2])
+    axis_column(S, d, a[0], a[1], a[2], pos[i, 0] + x - o[0], pos[i, 1] + y - o[1], pos[i, 2] + z - o[2])
+
+
+@kernel
+def advance(model: Model, work: Work, h: float, v: Vector, before: Vec3) -> None:
+    """Configurations 1 and 2 from 2 and 3 of the step before, whose common point O was `before`.
+
+    Columns stay those of the same poses, about the new O; but for quaternion joints, whose axes are those of the new
+    configuration 2: R2 of the body itself, and R1 exp(h w).
+    """
+    _move(work.pos2, work.quat2, work.rot2, work.pos1, work.quat1, work.rot1)
+    _move(work.pos3, work.quat3, work.rot3, work.pos2, work.quat2, work.rot2)
+    x, y, z = before[0] - work.origin[0], before[1] - work.origin[1], before[2] - work.origin[2]
+    _shift(work.S2, x, y, z, work.S1)
+    _shift(work.S3, x, y, z, work.S2)
+    for i in range(model.body_parent.shape[0]):
+        for k in range(4):
+            work.turn_in[i, k] = work.turn[i, k]
+        if model.joint_nrot[i] == 3:
+            d = model.body_vadr[i + 1] - 3
+            e = quat_exp(h * v[d], h * v[d + 1], h * v[d + 2])
+            E = quat_matrix(e[0], e[1], e[2], e[3])
+            for k in range(3):
+                a = rotate(work.rot1, i, E[k], E[3 + k], E[6 + k])
+                _axis(model, work, i, d + k, a, work.pos1, work.rot1, work.S1)
+                a = (work.rot2[i, k], work.rot2[i, 3 + k], work.rot2[i, 6 + k])
+                _axis(model, work, i, d + k, a, work.pos2, work.rot2, work.S2)
