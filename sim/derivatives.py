@@ -77,6 +77,8 @@ class Derivatives(States):
         if wrt is None:
             return A, B
         asked = _names("Simulator.linearize(wrt=...)", wrt)
+        if _parameters(asked):
+            self._check_order("Simulator.linearize(wrt=...)")
         found, plan = self._select("Simulator.linearize(wrt=...)", _parameters(asked))
         J = parameter_columns(self._calls, (state, us), A, plan)
         blocks = {"state": A, "input": B}
@@ -155,6 +157,7 @@ class Derivatives(States):
         the trajectory. An unsolved step raises SimulationError.
         """
         call = "Simulator.vjp"
+        self._check_order(call)
         xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
         inputs = self._border.inputs("vjp", "trajectory", us, (None, self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
@@ -198,6 +201,11 @@ class Derivatives(States):
     def replace(self, **settings: Any) -> Any:
         """See Simulator."""
         raise NotImplementedError
+
+    def _check_order(self, call: str) -> None:
+        """Steps of a higher order are another scheme, with derivatives by state and input only."""
+        if self.order != 2:
+            raise ValueError(f"{call}: expected a simulator of order 2, got order {self.order}")
 
     @cached_property
     def _known(self) -> list[Parameter]:

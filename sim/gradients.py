@@ -50,7 +50,6 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
     add_bounce_derivatives(model, work)
     add_coupling_derivatives(model, work)
-    add_swing_curvature(model, work, q)  # needs `subtree`, which the couplings use up
     if not factor_coupling(model, work):
         return False
     add_spring_derivatives(model, work, h, q, v)

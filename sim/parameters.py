@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.build import contact_frame, translation_axes
+from sim.closing import is_weld
 from sim.effects import Effect
 from sim.mechanism import Mechanism
 from sim.model import Integers, Vector
@@ -85,7 +86,8 @@ def all_parameters(mech: Mechanism, time_step: float) -> list[Parameter]:
         first += joint.nv
         limit += len(bounds)
     for index, joint in enumerate(mech.loops):
-        found += _geometry(joint, index, True)
+        if not is_weld(joint):
+            found += _geometry(joint, index, True)
     for index, contact in enumerate(mech.contacts):
         found += _contact_parameters(contact, index)
     found += _collision_parameters(mech)

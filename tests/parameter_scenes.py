@@ -30,8 +30,10 @@ class Case(NamedTuple):
     names: tuple[str, ...] = ()  # all when empty
 
     def kinds(self) -> list[str]:
-        """The kinds of its parameters."""
-        known = self.names or self.sim.parameters().names
+        """The kinds of its parameters; without restitution, a step need not be a continuous function of it."""
+        known = list(self.names or self.sim.parameters().names)
+        if not self.sim.model.contact_restitution.any():
+            known = [name for name in known if not name.startswith("restitution")]
         return [kind for kind in KINDS if any(name.split(":")[0].split("[")[0] == kind for name in known)]
 
 
