@@ -20,19 +20,25 @@ import dojo_opt as dojo
 
 NAMES = ("fourbar", "fivebar", "minitaur_leg", "stewart", "delta")
 STEP, CHUNK = 0.005, 5000
-# springs and limits that keep free motion away from singular configurations, where loops part ways
+# what keeps the motion away from singular configurations, where loops part ways
 HELD = {
     "fivebar": {"spring": 20.0},
     "minitaur_leg": {"gravity": (0.0, 0.0, 0.0)},
-    "stewart": {"spring": 5000.0},
+    "stewart": {"spring": 500.0, "gravity": (0.0, 0.0, 0.0)},
     "delta": {"gravity": (0.0, 0.0, 0.0)},
 }
+MOTOR_SPRING = {"delta": 20.0}  # [N m/rad], at rest in the neutral state
 
 
 def passive(name: str) -> dojo.Mechanism:
     """The model without contacts, limits, dampers and armature."""
     mech = getattr(dojo.models, name)(**HELD.get(name, {}))
-    return replace(mech, contacts=(), joints=[replace(j, damper=0.0, limits=None, armature=0.0) for j in mech.joints])
+    joints = [replace(j, damper=0.0, limits=None, armature=0.0) for j in mech.joints]
+    if name in MOTOR_SPRING:
+        at = {j.name: float(mech.neutral[mech.q_slice(j.name).start]) for j in joints}
+        held = {"spring": MOTOR_SPRING[name]}
+        joints = [replace(j, **held, rest=at[j.name]) if j.name.startswith("motor") else j for j in joints]
+    return replace(mech, contacts=(), joints=joints)
 
 
 def start(sim: dojo.Simulator, speed: float) -> np.ndarray:

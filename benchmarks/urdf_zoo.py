@@ -10,7 +10,8 @@ then with both. Nothing drives the joints. A robot on a fixed base is put so hig
 above the ground. `fine` means: every step was solved, no contact was deeper in the ground than 1e-6 m, and the energy
 never was higher than at the start by more than 1 % of the largest kinetic energy and 3 kappa / h per contact, which is
 what the smoothing of the contacts lifts a resting body by. The time step is 5 ms; a robot that does not do well with it
-is tried with 1 ms, and the line says so. The table shows the first reason of a refusal.
+is tried with 1 ms and 0.2 ms, and the line says so: legs that only touch with their feet fall through the ground and
+whip through their singular pose with 100 rad/s and more. The table shows the first reason of a refusal.
 
 PyBullet's thousand random objects are one mesh each. All are loaded; those with equal masses and inertias, which is
 all of them, are simulated once, and are one line of the table.
@@ -26,7 +27,7 @@ import warnings
 from collections import Counter
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, files
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ import dojo_opt as dojo
 
 PACKAGES = ("example-robot-data", "pybullet")
 DURATION = 2.0  # [s]
-TIME_STEPS = (0.005, 0.001)  # [s]
+TIME_STEPS = (0.005, 0.001, 0.0002)  # [s]
 CLEARANCE = 0.01  # [m] of a robot on a fixed base
 DEPTH = 1e-6  # [m]
 GROWTH = 0.01  # of the largest kinetic energy
@@ -104,9 +105,11 @@ def run(path: Path) -> Outcome:
     if mech is None:
         return Outcome(name, "refused", reason=reason)
     out = fall(Outcome(name, "fine", how, reason), mech, TIME_STEPS[0])
-    if out.verdict != "fine":
-        tried = f"{TIME_STEPS[1] * 1e3:g} ms; with {TIME_STEPS[0] * 1e3:g} ms: {out.verdict}"
-        out = fall(Outcome(name, "fine", ", ".join(filter(None, (how, tried))), reason), mech, TIME_STEPS[1])
+    for before, time_step in pairwise(TIME_STEPS):
+        if out.verdict == "fine":
+            break
+        tried = f"{time_step * 1e3:g} ms; with {before * 1e3:g} ms: {out.verdict}"
+        out = fall(Outcome(name, "fine", ", ".join(filter(None, (how, tried))), reason), mech, time_step)
     return out
 
 

@@ -28,13 +28,12 @@ problem = dojo.Problem(
 )
 plan = dojo.ilqr(problem, verbose=True)
 gap = max(float(np.abs(g).max()) for x in plan.x for g in sim.loop_gaps(x).values())
-knee = np.linalg.norm(sim.reactions(plan.x[:-1], plan.u)["foot"].force, axis=-1).max()
-print(
-    f"apex {plan.x[:, 1].max():.3f} m, landed at {plan.x[-1, 0]:.4f} m; the pin of the foot carries up to {knee:.0f} N"
-)
+pin = np.linalg.norm(sim.reactions(plan.x[:-1], plan.u)["foot"].force, axis=-1).max()
+foot = sim.rollout(start, plan.u, throw=True).contacts.gap[:, 0].max()
+print(f"the foot rises to {foot:.3f} m, landed at {plan.x[-1, 0]:.4f} m; its pin carries up to {pin:.0f} N")
 print(f"the loop is open by {gap:.1e} at most; largest violation of a constraint {plan.violation:.1e}")
 
 finish(dojo.plots.trajectory(plan), __file__)
 
 assert plan.success, plan.message
-assert abs(plan.x[-1, 0] - FORWARD) < 1e-3 and plan.x[:, 1].max() > start[1] + 0.05 and gap < 1e-8
+assert abs(plan.x[-1, 0] - FORWARD) < 1e-3 and foot > 0.01 and gap < 1e-8

@@ -96,6 +96,10 @@ class Calls:
         """Table of the first Work of this thread."""
         return self._works(1)[0]
 
+    def tables(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Tables of the Model, bound for derivatives, and of the first Work of this thread."""
+        return self._table(bind_step, bind_gradient), self._work()
+
     def _chunks(self, count: int) -> NDArray[np.int64]:
         """Tables for a parallel call over `count` items, one per chunk."""
         return self._works(max(1, min(count, _CHUNKS * (os.cpu_count() or 1))))
@@ -198,7 +202,7 @@ class Calls:
         """Which contacts were far in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         work = work_view(self._work())
-        for first, last in work.near[: work.counts[0]]:
+        for first, last in work.near[: work.counts[2]]:
             out[first:last] = False
         return out
 

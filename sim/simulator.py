@@ -12,6 +12,7 @@ from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
 from sim.calls import Settings
+from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
@@ -19,7 +20,6 @@ from sim.mechanism import Mechanism, with_contacts
 from sim.reactions import Reactions, reactions
 from sim.results import (
     Batch,
-    Linearization,
     Shot,
     SimulationError,
     StepResult,
@@ -27,7 +27,6 @@ from sim.results import (
     contacts_of,
     error_of,
 )
-from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
@@ -37,7 +36,7 @@ _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order")
 _ORDERS = (2, 4, 6, 8)
 
 
-class Simulator(States):
+class Simulator(Derivatives):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
     kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
@@ -232,69 +231,6 @@ class Simulator(States):
         ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
         """
         return reactions(self, x, u, frame)
-
-    # ---- derivatives
-
-    def linearize(
-        self,
-        x: ArrayLike,
-        u: ArrayLike | None = None,
-        kappa: float | None = None,
-        wrenches: Wrenches | None = None,
-    ) -> tuple[Floats, Floats]:
-        """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
-
-        By the implicit function theorem, in tangent coordinates. An unsolved step raises SimulationError.
-        wrenches (nbody, 6) as in `rollout` are constants.
-        """
-        if wrenches is not None:
-            return pushed.linearize(self, x, u, wrenches, kappa)
-        state = self._border.state("linearize", x)
-        us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
-        A, B, _, report = self._calls.linearize_one(state, us, self._border.kappa("linearize", kappa))
-        if report[0] != Status.SOLVED:
-            raise error_of(self.mechanism, "Simulator.linearize", report, self.tolerance)
-        return A, B
-
-    def linearize_rollout(
-        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None
-    ) -> tuple[Floats, Linearization]:
-        """States (T + 1, nx) of a rollout from x under us (T, nu), and its derivatives, in one pass.
-
-        As `rollout` and `linearize_trajectory`, but every step is solved once. An unsolved step raises SimulationError.
-        """
-        call = "linearize_rollout"
-        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, (None, self.nu))
-        knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, self._border.kappa(call, kappa))
-        if knot < len(inputs):
-            raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
-        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
-
-    def linearize_trajectory(
-        self,
-        xs: ArrayLike,
-        us: ArrayLike,
-        substeps: int = 1,
-        kappa: float | None = None,
-        wrenches: Wrenches | None = None,
-    ) -> Linearization:
-        """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
-
-        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu); wrenches: (T, nbody, 6) as in `rollout`.
-        """
-        if wrenches is not None:
-            return pushed.linearize_trajectory(self, xs, us, wrenches, substeps, kappa)
-        call = "Simulator.linearize_trajectory"
-        inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
-        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
-        if len(states) - len(inputs) not in (0, 1):
-            raise ValueError(
-                f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
-            )
-        steps = whole(f"{call}(substeps=...)", substeps)
-        level = self._border.kappa("linearize_trajectory", kappa)
-        A, B, x_next, reports = self._calls.linearize(states, inputs, steps, level)
-        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of trajectories of so many knots, for a planner: see `sim.horizon`."""

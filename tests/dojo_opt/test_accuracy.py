@@ -52,6 +52,14 @@ def test_every_order_converges_to_the_reference(make) -> None:
         assert max(errors[1]["momentum"], errors[1]["angular"], errors[2]["angular"]) < 1e-12
 
 
+def test_errors_below_what_rounding_makes_of_the_start_count_as_equal() -> None:
+    floors = curves.floors(scenes.free_body(10.0))
+    assert 1e-11 < floors["attitude"] < 1e-8 and floors["angular"] < 1e-11
+    ours, peer = {"dojo-opt": points((1e-3, 2e-10))}, {"MuJoCo RK4": points((2e-3, 1e-11))}
+    assert curves.ratios(ours | peer, "MuJoCo RK4", "position")[0.01] == pytest.approx(20.0)
+    assert curves.ratios(ours | peer, "MuJoCo RK4", "position", floors["attitude"])[0.01] == 1.0
+
+
 def test_scenes_are_those_of_the_peer_figures() -> None:
     assert scenes.tree(1.0).exact().energy[0] == pytest.approx(15.84)
     chain = scenes.chain(5)

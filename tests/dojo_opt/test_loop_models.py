@@ -34,38 +34,40 @@ def test_what_a_loop_costs_is_measured(bench: Any) -> None:
 
 
 def places(a: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of crank, coupler, rocker with the crank at angle a: centres (3, 2), and angles (3,); z is down."""
+    """The moving ends of crank and coupler (2, 2), and angles of crank, coupler, rocker; the crank at a, z is down."""
     b = CRANK * np.array([np.cos(a), np.sin(a)])
     d = np.array([1.0, 0.0]) - b
     r = np.linalg.norm(d)
     along = (COUPLER**2 - ROCKER**2 + r**2) / (2 * r)
     up = -np.sqrt(COUPLER**2 - along**2)
     c = b + along * d / r + up * np.array([-d[1], d[0]]) / r
-    angles = [a, np.arctan2(*(c - b)[::-1]), np.arctan2(c[1], c[0] - 1.0)]
-    return np.array([b / 2, (b + c) / 2, (c + (1.0, 0.0)) / 2]), np.array(angles)
+    return np.array([b, c]), np.array([a, np.arctan2(*(c - b)[::-1]), np.arctan2(c[1], c[0] - 1.0)])
 
 
 def swing(a: float) -> tuple[float, float]:
     """M(a) of the kinetic energy M a'^2/2, and the potential energy."""
-    mass = 2.0 * np.array([CRANK, COUPLER, ROCKER])
-    inertia = mass * (np.array([CRANK, COUPLER, ROCKER]) ** 2 + 0.05**2) / 12
-    (p1, w1), (p0, w0) = places(a + 1e-6), places(a - 1e-6)
-    speed, turn = (p1 - p0) / 2e-6, (w1 - w0) / 2e-6
-    M = mass @ (speed**2).sum(axis=1) + inertia @ turn**2
-    return float(M), float(-9.81 * mass @ places(a)[0][:, 1])
+    (b, c), _ = places(a)
+    across = np.array([[0.0, -1.0], [1.0, 0.0]])
+    vb, coupler, rocker = across @ b, across @ (c - b), across @ (c - (1.0, 0.0))
+    wb, wc = np.linalg.solve(np.array([coupler, -rocker]).T, -vb)
+    mass, length = 2.0 * np.array([CRANK, COUPLER, ROCKER]), np.array([CRANK, COUPLER, ROCKER])
+    speed = np.array([vb / 2, vb + wb * coupler / 2, wc * rocker / 2])
+    turn = mass * (length**2 + 0.05**2) / 12 * np.array([1.0, wb, wc]) ** 2
+    height = -np.array([b[1] / 2, (b[1] + c[1]) / 2, c[1] / 2])
+    return float(mass @ (speed**2).sum(axis=1) + turn.sum()), float(9.81 * mass @ height)
 
 
 def period(a0: float) -> float:
     """Of the oscillation that starts at rest at a0, by an accurate solver of its single coordinate."""
 
     def rate(_: float, y: np.ndarray) -> list[float]:
-        (M1, V1), (M0, V0), (M, _V) = swing(y[0] + 1e-4), swing(y[0] - 1e-4), swing(y[0])
-        return [y[1], -(0.5 * (M1 - M0) / 2e-4 * y[1] ** 2 + (V1 - V0) / 2e-4) / M]
+        (M1, V1), (M0, V0), (M, _V) = swing(y[0] + 1e-5), swing(y[0] - 1e-5), swing(y[0])
+        return [y[1], -(0.5 * (M1 - M0) / 2e-5 * y[1] ** 2 + (V1 - V0) / 2e-5) / M]
 
     def back(_: float, y: np.ndarray) -> float:
         return float(y[1])
 
-    found = solve_ivp(rate, (0.0, 8.0), [a0, 0.0], events=back, method="DOP853", rtol=1e-9, atol=1e-10)
+    found = solve_ivp(rate, (0.0, 8.0), [a0, 0.0], events=back, rtol=1e-7, atol=1e-8)
     return float(2.0 * next(t for t in found.t_events[0] if t > 1e-3))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ Floats = NDArray[np.float64]
 
 STEPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
 COARSE = (0.2,)  # [s] for ours of higher order besides: an evaluation less often, at the time of a peer's largest step
-FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse
+FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse; see `floors`
 LOST = 1.0  # of the energy, relative to all there is: such a run is lost, whether the engine knows it or not
 
 
@@ -72,26 +73,32 @@ def point(scene: Scene, engine: Engine, h: float, exact: Run) -> Point:
     return Point(h, run.seconds, run.steps, errors, message)
 
 
-def at_time(points: Sequence[Point], what: str, seconds: float) -> float:
+def floors(scene: Scene) -> dict[str, float]:
+    """Errors that count as equal: FLOOR, or what becomes of a change of the start by one rounding, if that is more."""
+    moved = replace(scene, q=np.nextafter(scene.q, np.inf), v=np.nextafter(scene.v, np.inf))
+    return {what: max(FLOOR, error) for what, error in scene.errors(moved.exact(), scene.exact()).items()}
+
+
+def at_time(points: Sequence[Point], what: str, seconds: float, floor: float = FLOOR) -> float:
     """Smallest error reached within a processor time, interpolated between time steps on logarithmic axes."""
     good = [p for p in points if np.isfinite(p.errors[what]) and p.seconds > 0.0]
     good.sort(key=lambda p: p.seconds)
     if not good or seconds < good[0].seconds:
         return np.inf
     times = np.log([p.seconds for p in good])
-    errors = np.minimum.accumulate(np.log([max(p.errors[what], FLOOR) for p in good]))
-    return float(np.exp(np.interp(np.log(seconds), times, errors)))
+    errors = np.minimum.accumulate(np.log([max(p.errors[what] / floor, 1.0) for p in good]))
+    return float(floor * np.exp(np.interp(np.log(seconds), times, errors)))
 
 
-def ratios(curves: Curves, peer: str, what: str) -> dict[float, float]:
+def ratios(curves: Curves, peer: str, what: str, floor: float = FLOOR) -> dict[float, float]:
     """Our error over the peer's at equal processor time, by time step of the peer [s].
 
     Ours is the best of our orders, whose time steps may differ from the peer's; infinite where all of them take longer.
-    A step with which the peer is lost is left out.
+    A step with which the peer is lost is left out. Errors below `floor` count as that.
     """
     mine = [points for name, points in curves.items() if name.startswith("dojo-opt")]
     return {
-        p.time_step: min(at_time(points, what, p.seconds) for points in mine) / max(p.errors[what], FLOOR)
+        p.time_step: min(at_time(points, what, p.seconds, floor) for points in mine) / max(p.errors[what], floor)
         for p in curves[peer]
         if np.isfinite(p.errors[what])
     }

@@ -60,7 +60,9 @@ class Accuracy:
             "energy is off by more than all there is counts as lost"
         )
         report.notes.append(
-            f"errors below {curves.FLOOR:g} count as equal; a step whose run would take longer than "
+            f"errors count as equal below {curves.FLOOR:g}, or below what a change of the start by one rounding makes "
+            "of the reference, if that is more (5e-10 rad after 10 s for the free body, which turns about its unstable "
+            "axis); a step whose run would take longer than "
             f"{'0.02' if self.quick else '0.2'} s is left out; inf: the engine was lost on the way"
         )
         return report
@@ -89,10 +91,11 @@ def _compare(report: Report, scene: Scene, measured: Curves) -> None:
     """Rows: ratios to the peer at equal processor time, and momentum of ours."""
     if _PEER in measured:
         attitude = "attitude" if scene.name == "free body" else "position"
+        floors = curves.floors(scene)
         for what, at_least in (("energy", 0.0), ("angular", 0.0), (attitude, 1e-3)):
             if what == "angular" and not scene.floating:
                 continue
-            over = curves.ratios(measured, _PEER, what)
+            over = curves.ratios(measured, _PEER, what, floors[what])
             value, note = curves.worst(over, at_least)
             name = {"angular": "angular momentum"}.get(what, what)
             report.rows.append(Row(f"{scene.name}: {name}, ours / RK4 at equal time", value, "", 1.0, note=note))

@@ -1,0 +1,76 @@
+"""Parameter x situation: error of the derivative of a step, and what the derivatives by all parameters cost.
+
+    python benchmarks/parameter_derivatives.py
+
+Error: along a random direction of all parameters of a kind, against differences of the solver at the same kappa,
+relative to the derivative. Cost: processor time by all parameters of a quadruped, over that by state and input.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+
+import dojo_opt as dojo
+from sim.parameters import KINDS, all_parameters
+from sim.selection import select
+from sim.sensitivity import parameter_columns
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from parameter_scenes import table  # noqa: E402
+
+REPEATS = 200
+
+
+def seconds(call: Callable[[], object]) -> float:
+    """Least processor time of five rounds [s]."""
+    rounds = []
+    for _ in range(5):
+        start = process_time()
+        for _ in range(REPEATS):
+            call()
+        rounds.append((process_time() - start) / REPEATS)
+    return min(rounds)
+
+
+def cost() -> str:
+    """A sentence about the standing quadruped."""
+    sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
+    x, u = sim.neutral(), np.zeros(sim.nu)
+    calls = sim._calls
+    A = calls.linearize_one(x, u, None)[0]
+    every, plan = select("benchmark", all_parameters(sim.mechanism, sim.time_step), sim.parameters().names)
+    T = 50
+    t = (np.tile(x, (T + 1, 1)), np.zeros((T, sim.nu)))
+    loss = np.ones((T + 1, sim.ndx))
+    kinds = [k for k in KINDS if any(n.startswith(k) for n in every.names)]
+    step = seconds(lambda: sim.rollout(x, np.zeros((1, sim.nu))))
+    both = seconds(lambda: calls.linearize_one(x, u, None))
+    columns = seconds(lambda: parameter_columns(calls, (x, u), A, plan))
+    states = seconds(lambda: sim.vjp(t, loss)) / T
+    sweep = seconds(lambda: sim.vjp(t, loss, wrt=("state", "input", *kinds))) / T
+    return (
+        f"quadruped, {len(every.names)} parameters [us]: step {1e6 * step:.1f}, step and state-input gradient "
+        f"{1e6 * both:.1f}, all parameters {1e6 * columns:.1f}; per step of a sweep {1e6 * states:.1f}, with all "
+        f"parameters {1e6 * sweep:.1f}"
+    )
+
+
+def main() -> None:
+    """Print the table as Markdown, and the cost."""
+    errors = table()
+    print("| | " + " | ".join(errors) + " |")
+    print("|---" * (len(errors) + 1) + "|")
+    for kind in KINDS:
+        cells = (f"{row[kind]:.0e}" if kind in row else "" for row in errors.values())
+        print(f"| {kind} | " + " | ".join(cells) + " |")
+    print()
+    print(cost())
+
+
+if __name__ == "__main__":
+    main()

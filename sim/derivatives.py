@@ -1,0 +1,238 @@
+"""Derivatives of the steps of a simulator by state, input and parameters, forward and backward: part of Simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim import wrenches as pushed
+from sim.border import whole
+from sim.parameters import Parameter, Parameters, Plan, all_parameters
+from sim.results import Linearization, Trajectory, error_of
+from sim.selection import select, with_values
+from sim.sensitivity import adjoint_sweep, parameter_columns
+from sim.states import States
+from sim.wrenches import Wrenches
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+Blocks = dict[str, Floats]
+_VARIABLES = ("state", "input")
+
+
+class Derivatives(States):
+    """Derivatives by the implicit function theorem, in tangent coordinates."""
+
+    @overload
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        wrt: None = None,
+    ) -> tuple[Floats, Floats]: ...
+
+    @overload
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: None = None,
+        *,
+        wrt: Sequence[str],
+    ) -> Blocks: ...
+
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        wrt: Sequence[str] | None = None,
+    ) -> Any:
+        """(A, B) = d(next state)/d(x, u), (ndx, ndx) and (ndx, nu), of the step solved at `kappa`.
+
+        wrt: "state", "input" and parameters, as in `parameters`; then a table by these names, of blocks (ndx, n). x and
+        u are held fixed, so the poses and momenta that belong to x move with a parameter.
+        wrenches: (nbody, 6) as in `rollout`, constants; not together with `wrt`. An unsolved step raises
+        SimulationError.
+        """
+        if wrenches is not None:
+            if wrt is not None:
+                raise ValueError("Simulator.linearize(wrt=..., wrenches=...): give either, or the wrenches as inputs")
+            return pushed.linearize(cast(Any, self), x, u, wrenches, kappa)
+        state = self._border.state("linearize", x)
+        us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
+        level = self._border.kappa("linearize", kappa)
+        A, B, _, report = self._calls.linearize_one(state, us, level)
+        if report[0] != Status.SOLVED:
+            raise error_of(self.mechanism, "Simulator.linearize", report, self.tolerance)
+        if wrt is None:
+            return A, B
+        asked = _names("Simulator.linearize(wrt=...)", wrt)
+        if _parameters(asked):
+            self._check_order("Simulator.linearize(wrt=...)")
+        found, plan = self._select("Simulator.linearize(wrt=...)", _parameters(asked))
+        J = parameter_columns(self._calls, (state, us), A, plan)
+        blocks = {"state": A, "input": B}
+        return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
+
+    def linearize_rollout(
+        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None
+    ) -> tuple[Floats, Linearization]:
+        """States (T + 1, nx) of a rollout from x under us (T, nu), and its derivatives, in one pass.
+
+        As `rollout` and `linearize_trajectory`, but every step is solved once. An unsolved step raises SimulationError.
+        """
+        call = "linearize_rollout"
+        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, (None, self.nu))
+        knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, self._border.kappa(call, kappa))
+        if knot < len(inputs):
+            raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
+        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
+
+    def linearize_trajectory(
+        self,
+        xs: ArrayLike,
+        us: ArrayLike,
+        substeps: int = 1,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+    ) -> Linearization:
+        """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
+
+        xs: (T, nx) or (T + 1, nx), of which the last is not used; us: (T, nu); wrenches: (T, nbody, 6) as in `rollout`.
+        """
+        if wrenches is not None:
+            return pushed.linearize_trajectory(cast(Any, self), xs, us, wrenches, substeps, kappa)
+        call = "Simulator.linearize_trajectory"
+        inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
+        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
+        if len(states) - len(inputs) not in (0, 1):
+            raise ValueError(
+                f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
+            )
+        steps = whole(f"{call}(substeps=...)", substeps)
+        level = self._border.kappa("linearize_trajectory", kappa)
+        A, B, x_next, reports = self._calls.linearize(states, inputs, steps, level)
+        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))
+
+    def linearize_maximal(
+        self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None
+    ) -> tuple[Floats, Floats]:
+        """(A, B) = d(next maximal state)/d(z, u), (12 nbody, 12 nbody) and (12 nbody, nu).
+
+        Tangent coordinates per body: position, velocity (world), rotation (right perturbation of the quaternion),
+        angular velocity (body). The step sees z through minimal(z): what leaves the joints has no effect, so A is the
+        derivative of maximal(step(minimal(z))).
+        """
+        bodies = checks.array("Simulator.linearize_maximal(z)", z, (self.nbody, 13))
+        x = self.minimal(bodies)
+        us = self._border.inputs("linearize_maximal", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
+        A, B, x_next, report = self._calls.linearize_one(x, us, self._border.kappa("linearize_maximal", kappa))
+        if report[0] != Status.SOLVED:
+            raise error_of(self.mechanism, "Simulator.linearize_maximal", report, self.tolerance)
+        out = self.maximal_jacobian(x_next)
+        return out @ A @ self.minimal_jacobian(bodies), out @ B
+
+    def vjp(
+        self,
+        trajectory: Trajectory | tuple[ArrayLike, ArrayLike],
+        dL_dx: ArrayLike,
+        wrt: Sequence[str] = ("state", "input"),
+        kappa: float | None = None,
+    ) -> Blocks:
+        """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
+
+        trajectory: of `rollout`, or (states (T + 1, nx), inputs (T, nu)); dL_dx: (T + 1, ndx) in tangent coordinates.
+        Returns a table by the names of `wrt`: "state" (ndx,), of the first state; "input" (T, nu); parameters (n,),
+        as in `parameters`. The steps are solved anew at `kappa`; nothing but one step is kept, so the memory is that of
+        the trajectory. An unsolved step raises SimulationError.
+        """
+        call = "Simulator.vjp"
+        self._check_order(call)
+        xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
+        inputs = self._border.inputs("vjp", "trajectory", us, (None, self.nu))
+        rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
+        loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
+        asked = _names(f"{call}(wrt=...)", wrt)
+        found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
+        path = (self._border.states(f"{call}(trajectory)", rows), inputs)
+        level = self._border.kappa("vjp", kappa)
+        knot, line = adjoint_sweep(self._calls, path, loss, plan, level)
+        if knot >= 0:
+            raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
+        blocks = {"state": line.costate[0], "input": line.inputs}
+        return {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
+
+    def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
+        """Names and values of parameters: of all, or of the given names, in their order.
+
+            kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
+
+        A name without a component stands for all of them, one without a part for all parts; `kind:*` is a single one
+        that adds the same to all parts, at the mean of their values. Kinds (see sim/parameters.py for units):
+
+            mass, inertia, com          of bodies; a mass changes alone; com is a displacement from where it is, and
+                                        joints, contacts and shapes stay where they are on the body
+            parent_point, child_point   of joints, also of those that close loops
+            orientation, axis           rotation vector of the joint frame, from where it is; direction
+            spring, damper, rest, armature, lower, upper, cone       of joints
+            friction, restitution       of contacts and collisions
+            contact_point, contact_radius, contact_height, contact_normal
+            shape_a, shape_b            centres of the shapes of collisions in their bodies
+            gravity, time_step
+        """
+        names = [p.name for p in self._known] if wrt is None else _names("Simulator.parameters(wrt)", wrt)
+        return self._select("Simulator.parameters(wrt)", tuple(names))[0]
+
+    def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
+        """The same simulator with other values of the named parameters, as in `parameters`; compiled code is shared."""
+        mech, time_step = with_values("Simulator.with_parameters(...)", self.mechanism, self.time_step, values)
+        return self.replace(mechanism=mech, time_step=time_step)
+
+    def replace(self, **settings: Any) -> Any:
+        """See Simulator."""
+        raise NotImplementedError
+
+    def _check_order(self, call: str) -> None:
+        """Steps of a higher order are another scheme, with derivatives by state and input only."""
+        if self.order != 2:
+            raise ValueError(f"{call}: expected a simulator of order 2, got order {self.order}")
+
+    @cached_property
+    def _known(self) -> list[Parameter]:
+        """All parameters."""
+        return all_parameters(self.mechanism, self.time_step)
+
+    @cached_property
+    def _selections(self) -> dict[tuple[str, ...], tuple[Parameters, Plan]]:
+        """Those made so far: finding parameters by name takes longer than their derivatives."""
+        return {}
+
+    def _select(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, Plan]:
+        """Parameters by name, and the terms of their columns."""
+        if names not in self._selections:
+            self._selections[names] = select(call, self._known, names)
+        return self._selections[names]
+
+
+def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
+    """The names, one or several, all different."""
+    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+    for name in names:
+        if not isinstance(name, str):
+            raise ValueError(f"{call}: expected names, got {name!r}")
+    checks.distinct(call, names)
+    return names
+
+
+def _parameters(names: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in _VARIABLES)
