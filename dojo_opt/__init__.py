@@ -38,6 +38,7 @@ __all__ = [
     "Perturbation",
     "Plan",
     "Plant",
+    "Polytope",
     "Problem",
     "Push",
     "Sampled",
@@ -90,6 +91,7 @@ _HOME: dict[str, str | None] = {
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
     "Plant": "dojo_opt.plant.plant",
+    "Polytope": "sim.polytope",
     "Problem": "dojo_opt.problem",
     "Push": "dojo_opt.plant.perturbation",
     "Sampled": "dojo_opt.mpc.moving",
@@ -139,6 +141,7 @@ if TYPE_CHECKING:
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
     from sim.parts import Body, Contact, Input, Joint
+    from sim.polytope import Polytope
     from sim.results import Linearization, SimulationError, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator

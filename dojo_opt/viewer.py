@@ -16,6 +16,7 @@ import numpy as np
 from dojo_opt.motion import Motion, motion
 from sim import shapes
 from sim.parts import WORLD
+from sim.polytope import Polytope
 from sim.simulator import Simulator
 from sim.terrain import Terrain
 
@@ -151,6 +152,11 @@ def _solids(shape: Any) -> list[tuple[Any, Any]]:
         return [(geometry.Box([shape.x, shape.y, shape.z]), place)]
     if isinstance(shape, shapes.HalfSpace):
         return [(geometry.Box([10.0, 10.0, _THICK]), place @ _place((0, 0, -0.5 * _THICK)))]
+    if isinstance(shape, Polytope):
+        from scipy.spatial import ConvexHull
+
+        points = np.asarray(shape.vertices)
+        return [(geometry.TriangularMeshGeometry(points, ConvexHull(points).simplices), place)]
     # MeshCat's cylinders stand along y, ours along z
     upright = place @ _place((0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
     solids = [(geometry.Cylinder(shape.length, shape.radius), upright)]

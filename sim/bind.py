@@ -14,6 +14,8 @@ from sim import (
     coupling_gradient,
     gears,
     loops,
+    pair_choice,
+    pair_far,
     pair_stiffness,
     pairs,
     pyramid,
@@ -47,6 +49,12 @@ _PAIRS = (
     pair_stiffness.apply_pairs,
     pair_stiffness.pair_constants,
     report_pairs,
+    pair_choice.choose_pairs,
+    pair_choice.overlapping,
+    pair_far.begin_pairs,
+    pair_far.enlist_pairs,
+    pair_far.far_pair_impulses,
+    pair_far.pairs_came_near,
 )
 _PYRAMIDS = (
     pyramid.start_pyramid,
@@ -135,6 +143,8 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (ball_spring.add_ball_spring_derivatives,))
     if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _COUPLING_GRADIENT)
+    if len(model.pair_kind):
+        _bind(model, (pair_far.all_near,))
     if np.any(model.contact_restitution):
         _bind(model, (restitution.add_bounce_composites,))
         if len(model.pair_kind):

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.collisions import couples, pack_collisions
+from sim.collisions import pack_collisions
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law, Model
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
 from sim.terrain import Terrain
+from sim.touch import couples
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ncoupling=npairs + len(mech.loops),
         nrow=6 * npairs + sum(6 - j.nv for j in mech.loops) + len(mech.gears),
         nloop=len(mech.loops),
+        nhull=max(1, sum(len(table) for touch in mech.touches for table in touch.hulls)),
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),

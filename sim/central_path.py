@@ -7,12 +7,14 @@ from sim.inequalities import inequality_kinematics, keep_inequalities, move_ineq
 from sim.line_search import largest_turn
 from sim.merit import residuals
 from sim.model import Guess, Model, Options, Vector, Work
+from sim.pair_choice import choose_pairs
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949
+AGAIN = -1  # instead of the number of an attempt
 _BEYOND = 2.0  # [rad] from a fold to a start on its other side
 
 
@@ -24,6 +26,7 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
             work.nu[d] = share * v[d]
             work.nu_trial[d] = work.nu[d]
         if momentum_balance(model, work, h, q):
+            choose_pairs(model, work)
             inequality_kinematics(model, work, h)
             return True
         share *= 0.7
@@ -75,10 +78,15 @@ def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, atte
 
     nu is the incoming velocity at first, then by turns
         even    a share of it: none, and on by the golden ratio, modulo 1
+        AGAIN   where the last attempt ended, which is no solution because shapes overlap there in other points
         odd     where the last attempt ended, and on along its Newton step, forward and backward by turns: attempts end
                 at folds of the path, where the matrix is all but singular and its null vector leads to the other side
     """
-    if attempt > 1 and attempt % 2 == 1:
+    if attempt == AGAIN:
+        for d in range(v.shape[0]):
+            work.dnu[d] = work.nu[d]
+        placed = place(model, work, options.h, q, work.dnu, 1.0)
+    elif attempt > 1 and attempt % 2 == 1:
         far = min(_BEYOND / largest_turn(work), 100.0)
         if attempt % 4 == 3:
             far = -far
@@ -90,4 +98,5 @@ def start(model: Model, work: Work, options: Options, q: Vector, v: Vector, atte
         placed = place(model, work, options.h, q, v, share)
     if not placed:
         return 0.0
-    return start_inequalities(model, work, options.h, options.kappa, _GROWTH ** ((attempt - 1) % _GROWTHS))
+    growth = _GROWTH ** ((attempt - 1) % _GROWTHS) if attempt > 0 else 1.0
+    return start_inequalities(model, work, options.h, options.kappa, growth)

@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim import checks
 from sim.collision import kinds
 from sim.model import Law, Model
 from sim.parts import LAWS, WORLD, share
-from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
+from sim.shapes import Solid
+from sim.touch import Touch, couples
 
 if TYPE_CHECKING:
     from sim.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, or HalfSpace of b; left out, that of the body. With String on
-                       both sides the bodies are tied together instead: their points keep within its length.
+    shape_a, shape_b   Sphere, Capsule, Box, Polytope, HalfSpace; Cylinder against Sphere and HalfSpace; left out, that
+                       of the body. With String on both sides the bodies are tied together instead: their points keep
+                       within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law, restitution     as in Contact
+
+    A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
+    time step, and adds the energy that this takes.
     """
 
     a: str
@@ -48,8 +50,14 @@ class Collision:
         call = f"Collision({self.name!r}"
         if self.a == self.b:
             raise ValueError(f"{call}): a body cannot collide with itself")
-        if self.b == WORLD and self.shape_b is None:
-            raise ValueError(f"{call}): give shape_b=..., the shape of the obstacle")
+        for body, field in ((self.a, "shape_a"), (self.b, "shape_b")):
+            if body == WORLD and getattr(self, field) is None:
+                raise ValueError(f"{call}): give {field}=..., the shape of the obstacle")
+        if self.a == WORLD:  # the obstacle is b
+            for one, other in (("a", "b"), ("shape_a", "shape_b")):
+                first, second = getattr(self, one), getattr(self, other)
+                object.__setattr__(self, one, second)
+                object.__setattr__(self, other, first)
         for field in ("shape_a", "shape_b"):
             shape = getattr(self, field)
             if shape is not None and not isinstance(shape, Solid):
@@ -60,103 +68,9 @@ class Collision:
         object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
 
 
-@dataclass(frozen=True)
-class Touch:
-    """One contact point that a collision may have, as kernels need it: a and b in the order of `collide`."""
-
-    name: str
-    bodies: tuple[int, int]  # -1 for the world
-    kind: int
-    feature: int
-    sizes: Floats  # (8,)
-    places: Floats  # (2, 12) centre and rotation of the shapes in their bodies
-    friction: float
-    law: str
-    restitution: float
-
-
-def touches(mech: Mechanism) -> list[Touch]:
-    """All contact points of the collisions of a mechanism; those of the same two bodies follow one another."""
-    found = [touch for collision in mech.collisions for touch in _touches(mech, collision)]
-    order = list(dict.fromkeys(touch.bodies for touch in found))
-    return sorted(found, key=lambda touch: order.index(touch.bodies))
-
-
-def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
-    call = f"Mechanism({mech.name!r}): collision {collision.name!r}"
-    ends = []
-    for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
-        index = -1 if body == WORLD else mech.body_names.index(body)
-        shape = given if given is not None else mech.bodies[index].shape
-        if shape is None:
-            raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
-        ends.append((index, shape, _CODES[type(shape)]))
-    match = kinds.pair(ends[0][2], ends[1][2])
-    if match is None:
-        names = " and ".join(type(shape).__name__ for _, shape, _ in ends)
-        raise ValueError(f"{call}: there is no collision of {names}")
-    kind, swapped = match
-    if swapped:
-        ends.reverse()
-    if ends[0][0] < 0:  # the world is b
-        names = " with a fixed ".join(type(shape).__name__ for _, shape, _ in reversed(ends))
-        raise ValueError(f"{call}: no collision of a {names}; give the obstacle another shape")
-    sizes = np.zeros(8)
-    for k, (_, shape, _) in enumerate(ends):
-        values = _sizes(shape)
-        sizes[4 * k : 4 * k + len(values)] = values
-    places = np.array([_place(shape) for _, shape, _ in ends])
-    number = kinds.count(kind)
-    return [
-        Touch(
-            collision.name if number == 1 else f"{collision.name}_{feature}",
-            (ends[0][0], ends[1][0]),
-            int(kind),
-            feature,
-            sizes,
-            places,
-            collision.friction,
-            collision.law,
-            collision.restitution,
-        )
-        for feature in range(number)
-    ]
-
-
-_CODES = {
-    Sphere: kinds.Shape.SPHERE,
-    Capsule: kinds.Shape.CAPSULE,
-    Box: kinds.Shape.BOX,
-    Cylinder: kinds.Shape.CYLINDER,
-    HalfSpace: kinds.Shape.HALFSPACE,
-    String: kinds.Shape.STRING,
-}
-
-
-def _sizes(shape: Solid) -> tuple[float, ...]:
-    """Sizes in the order of kinds.Shape."""
-    if isinstance(shape, Sphere):
-        return (shape.radius,)
-    if isinstance(shape, Capsule | Cylinder):
-        return shape.radius, 0.5 * shape.length
-    if isinstance(shape, Box):
-        return 0.5 * shape.x, 0.5 * shape.y, 0.5 * shape.z
-    return (shape.length,) if isinstance(shape, String) else ()
-
-
-def _place(shape: Solid) -> Floats:
-    """Centre and rotation of a shape in its body, (12,)."""
-    return np.concatenate([np.asarray(shape.center), rotation_matrix(shape.orientation).ravel()])
-
-
-def couples(found: Sequence[Touch]) -> list[tuple[int, int]]:
-    """The pairs of bodies, in the order of their touches."""
-    return [bodies for bodies, _ in groupby(found, key=lambda touch: touch.bodies)]
-
-
 def pack_collisions(mech: Mechanism, model: Model) -> None:
     """The numbers of the pairs, and of the couplings that they make."""
-    found = touches(mech)
+    found = mech.touches
     bodies = couples(found)
     ground = len(mech.contacts)
     for j, touch in enumerate(found):
@@ -169,6 +83,43 @@ def pack_collisions(mech: Mechanism, model: Model) -> None:
         model.pair_kind[j], model.pair_feature[j] = touch.kind, touch.feature
         model.pair_sizes[j] = touch.sizes
         model.pair_place[2 * j : 2 * j + 2] = touch.places
+    _pack_far(found, model)
+    _pack_hulls(found, model)
     for k, (a, b) in enumerate(bodies):
         model.coupling_body[k] = a, b
         model.coupling_row[k + 1] = model.coupling_row[k] + 6
+
+
+def _pack_far(found: Sequence[Touch], model: Model) -> None:
+    """pair_far and body_reach."""
+    firsts = [j for j, touch in enumerate(found) if touch.feature == 0]
+    if not firsts:
+        return
+    degree = Counter(i for j in firsts for i in found[j].bodies)
+    for j, end in zip(firsts, [*firsts[1:], len(found)], strict=True):
+        touch = found[j]
+        arms, mobility, turning = [0.0, 0.0], 0.0, 0.0
+        for side, i in enumerate(touch.bodies):
+            if i < 0:
+                continue
+            arm = float(np.linalg.norm(touch.places[side, :3])) + touch.radii[side]
+            least = float(np.linalg.eigvalsh(model.body_inertia[i].reshape(3, 3))[0])
+            free = model.body_mass[i] > 0.0 and arm < np.inf
+            arms[side] = arm
+            mobility += 1.0 / model.body_mass[i] + arm**2 / least if free else np.inf
+            turning += arm / least if free else np.inf
+            model.body_reach[i] = max(model.body_reach[i], arm)
+        most = max(degree[i] for i in touch.bodies if i >= 0)
+        model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j
+
+
+def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
+    """hull, and where in it the polytopes of every point are."""
+    end, rows = 0, [0, 0]
+    for j, touch in enumerate(found):
+        for k, table in enumerate(touch.hulls):
+            rows[k] = end
+            model.hull[end : end + len(table)] = table
+            end += len(table)
+        if touch.kind % kinds.SWAPPED == kinds.Pair.POLYTOPE_POLYTOPE:
+            model.pair_sizes[j, [0, 4]] = rows

@@ -11,9 +11,10 @@ zeta_0 answers the right-hand side and Z the unit forces:
 
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
-so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row. Constraints that say nothing
-new (a planar loop in space) are found by the pivots, and their forces set to zero; their rows are rounding, and kept so
-by a scale that does not look at directions.
+so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row, those of gears (gears.py)
+come last; couple_live names those that the dense system has: not those of far pairs, nor those without stiffness.
+Constraints that say nothing new (a planar loop in space) are found by the pivots, and their forces set to zero; their
+rows are rounding, and kept so by a scale that does not look at directions.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def take_apart(work: Work, k: int, row: int) -> None:
             B[c] = 0.0
             R[c] = 0.0
             R[6 + c] = 0.0
-        work.couple_E[r] = 1.0
+        work.couple_E[r] = 0.0  # no row, and none after it
         if not abs(best) > _ROUNDING * first:
             continue
         work.couple_E[r] = 1.0 / best
@@ -120,57 +121,88 @@ def response_size(model: Model, work: Work, k: int, row: int) -> float:
 
 
 @kernel
-def _row_scale(work: Work, row: int, size: float) -> float:
-    """1 over the largest entry of a row of the dense system, or over `size` when that is larger."""
+def enlist(model: Model, work: Work) -> int:
+    """couple_live: rows of the dense system, with their coupling, or number of couplings + gear; returns how many."""
+    n = 0
+    count = model.coupling_body.shape[0]
+    for k in range(count):
+        if not is_loop(model, k):
+            if work.coupling_live[k] == 0:
+                continue
+            take_apart(work, k, model.coupling_row[k])
+        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            if is_loop(model, k) or work.couple_E[row] > 0.0 or work.couple_E[row] < 0.0:
+                work.couple_live[n, 0] = row
+                work.couple_live[n, 1] = k
+                n += 1
+    for k in range(model.gear_dof.shape[0]):
+        work.couple_live[n, 0] = gear_row(model, k)
+        work.couple_live[n, 1] = count + k
+        n += 1
+    return n
+
+
+@kernel
+def unit_impulse(model: Model, work: Work, p: int, out: Vector) -> None:
+    """out (nv,) = the generalized impulse of a unit force in row p of the dense system."""
+    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+    if k >= model.coupling_body.shape[0]:
+        unit_gear_impulse(model, k - model.coupling_body.shape[0], out)
+        return
+    for d in range(out.shape[0]):
+        out[d] = 0.0
+    add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[row], out)
+    add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[row], out)
+
+
+@kernel
+def row_response(model: Model, work: Work, p: int, y: Vector) -> float:
+    """Row p of the dense system times the velocities y (nv,), whose twists are in work.twist."""
+    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+    if k >= model.coupling_body.shape[0]:
+        return gear_response(model, work, k - model.coupling_body.shape[0], y)
+    return response(model, work, k, row)
+
+
+@kernel
+def scale_row(T: Matrix, p: int, size: float) -> float:
+    """Divide row p by its largest entry, or by `size` when that is larger; returns one over it."""
     largest = size
-    for col in range(work.couple_T.shape[1]):
-        largest = max(largest, abs(work.couple_T[row, col]))
-    return 1.0 / largest if largest > 0.0 else 1.0
+    for q in range(T.shape[1]):
+        largest = max(largest, abs(T[p, q]))
+    scale = 1.0 / largest if largest > 0.0 else 1.0
+    for q in range(T.shape[1]):
+        T[p, q] *= scale
+    return scale
 
 
 @late(Late.FACTOR_COUPLING, True)
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
+    n = enlist(model, work)
+    T = work.couple_T[:n, :n]
     pairs = 0
-    for row in range(work.couple_scale.shape[0]):
-        work.couple_scale[row] = 0.0
-    for k in range(model.coupling_body.shape[0]):
+    for p in range(n):
+        work.couple_scale[p] = 0.0
+    for q in range(n):
+        col, k = work.couple_live[q, 0], work.couple_live[q, 1]
+        unit_impulse(model, work, q, work.rhs)
+        y = work.couple_Y[col]
+        solve(model, work, work.rhs, y)
+        for p in range(n):
+            T[p, q] = -row_response(model, work, p, y)
+            m = work.couple_live[p, 1]
+            if is_loop(model, m) and m < model.coupling_body.shape[0]:
+                work.couple_scale[p] = max(work.couple_scale[p], response_size(model, work, m, work.couple_live[p, 0]))
         if not is_loop(model, k):
-            take_apart(work, k, model.coupling_row[k])
-    for k in range(model.coupling_body.shape[0]):
-        for col in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            for d in range(work.rhs.shape[0]):
-                work.rhs[d] = 0.0
-            add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[col], work.rhs)
-            add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[col], work.rhs)
-            solve(model, work, work.rhs, work.couple_Y[col])
-            for m in range(model.coupling_body.shape[0]):
-                for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
-                    work.couple_T[row, col] = -response(model, work, m, row)
-                    if is_loop(model, m):
-                        size = response_size(model, work, m, row)
-                        work.couple_scale[row] = max(work.couple_scale[row], size)
-            for m in range(model.gear_dof.shape[0]):
-                work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
-            if not is_loop(model, k):
-                work.couple_T[col, col] += work.couple_E[col]
-                pairs += 1
-    for k in range(model.gear_dof.shape[0]):
-        col = gear_row(model, k)
-        unit_gear_impulse(model, k, work.rhs)
-        solve(model, work, work.rhs, work.couple_Y[col])
-        for m in range(model.coupling_body.shape[0]):
-            for row in range(model.coupling_row[m], model.coupling_row[m + 1]):
-                work.couple_T[row, col] = -response(model, work, m, row)
-        for m in range(model.gear_dof.shape[0]):
-            work.couple_T[gear_row(model, m), col] = -gear_response(model, work, m, work.couple_Y[col])
-    for row in range(work.couple_T.shape[0]):
-        work.couple_scale[row] = _row_scale(work, row, work.couple_scale[row])
-        for col in range(work.couple_T.shape[1]):
-            work.couple_T[row, col] *= work.couple_scale[row]
+            T[q, q] += work.couple_E[col]
+            pairs += 1
+    for p in range(n):
+        work.couple_scale[p] = scale_row(T, p, work.couple_scale[p])
     least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
-    rank = full_lu_factor(work.couple_T, work.couple_pivots, least)
+    rank = full_lu_factor(T, work.couple_pivots, least)
     work.couple_rank[0] = rank
+    work.couple_rank[1] = n
     return rank >= pairs
 
 
@@ -180,16 +212,17 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
 
     share: part of the loop gaps to close.
     """
-    x = work.couple_x
-    for k in range(model.coupling_body.shape[0]):
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + response(model, work, k, row))
-    for k in range(model.gear_dof.shape[0]):
-        row = gear_row(model, k)
-        x[row, 0] = work.couple_scale[row] * (share * work.couple_gap[row] + gear_response(model, work, k, out))
-    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), x)
-    for row in range(x.shape[0]):
-        f = x[row, 0]
+    n = int(work.couple_rank[1])
+    x = work.couple_x[:n]
+    for p in range(n):
+        gap = share * work.couple_gap[work.couple_live[p, 0]]
+        x[p, 0] = work.couple_scale[p] * (gap + row_response(model, work, p, out))
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), x)
+    for row in range(work.couple_step.shape[0]):
+        work.couple_step[row] = 0.0
+    for p in range(n):
+        f = x[p, 0]
+        row = work.couple_live[p, 0]
         work.couple_step[row] = f
         Y = work.couple_Y[row]
         for d in range(out.shape[0]):
@@ -210,30 +243,42 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
                 V[k] += work.S3nu[d, k] * y[d]
 
 
+@kernel
+def add_columns(model: Model, work: Work, p: int, x: Vector) -> None:
+    """x = the row of couple_panel that is row p of the dense system, plus its response to the columns."""
+    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+    for m in range(x.shape[0]):
+        x[m] = work.couple_panel[row, m]  # p <= row
+    if k >= model.coupling_body.shape[0]:
+        add_gear_columns(model, work, k - model.coupling_body.shape[0], x)
+        return
+    for side in range(2):
+        i = model.coupling_body[k, side]
+        if i < 0:
+            continue
+        for c in range(6):
+            f = work.couple_R[row, 6 * side + c]
+            z = work.panel[6 * i + c]
+            for m in range(x.shape[0]):
+                x[m] += f * z[m]
+
+
 @late(Late.SOLVE_COUPLING_PANEL)
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
-    X = work.couple_panel
-    for k in range(model.coupling_body.shape[0]):
-        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            for side in range(2):
-                i = model.coupling_body[k, side]
-                if i < 0:
-                    continue
-                for c in range(6):
-                    f = work.couple_R[row, 6 * side + c]
-                    z = work.panel[6 * i + c]
-                    for m in range(X.shape[1]):
-                        X[row, m] += f * z[m]
-            for m in range(X.shape[1]):
-                X[row, m] *= work.couple_scale[row]
-    add_gear_columns(model, work, X)
-    full_lu_solve(work.couple_T, work.couple_pivots, int(work.couple_rank[0]), X)
-    for row in range(X.shape[0]):
+    n = int(work.couple_rank[1])
+    X = work.couple_panel[:n]
+    for p in range(n):
+        add_columns(model, work, p, X[p])
+        for m in range(X.shape[1]):
+            X[p, m] *= work.couple_scale[p]
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X)
+    for p in range(n):
+        Y = work.couple_Y[work.couple_live[p, 0]]
         for d in range(work.columns.shape[0]):
-            f = work.couple_Y[row, d]
+            f = Y[d]
             for m in range(X.shape[1]):
-                work.columns[d, m] += f * X[row, m]
+                work.columns[d, m] += f * X[p, m]
 
 
 @kernel

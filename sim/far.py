@@ -29,6 +29,7 @@ Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: larges
 from __future__ import annotations
 
 from sim.model import Model, Options, Work
+from sim.pair_far import enlist_pairs, pairs_came_near
 from sim.rotation import rotate
 from sim.terrain_contact import terrain_gap
 from solvers.jit import kernel
@@ -83,19 +84,9 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         if a == 0.0 or not known:
             work.far[c, 23] = 0.0
         _enlist(model, work, c)
-    _enlist_pairs(model, work)
+    work.counts[2] = work.counts[0]
+    enlist_pairs(model, work)
     work.far_law[1] = options.tolerance / max(1, work.counts[1])
-
-
-@kernel
-def _enlist_pairs(model: Model, work: Work) -> None:
-    """One more run of near: the contacts between bodies."""
-    runs = work.counts[0]
-    if model.contact_body.shape[0] > model.contact_height.shape[0]:
-        work.near[runs, 0] = model.contact_height.shape[0]
-        work.near[runs, 1] = model.contact_body.shape[0]
-        runs += 1
-    work.counts[2] = runs
 
 
 @kernel
@@ -134,7 +125,7 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
 @kernel
 def came_near(model: Model, work: Work) -> bool:
     """Whether a far cluster is not, at configuration 3; it is near from now on."""
-    found = False
+    found = pairs_came_near(model, work)
     for m in range(work.counts[1]):
         c = work.far_first[m]
         if cluster_gap(model, work, c, True) < work.far[c, 0]:
@@ -147,5 +138,6 @@ def came_near(model: Model, work: Work) -> bool:
         for c in range(model.contact_height.shape[0]):
             if model.cluster_end[c] > 0:
                 _enlist(model, work, c)
-        _enlist_pairs(model, work)
+        work.counts[2] = work.counts[0]
+        enlist_pairs(model, work)
     return found

@@ -52,15 +52,12 @@ def gear_response(model: Model, work: Work, k: int, y: Vector) -> float:
 
 
 @kernel
-def add_gear_columns(model: Model, work: Work, X: Matrix) -> None:
-    """X[row of gear] += d(gap)/d(v25) of the columns."""
-    for k in range(model.gear_dof.shape[0]):
-        row = gear_row(model, k)
-        a = work.columns[model.gear_dof[k, 0]]
-        b = work.columns[model.gear_dof[k, 1]]
-        for m in range(X.shape[1]):
-            X[row, m] += work.gear_rate[k, 0] * a[m] + work.gear_rate[k, 1] * b[m]
-            X[row, m] *= work.couple_scale[row]
+def add_gear_columns(model: Model, work: Work, k: int, x: Vector) -> None:
+    """x += d(gap of gear k)/d(v25) of the columns."""
+    a = work.columns[model.gear_dof[k, 0]]
+    b = work.columns[model.gear_dof[k, 1]]
+    for m in range(x.shape[0]):
+        x[m] += work.gear_rate[k, 0] * a[m] + work.gear_rate[k, 1] * b[m]
 
 
 @kernel

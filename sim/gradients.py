@@ -15,6 +15,7 @@ from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import add_limit_derivatives
 from sim.model import InputKind, Late, Matrix, Model, Vector, Work
+from sim.pair_far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.restitution import add_bounce_composites, add_bounce_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
@@ -34,6 +35,7 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     inertial_jacobians(model, work, h)
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     joint_blocks(model, work, h, q, v)
+    all_near(model, work)
     add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
     add_bounce_composites(model, work)

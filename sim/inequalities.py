@@ -29,6 +29,7 @@ from sim.friction import (
 from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
 from sim.loops import keep_loops, move_loops
 from sim.model import Goal, Late, Matrix, Model, Work
+from sim.pair_far import far_pair_impulses
 from sim.pair_stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
@@ -49,6 +50,7 @@ def inequality_kinematics(model: Model, work: Work, h: float) -> None:
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
     far_impulses(model, work, h)
     pair_kinematics(model, work, h)
+    far_pair_impulses(model, work, h, work.far_law[0])
     subtract_floors(model, work)
     limit_gaps(model, work, h)
 

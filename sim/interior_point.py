@@ -1,6 +1,6 @@
 """The interior point of a step: Newton's method on the joint velocities, contacts and limits held on the central path.
 
-Six things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
+Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
   beta by Newton, at a `smoothing` that follows down to kappa (friction.py); only gaps and normal impulses have to stay
@@ -10,13 +10,15 @@ Six things decide (60,000 random extreme states, `benchmarks/robustness.py`, see
 * The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
 * No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
+* Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
+  overlap is none (pair_choice.py).
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0.
 """
 
 from __future__ import annotations
 
-from sim.central_path import first_attempt, start
+from sim.central_path import AGAIN, first_attempt, start
 from sim.direction import direction, linearize_step
 from sim.far import came_near, choose_far
 from sim.friction import slip_noise
@@ -25,6 +27,8 @@ from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.newton import residual_scale, rounding
+from sim.pair_choice import overlapping
+from sim.pair_far import begin_pairs
 from sim.restitution import find_impacts, gained_energy
 from solvers.jit import inlined, kernel
 from solvers.late import late
@@ -39,6 +43,7 @@ _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of pos
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
 _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
+_CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -72,7 +77,7 @@ def try_from(
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     smoothing = kappa
-    if attempt > 0:
+    if attempt != 0:
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
@@ -117,14 +122,24 @@ def interior_point(
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    begin_pairs(model, work, options)
     choose_far(model, work, options)
     find_impacts(model, work, options.h)
     while True:
+        work.pair_free[0] = 0
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
-            if out.status == _SOLVED or out.status == _MAX_ITERATIONS:
+            apart = not (out.status == _SOLVED and overlapping(model, work))
+            for _ in range(_CHOICES):
+                if apart:
+                    break
+                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
+                apart = not (out.status == _SOLVED and overlapping(model, work))
+            if apart and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
+            out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
+            work.pair_free[0] = (attempt + 1) // 2 % 2
         if came_near(model, work):
             continue
         if out.status != _SOLVED or not gained_energy(model, work, options.h):

@@ -40,14 +40,19 @@ MODEL_FLOATS = _shapes(
     dof_damper nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight,
-    contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, loop_point nloop 6,
-    loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
+    contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
+    body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
     gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit,
     input_wrench nu 6, gravity 3
     """
 )
 
-WORK_INTS = _shapes("counts 4, near ncontact 2, far_first nground")
+WORK_INTS = _shapes(
+    """
+    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_free 1,
+    coupling_live ncoupling, couple_live nrow 2
+    """
+)
 
 WORK_FLOATS = _shapes(
     """
@@ -61,10 +66,11 @@ WORK_FLOATS = _shapes(
     contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
-    pair_frame npair 12,
+    pair_frame npair 12, pair_trial 1 43,
+    pair_before npair 13, pair_apart npair, pair_far_state 3, far_pose nbody 7, far_wrench nbody 6,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 1,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 2,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
@@ -90,6 +96,7 @@ class Sizes(NamedTuple):
     ncoupling: int = 0  # two bodies with pairs, and closed loops
     nrow: int = 0  # unknown forces of the couplings
     nloop: int = 0
+    nhull: int = 1  # rows of the tables of polytopes
     ngear: int = 0
     nterrain: int = 0  # height fields: one per terrain and radius of its contacts
     nheight: int = 0  # their coefficients
@@ -150,6 +157,7 @@ def sizes_of(model: Model) -> Sizes:
         ncoupling=len(model.coupling_body),
         nrow=int(model.coupling_row[-1]) + len(model.gear_dof),
         nloop=len(model.loop_ntrans),
+        nhull=len(model.hull),
         ngear=len(model.gear_dof),
         nterrain=len(model.terrain_size),
         nheight=len(model.terrain_heights),

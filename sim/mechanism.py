@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.closing import carried
-from sim.collisions import Collision, Touch, touches
+from sim.collisions import Collision
 from sim.gear import Gear, check_gears
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
 from sim.terrain import Terrain
+from sim.touch import Touch, touches
 
 
 @dataclass(frozen=True)

@@ -104,8 +104,16 @@ class Late(IntEnum):
     GAINED_ENERGY = 46
     BOUNCE_COMPOSITES = 47
     BOUNCE_DERIVATIVES = 48
+    # which pairs, and which of their elements
+    BEGIN_PAIRS = 49
+    ENLIST_PAIRS = 50
+    CHOOSE_PAIRS = 51
+    OVERLAPPING = 52
+    FAR_PAIR_IMPULSES = 53
+    PAIRS_CAME_NEAR = 54
+    ALL_NEAR = 55
     # gears
-    APPLY_GEARS = 49
+    APPLY_GEARS = 56
 
 
 class Model(NamedTuple):
@@ -161,6 +169,9 @@ class Model(NamedTuple):
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
+    pair_far: Matrix  # (npair, 7) what says that a collision is far (pair_far.py), at its first pair
+    hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/hull.py)
+    body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
     loop_point: Matrix  # (nloop, 6) joint frame on b, joint point on a, from their centres of mass [m]
     loop_offset: Matrix  # (nloop, 9) orientation of the joint frame on b, rotation matrix
@@ -219,6 +230,11 @@ class Work(NamedTuple):
     counts: Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; whether advance.py may be used
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     far_first: Integers  # (nground,) first contacts of the far clusters
+    pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
+    pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
+    coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
+    couple_live: Integers  # (nrow, 2) rows of the dense system, with their couplings
+    pair_free: Integers  # (1,) 1: elements are chosen anew at every pose
     far: Matrix  # (nground, 24) see far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
@@ -238,6 +254,12 @@ class Work(NamedTuple):
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
     pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
+    pair_apart: Vector  # (npair,) half the gap ahead of a far collision, 0 of a near one, at its first pair
+    pair_far_state: Vector  # (3,) see pair_far.py
+    far_pose: Matrix  # (nbody, 7) poses where the far collisions were evaluated
+    far_wrench: Matrix  # (nbody, 6) their wrenches about O
+    pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
     pair_shift: Matrix  # (npair, 18) displacement of the contact point by the relative twist
@@ -255,7 +277,7 @@ class Work(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
-    couple_rank: Vector  # (1,)
+    couple_rank: Vector  # (2,) rank and size of the dense system,
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from sim.friction import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.model import Goal, Late, Matrix, Model, Vector, Work
+from sim.pair_far import add_far_pairs
 from sim.pairs import add_pair_wrench, is_absent, pair_arm, pair_force, pair_jacobian, shares
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
@@ -100,39 +101,46 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 @late(Late.CONDENSE_PAIRS)
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
-    """coupling_K of all pairs, their laws linearised at kappa; overwritten.  share: as in `condense_into`."""
-    for r in range(work.coupling_K.shape[0]):
-        for k in range(36):
-            work.coupling_K[r, k] = 0.0
-    for j in range(model.pair_kind.shape[0]):
-        pair_jacobian(model, work, h, j)
-        condense_contact(model, work, model.contact_height.shape[0] + j, kappa, share)
-        if not is_absent(work, j):
-            add_pair_stiffness(model, work, j, share)
+    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  share: as in `condense_into`."""
+    ground = model.contact_height.shape[0]
+    for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
+        if work.coupling_live[k] == 1:
+            for e in range(36):
+                work.coupling_K[2 * k, e] = 0.0
+                work.coupling_K[2 * k + 1, e] = 0.0
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            pair_jacobian(model, work, h, c - ground)
+            condense_contact(model, work, c, kappa, share)
+            if not is_absent(work, c - ground):
+                add_pair_stiffness(model, work, c - ground, share)
 
 
 @late(Late.APPLY_PAIRS, 0.0)
 def apply_pairs(model: Model, work: Work) -> float:
-    """wrench -= impulses of the pairs; returns their largest |gap - slack|."""
+    """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
+    ground = model.contact_height.shape[0]
     r = 0.0
-    for j in range(model.pair_kind.shape[0]):
-        c = model.contact_height.shape[0] + j
-        n, t1, t2 = contact_impulse(model, work, c)
-        if not is_absent(work, j):
-            add_pair_wrench(model, work, j, n, t1, t2)
-        r = max(r, contact_error(model, work, c))
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            n, t1, t2 = contact_impulse(model, work, c)
+            if not is_absent(work, c - ground):
+                add_pair_wrench(model, work, c - ground, n, t1, t2, work.wrench)
+            r = max(r, contact_error(model, work, c))
+    add_far_pairs(work)
     return r
 
 
 @late(Late.PAIR_CONSTANTS)
 def pair_constants(model: Model, work: Work, goal: Goal) -> None:
-    """wrench -= constant parts of the impulses of the pairs, for the goal of this Newton step."""
-    for j in range(model.pair_kind.shape[0]):
-        c = model.contact_height.shape[0] + j
-        contact_constant(model, work, c, goal)
-        w = work.contact_w[c]
-        if not is_absent(work, j):
-            add_pair_wrench(model, work, j, w[0], w[1], w[2])
+    """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
+    ground = model.contact_height.shape[0]
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_constant(model, work, c, goal)
+            w = work.contact_w[c]
+            if not is_absent(work, c - ground):
+                add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)
 
 
 @kernel

@@ -15,51 +15,15 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.collide import arrange, collide_arranged
-from sim.model import Late, Model, Vector, Work
+from sim.collision.collide import collide_chosen
+from sim.model import Late, Matrix, Model, Vector, Work
+from sim.pair_choice import choose_shapes
+from sim.pair_pose import place_shapes
 from sim.rotation import Vec3, cross, rotate
 from solvers.jit import kernel
 from solvers.late import late
 
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
-
-
-@kernel
-def place_shape(model: Model, work: Work, row: int, i: int) -> None:
-    """World pose at configuration 3 of shape `row` on body i, -1 for the world."""
-    c = model.pair_place[row]
-    p = work.shape_pos[row]
-    R = work.shape_rot[row]
-    if i < 0:
-        for k in range(3):
-            p[k] = c[k]
-        for k in range(9):
-            R[k] = c[3 + k]
-        return
-    x, y, z = rotate(work.rot3, i, c[0], c[1], c[2])
-    p[0] = work.pos3[i, 0] + x
-    p[1] = work.pos3[i, 1] + y
-    p[2] = work.pos3[i, 2] + z
-    for k in range(3):
-        x, y, z = rotate(work.rot3, i, c[3 + k], c[6 + k], c[9 + k])
-        R[k] = x
-        R[3 + k] = y
-        R[6 + k] = z
-
-
-@kernel
-def relative_pose(work: Work, j: int) -> None:
-    """pair_relative[j] = (R_b^T R_a, R_b^T (o_a - o_b)): shape a in the frame of shape b."""
-    A = work.shape_rot[2 * j]
-    B = work.shape_rot[2 * j + 1]
-    out = work.pair_relative[j]
-    x = work.shape_pos[2 * j, 0] - work.shape_pos[2 * j + 1, 0]
-    y = work.shape_pos[2 * j, 1] - work.shape_pos[2 * j + 1, 1]
-    z = work.shape_pos[2 * j, 2] - work.shape_pos[2 * j + 1, 2]
-    for r in range(3):
-        for c in range(3):
-            out[3 * r + c] = B[r] * A[c] + B[3 + r] * A[3 + c] + B[6 + r] * A[6 + c]
-        out[9 + r] = B[r] * x + B[3 + r] * y + B[6 + r] * z
 
 
 @kernel
@@ -85,21 +49,21 @@ def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -
 
 
 @kernel
-def collide_shapes(model: Model, work: Work, first: int) -> int:
-    """pair_out of all points of the collision whose first pair this is; returns one past the last."""
-    k = model.pair_coupling[first]
-    place_shape(model, work, 2 * first, model.coupling_body[k, 0])
-    place_shape(model, work, 2 * first + 1, model.coupling_body[k, 1])
-    relative_pose(work, first)
+def collide_shapes(model: Model, work: Work, first: int) -> None:
+    """pair_out of all points of the collision whose first pair this is, at configuration 3."""
+    place_shapes(model, work, first, work.pos3, work.rot3)
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    faces = arrange(kind, sizes, pose[:9], pose[9:])
+    if work.pair_free[0] == 1:
+        choose_shapes(model, work, first)
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        collide_arranged(kind, end - first, faces, sizes, pose[:9], pose[9:], work.pair_out[end])
+        if work.pair_free[0] == 0:
+            collide_chosen(
+                kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
+            )
         end += 1
-    return end
 
 
 @kernel
@@ -110,34 +74,40 @@ def is_absent(work: Work, j: int) -> bool:
 
 @late(Late.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gap, slip, frame and point of every pair at configuration 3."""
+    """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
     ground = model.contact_height.shape[0]
-    end = 0
-    for j in range(model.pair_kind.shape[0]):
-        if j == end:
-            end = collide_shapes(model, work, j)
-        a = model.coupling_body[model.pair_coupling[j], 0]
-        b = model.coupling_body[model.pair_coupling[j], 1]
-        g = work.pair_out[j]
-        F = work.pair_frame[j]
-        s = shape_b(model, j)
-        t1, t2, _ = tangents(g[1], g[2], g[3])
-        F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
-        F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
-        F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
-        F[9], F[10], F[11] = rotate(work.shape_rot, s, g[4], g[5], g[6])
-        for k in range(3):
-            F[9 + k] += work.shape_pos[s, k]
-        ax, ay, az = point_velocity(work, h, a, F[9], F[10], F[11])
-        bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
-        x, y, z = ax - bx, ay - by, az - bz
-        kin = work.contact_kin[ground + j]
-        kin[0] = 1.0 if is_absent(work, j) else g[0]
-        kin[1] = F[3] * x + F[4] * y + F[5] * z
-        kin[2] = F[6] * x + F[7] * y + F[8] * z
-        kin[3] = F[9] - work.pos3[a, 0]
-        kin[4] = F[10] - work.pos3[a, 1]
-        kin[5] = F[11] - work.pos3[a, 2]
+    for m in range(work.counts[0], work.counts[2]):
+        for j in range(work.near[m, 0] - ground, work.near[m, 1] - ground):
+            if model.pair_feature[j] == 0:
+                collide_shapes(model, work, j)
+            point_kinematics(model, work, h, j)
+
+
+@kernel
+def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
+    """Gap, slip, frame and point of pair j, from pair_out."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    g = work.pair_out[j]
+    F = work.pair_frame[j]
+    s = shape_b(model, j)
+    t1, t2, _ = tangents(g[1], g[2], g[3])
+    F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
+    F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
+    F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
+    F[9], F[10], F[11] = rotate(work.shape_rot, s, g[4], g[5], g[6])
+    for k in range(3):
+        F[9 + k] += work.shape_pos[s, k]
+    ax, ay, az = point_velocity(work, h, a, F[9], F[10], F[11])
+    bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
+    x, y, z = ax - bx, ay - by, az - bz
+    kin = work.contact_kin[model.contact_height.shape[0] + j]
+    kin[0] = 1.0 if is_absent(work, j) else g[0]
+    kin[1] = F[3] * x + F[4] * y + F[5] * z
+    kin[2] = F[6] * x + F[7] * y + F[8] * z
+    kin[3] = F[9] - work.pos3[a, 0]
+    kin[4] = F[10] - work.pos3[a, 1]
+    kin[5] = F[11] - work.pos3[a, 2]
 
 
 @kernel
@@ -177,19 +147,19 @@ def pair_force(work: Work, j: int, fn: float, f1: float, f2: float) -> Vec3:
 
 
 @kernel
-def add_pair_wrench(model: Model, work: Work, j: int, fn: float, f1: float, f2: float) -> None:
-    """wrench[a] -= (f, (P - O) x f), wrench[b] += the same."""
+def add_pair_wrench(model: Model, work: Work, j: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[a] -= (f, (P - O) x f), out[b] += the same."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     f = pair_force(work, j, fn, f1, f2)
     x, y, z = pair_arm(model, work, j)
     m = cross(x, y, z, f[0], f[1], f[2])
     for k in range(3):
-        work.wrench[a, k] -= f[k]
-        work.wrench[a, 3 + k] -= m[k]
+        out[a, k] -= f[k]
+        out[a, 3 + k] -= m[k]
         if b >= 0:
-            work.wrench[b, k] += f[k]
-            work.wrench[b, 3 + k] += m[k]
+            out[b, k] += f[k]
+            out[b, 3 + k] += m[k]
 
 
 @kernel

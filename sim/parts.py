@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.polytope import Polytope
 from sim.shapes import Shape, Solid
 from sim.terrain import Terrain
 
@@ -48,7 +49,7 @@ class Body:
     name: str
     mass: float = 1.0  # [kg]
     inertia: ArrayLike | None = None
-    shape: Shape | None = None
+    shape: Shape | Polytope | None = None
 
     def __post_init__(self) -> None:
         checks.name("Body(name=...)", self.name)
@@ -56,7 +57,8 @@ class Body:
         if self.mass != 0 or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         if self.shape is not None and not isinstance(self.shape, Solid):
-            raise ValueError(f"{call}, shape=...): expected Sphere, Box, Cylinder or Capsule, got {self.shape!r}")
+            known = "Sphere, Box, Cylinder, Capsule or Polytope"
+            raise ValueError(f"{call}, shape=...): expected {known}, got {self.shape!r}")
         object.__setattr__(self, "inertia", _inertia(call, self))
 
 

@@ -55,7 +55,9 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             work.rot3[i, k] = rot[i, k]
     for m in range(work.counts[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
+    work.pair_free[0] = 1  # what touched there, whatever it is now
     pair_kinematics(model, work, h)
+    work.pair_free[0] = 0
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]

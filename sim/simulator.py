@@ -18,15 +18,7 @@ from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism, with_contacts
 from sim.reactions import Reactions, reactions
-from sim.results import (
-    Batch,
-    Shot,
-    SimulationError,
-    StepResult,
-    Trajectory,
-    contacts_of,
-    error_of,
-)
+from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 

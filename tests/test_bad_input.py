@@ -66,6 +66,20 @@ PARTS = {
     "not a body": (lambda: dojo.Mechanism([HINGE], [HINGE]), "bodies", "Body"),
     "nothing moves": (lambda: dojo.Mechanism([BODY], [dojo.Joint("fixed", None, "arm")]), "free to move"),
     "neutral": (lambda: dojo.Mechanism([BODY], [HINGE], neutral={"elbow": 1.0}), "neutral", "elbow", "hinge"),
+    "ball without volume": (lambda: dojo.Sphere(0.0), "Sphere(radius", "0"),
+    "box without volume": (lambda: dojo.Box(1.0, 1.0, 0.0), "Box(z", "0"),
+    "capsule of negative length": (lambda: dojo.Capsule(0.1, -1.0), "Capsule(length", "-1"),
+    "cylinder without volume": (lambda: dojo.Cylinder(0.0, 1.0), "Cylinder(radius", "0"),
+    "flat polytope": (lambda: dojo.Polytope([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), "Polytope", "no volume"),
+    "polytope of three": (lambda: dojo.Polytope(np.eye(3)), "Polytope", "at least 4", "3"),
+    "polytope off centre": (lambda: dojo.Body("rock", 1.0, shape=dojo.Polytope(np.vstack([np.eye(3), np.zeros(3)]))),
+                            "centroid", "0.25", "about_centroid"),
+    "collision with itself": (lambda: dojo.Collision("arm", "arm"), "arm", "itself"),
+    "obstacle without shape": (lambda: dojo.Collision("world", "arm"), "shape_a", "obstacle"),
+    "collision of no body": (lambda: dojo.Mechanism([BODY], [HINGE], collisions=[dojo.Collision("arm", "leg")]), "leg"),
+    "second joint of a pair": (lambda: dojo.Mechanism([BODY, other()], [HINGE,
+                               dojo.Joint("revolute", "arm", "leg", name="knee"),
+                               dojo.Joint("revolute", "arm", "leg", name="second knee")]), "knee", "close=True"),
 }
 # fmt: on
 
@@ -172,3 +186,52 @@ def test_pendulum_may_turn_by_any_angle():
     """Angles of hinges are not wrapped."""
     sim = dojo.Simulator(pendulum(1), time_step=0.01)
     assert run(sim, np.array([50.0 * np.pi, 1.0]), 5)[-1][0] > 50.0 * np.pi
+
+
+def pair_of_boxes(distance, **settings):
+    box = dojo.Box(0.4, 0.4, 0.4)
+    bodies = [dojo.Body(n, 1.0, shape=box) for n in "ab"]
+    joints = [dojo.Joint("floating", None, n) for n in "ab"]
+    mech = dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b")], gravity=(0, 0, 0))
+    sim = dojo.Simulator(mech, time_step=0.01, **settings)
+    x = sim.neutral()
+    x[0] = distance
+    return sim, x
+
+
+@pytest.mark.parametrize("depth", [1e-3, 0.05, 0.2])
+def test_a_start_in_overlap_is_moved_apart_in_the_first_step(depth):
+    """As documented by Collision: at the speed of the overlap over the time step; momentum is kept."""
+    sim, x = pair_of_boxes(0.4 - depth, kappa=1e-9)
+    t = sim.rollout(x, np.zeros((3, 0)))
+    assert t.success, t.message
+    assert t.contacts.gap.min() > 0.0
+    speeds = t.x[1, [sim.nq, sim.nq + 6]]
+    np.testing.assert_allclose(speeds, np.array([0.5, -0.5]) * depth / 0.01, rtol=1e-2)
+    np.testing.assert_allclose(sim.momentum(t.x)[0], 0.0, atol=1e-6)
+
+
+def test_a_second_hinge_on_the_same_axis_changes_nothing():
+    """Two joints on one pair of bodies: the second one closes a loop, and all that it says is known already."""
+    door = dojo.Body("door", 1.0, (0.1, 0.1, 0.1))
+    hinge = {"axis": (0, 1, 0), "child_point": (0, 0, 0.5)}
+    first = dojo.Joint("revolute", None, "door", name="upper", **hinge)
+    second = dojo.Joint("revolute", None, "door", name="lower", close=True, axis=(0, 1, 0), parent_point=(0, 0.3, 0),
+                        child_point=(0, 0.3, 0.5))  # fmt: skip
+    runs = []
+    for joints in ([first], [first, second]):
+        sim = dojo.Simulator(dojo.Mechanism([door], joints), time_step=0.01)
+        runs.append(sim.rollout(np.array([1.0, 0.0]), np.zeros((50, sim.nu)), throw=True).x)
+    np.testing.assert_allclose(runs[0], runs[1], atol=1e-7)
+
+
+def test_hinges_across_one_another_hold_the_body_still():
+    """An over-constrained loop that fits together: nothing can move, and nothing does."""
+    door = dojo.Body("door", 1.0, (0.1, 0.1, 0.1))
+    joints = [
+        dojo.Joint("revolute", None, "door", name="hinge", axis=(0, 1, 0), child_point=(0, 0, 0.5)),
+        dojo.Joint("revolute", None, "door", name="cross", axis=(1, 0, 0), child_point=(0, 0, 0.5), close=True),
+    ]
+    sim = dojo.Simulator(dojo.Mechanism([door], joints), time_step=0.01)
+    t = sim.rollout(sim.neutral(), np.zeros((20, sim.nu)), throw=True)
+    np.testing.assert_allclose(t.x, 0.0, atol=1e-8)

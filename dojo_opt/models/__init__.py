@@ -29,6 +29,7 @@ from dojo_opt.models.pendulum import pendulum
 from dojo_opt.models.quadrotor import quadrotor
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.raiberthopper import raiberthopper
+from dojo_opt.models.rexhopper import rexhopper
 from dojo_opt.models.slider import slider
 from dojo_opt.models.snake import snake
 from dojo_opt.models.sphere import sphere
@@ -65,6 +66,7 @@ __all__ = [
     "quadrotor",
     "quadruped",
     "raiberthopper",
+    "rexhopper",
     "slider",
     "snake",
     "sphere",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import Mechanism
 from sim.parts import WORLD
+from sim.polytope import Polytope
 from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
 from sim.urdf.stance import poses
 
@@ -77,7 +78,7 @@ def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
     return out
 
 
-def _surface(shape: Shape) -> Floats:
+def _surface(shape: Shape | Polytope) -> Floats:
     """Points whose hull is the shape, body axes (n, 3)."""
     turn, centre = rotation_matrix(shape.orientation), np.asarray(shape.center)
     angles = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
@@ -87,6 +88,8 @@ def _surface(shape: Shape) -> Floats:
         local = 0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))
     elif isinstance(shape, Sphere):
         local = shape.radius * ball
+    elif isinstance(shape, Polytope):
+        local = np.asarray(shape.vertices)
     else:
         assert isinstance(shape, Capsule | Cylinder)
         end = shape.radius * (ball if isinstance(shape, Capsule) else ring)

@@ -41,6 +41,12 @@ def corner(k: int, h: Vec3) -> Vec3:
 
 
 @inner_kernel
+def bits(n: Vec3) -> int:
+    """The corner of a box farthest along n."""
+    return (1 if n[0] >= 0.0 else 0) + (2 if n[1] >= 0.0 else 0) + (4 if n[2] >= 0.0 else 0)
+
+
+@inner_kernel
 def distance_squared(x: Vec3, h: Vec3) -> float:
     """Squared distance of a point to the solid box."""
     a, b, c = max(abs(x[0]) - h[0], 0.0), max(abs(x[1]) - h[1], 0.0), max(abs(x[2]) - h[2], 0.0)

@@ -16,123 +16,114 @@ a's, then pairs of edges.
 
 from __future__ import annotations
 
-from sim.collision.axes import Arrangement, deepest, side_of, support
-from sim.collision.box import (
-    column,
-    corner,
-    distance_squared,
-    nearest,
-    to_a,
-    to_b,
-    vertex_on_box,
-    vertex_under_box,
-)
+from sim.collision.axes import Arrangement, deepest, side_of
+from sim.collision.box import bits, column, corner, distance_squared, nearest, to_a, to_b
 from sim.collision.box_axes import facing
-from sim.collision.clip import BORDER, clip, common_normal, crossing, on_edges
-from sim.collision.witness import FACE, NOWHERE, TIE, absent, along, axis, dot, edges, vertex_a, vertex_b
+from sim.collision.box_elements import (
+    BOX_VERTEX,
+    CORNER_FACE,
+    CROSSING,
+    EDGES,
+    VERTEX_BOX,
+    VERTEX_FACE,
+    Facing,
+    code_of,
+    edge_of,
+    face_corner,
+    face_edge,
+    put_elements,
+    vertex,
+)
+from sim.collision.clip import BORDER, PAST, clip, edge_normal, on_edges, side_edge
+from sim.collision.witness import TIE, absent, axis, dot
 from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
-_RADII = (0.0, 0.0)
-
 
 @inner_kernel
-def box_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
-    """Contact point `feature` of two boxes."""
-    ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
-    face, edge, s = arrangement
-    i, top, j, bottom = facing(face, R, r)
+def choose_elements(
+    feature: int, arrangement: Arrangement, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
+) -> int:
+    """The elements (box_elements.py) that are contact point `feature` at this pose; writes the contact, too."""
+    face, edge, s, up, over = arrangement
+    faces = facing(face, up, R)
     if feature < 8:
-        found = put_clipped(feature, i, top, j, bottom, ha, hb, R, r, out)
+        code = clipped(feature, faces, ha, hb, R, r)
     elif feature < 12:
-        found = put_corner(feature - 8, (i, top), (j, bottom), ha, hb, R, r, out)
+        code = corner_below(feature - 8, faces, ha, hb, R, r)
     else:
-        found = False
-        if edge >= 0 and put_edges(edge, s, ha, hb, R, r, out):
-            found = not clipped_has(edge, i, top, j, bottom, ha, hb, R, r, out)
+        code = two_edges(edge, s, over, ha, hb, R, r) if edge >= 0 else 0
+        if code != 0:
+            code = 0 if clipped_has(edge, over, faces, ha, hb, R, r) else code
         elif s > 0.0:
-            found = put_vertex(ha, hb, R, r, out)
-    if not found or (feature < 12 and out[0] < deepest(s, (min(ha[0], hb[0]), min(ha[1], hb[1]), min(ha[2], hb[2])))):
-        absent(out)
+            code = nearest_corner(ha, hb, R, r)
+    if code != 0:
+        put_elements(code, ha, hb, R, r, out)
+        if feature == 12:
+            if code & 7 < VERTEX_BOX or separates(ha, hb, R, r, out):
+                return code
+        elif out[0] >= deepest(s, (min(ha[0], hb[0]), min(ha[1], hb[1]), min(ha[2], hb[2]))):
+            return code
+    absent(out)
+    return 0
 
 
 @inner_kernel
-def vertex(k: int, j: int, bottom: float, h: Vec3, R: Vector, r: Vector) -> Vec3:
-    """Vertex k = 0..3 of the face `bottom` e_j of a, around it: the signs are ++, -+, --, +-."""
-    x = along((r[0], r[1], r[2]), bottom * h[j], column(R, j))
-    m, o = (j + 1) % 3, (j + 2) % 3
-    x = along(x, h[m] if k == 0 or k == 3 else -h[m], column(R, m))
-    return along(x, h[o] if k < 2 else -h[o], column(R, o))
-
-
-@inner_kernel
-def put_clipped(
-    feature: int, i: int, top: float, j: int, bottom: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
-) -> bool:
+def clipped(feature: int, faces: Facing, ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> int:
     """Begin (feature 0-3) or end (4-7) of an edge of the face of a above the face of b."""
+    i, top, j, bottom = faces
     k = feature & 3
     x, y = vertex(k, j, bottom, ha, R, r), vertex((k + 1) & 3, j, bottom, ha, R, r)
     m, o = (i + 1) % 3, (i + 2) % 3
     begin, end = clip((x[m], x[o]), (y[m], y[o]), (hb[m], hb[o]))
     if feature < 4 and begin == 1:
-        vertex_a(x, axis(i, top), NOWHERE, top * x[i] - hb[i], _RADII, NOWHERE, FACE, out)
-        return True
+        return code_of(VERTEX_FACE, faces, k, 0)
     code = begin if feature < 4 else end
     if code < 2:
-        return False
-    l = (j + 1) % 3 if k & 1 == 0 else (j + 2) % 3
-    middle = (0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), 0.5 * (x[2] + y[2]))
-    return crossing(middle, column(R, l), ha[l], code - 2, i, top, hb, 0.0, out)
+        return 0
+    middle, ua, la = face_edge(k, j, bottom, ha, R, r)
+    y, ub, lb = side_edge(code - 2, i, top, hb)
+    return code_of(CROSSING, faces, k, code - 2) if on_edges(middle, ua, la, y, ub, lb, PAST) else 0
 
 
 @inner_kernel
-def put_corner(
-    k: int, up: tuple[int, float], down: tuple[int, float], ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
-) -> bool:
+def corner_below(k: int, faces: Facing, ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> int:
     """Corner k of the face of b under the face of a, unless a vertex of a is in the same place."""
-    i, top = up
-    j, bottom = down
+    i, top, j, bottom = faces
     m, o = (i + 1) % 3, (i + 2) % 3
-    y = axis(i, top * hb[i])
-    y = along(y, hb[m] if k == 0 or k == 3 else -hb[m], axis(m, 1.0))
-    y = along(y, hb[o] if k < 2 else -hb[o], axis(o, 1.0))
+    y = face_corner(k, i, top, hb)
     z = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
     l, q = (j + 1) % 3, (j + 2) % 3
     if abs(z[l]) > ha[l] or abs(z[q]) > ha[q]:
-        return False
+        return 0
     for v in range(4):
         x = vertex(v, j, bottom, ha, R, r)
         if abs(x[m] - y[m]) <= BORDER * hb[m] and abs(x[o] - y[o]) <= BORDER * hb[o]:
-            return False
-    n = column(R, j)
-    n = (-bottom * n[0], -bottom * n[1], -bottom * n[2])
-    vertex_b(y, n, NOWHERE, bottom * z[j] - ha[j], _RADII, NOWHERE, FACE, out)
-    return True
+            return 0
+    return code_of(CORNER_FACE, faces, k, 0)
 
 
 @inner_kernel
-def put_edges(edge: int, s: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
-    """The two edges that the separating direction points to; False where they pass each other."""
+def two_edges(edge: int, s: float, over: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> int:
+    """The two edges that the separating direction points to; 0 where they pass each other."""
     i, j = edge // 3, edge % 3
     ua, ub = column(R, j), axis(i, 1.0)
-    n = common_normal(ua, ub, (r[0], r[1], r[2]))
+    n = edge_normal(ub, ua, over)
     w = to_a(R, n)
-    x = to_b(R, support((-w[0], -w[1], -w[2]), j, ha))
+    k, l = bits((-w[0], -w[1], -w[2])), bits(n)
+    x, y = to_b(R, edge_of(k, j, ha)), edge_of(l, i, hb)
     x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
-    y = support(n, i, hb)
     if s > 0.0 and not on_edges(x, ua, ha[j], y, ub, hb[i], TIE):
-        return False
-    edges(x, ua, y, ub, n, _RADII, out)
-    return True
+        return 0
+    return code_of(EDGES, (i, over, j, 1.0), k, l)
 
 
 @inner_kernel
-def clipped_has(
-    edge: int, i: int, top: float, j: int, bottom: float, ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector
-) -> bool:
-    """Whether the two edges that `put_edges` has just written are a crossing of the two faces (features 0-7)."""
-    n = (out[1], out[2], out[3])
+def clipped_has(edge: int, over: float, faces: Facing, ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> bool:
+    """Whether the edges of `two_edges` are a crossing of the two faces (features 0-7)."""
+    i, top, j, bottom = faces
+    n = edge_normal(axis(edge // 3, 1.0), column(R, edge % 3), over)
     w = to_a(R, n)
     side = side_of(edge // 3, n, i, top)
     mine = side_of(edge % 3, (-w[0], -w[1], -w[2]), j, bottom)
@@ -147,28 +138,31 @@ def clipped_has(
 
 
 @inner_kernel
-def put_vertex(ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
-    """The nearest corner of one box against an edge or corner of the other; False where those are not the nearest."""
-    near, of_a, d2 = NOWHERE, True, 1e300
+def nearest_corner(ha: Vec3, hb: Vec3, R: Vector, r: Vector) -> int:
+    """The nearest corner of one box against an edge or corner of the other; 0 where it is nearest to a face."""
+    near, of_a, d2 = 0, True, 1e300
     for k in range(8):
         x = to_b(R, corner(k, ha))
-        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
-        e2 = distance_squared(x, hb)
+        e2 = distance_squared((x[0] + r[0], x[1] + r[1], x[2] + r[2]), hb)
         if e2 < d2 * (1.0 - TIE):
-            near, d2 = x, e2
+            near, d2 = k, e2
     for k in range(8):
         y = corner(k, hb)
         e2 = distance_squared(to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])), ha)
         if e2 < d2 * (1.0 - TIE):
-            near, of_a, d2 = y, False, e2
+            near, of_a, d2 = k, False, e2
     if of_a:
-        if nearest(near, hb)[3] == 1:
-            return False
-        vertex_on_box(near, hb, 0.0, out)
-    else:
-        if nearest(to_a(R, (near[0] - r[0], near[1] - r[1], near[2] - r[2])), ha)[3] == 1:
-            return False
-        vertex_under_box(near, ha, R, r, out)
+        x = to_b(R, corner(near, ha))
+        kind = nearest((x[0] + r[0], x[1] + r[1], x[2] + r[2]), hb)[3]
+        return 0 if kind == 1 else code_of(VERTEX_BOX, (0, 1.0, 0, 1.0), near, 0)
+    y = corner(near, hb)
+    kind = nearest(to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])), ha)[3]
+    return 0 if kind == 1 else code_of(BOX_VERTEX, (0, 1.0, 0, 1.0), near, 0)
+
+
+@inner_kernel
+def separates(ha: Vec3, hb: Vec3, R: Vector, r: Vector, out: Vector) -> bool:
+    """Whether the normal in `out` separates the two boxes by the distance there: the two points are the nearest."""
     n = (out[1], out[2], out[3])
     w = to_a(R, n)
     reach = abs(w[0]) * ha[0] + abs(w[1]) * ha[1] + abs(w[2]) * ha[2]

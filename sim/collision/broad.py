@@ -1,4 +1,4 @@
-"""Bounding spheres: which pairs are too far apart to be worth a look."""
+"""Bounding spheres: which pairs are too far apart to be worth a closer look."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from math import hypot, inf
 
 from sim.collision.kinds import Shape
-from sim.model import Vector
-from solvers.jit import kernel
 
 
 def bounding_radius(shape: Shape, sizes: Sequence[float]) -> float:
@@ -24,13 +22,3 @@ def bounding_radius(shape: Shape, sizes: Sequence[float]) -> float:
     if shape == Shape.CYLINDER:
         return hypot(*sizes[:2])
     return inf
-
-
-@kernel
-def far(r: Vector, radius_a: float, radius_b: float, margin: float) -> bool:
-    """Whether two bounding spheres are more than `margin` apart: |r| > radius_a + radius_b + margin.
-
-    r: (3,) from the centre of b to that of a [m]. False when a radius is infinite (half-space, string).
-    """
-    reach = radius_a + radius_b + margin
-    return r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > reach * reach

@@ -1,8 +1,9 @@
 """Capsule against box: a segment with a radius around it.
 
     feature 0, 1    begin and end of the part of the segment above the nearest face of the box: an end of the segment,
-                    or where it crosses an edge of the face
-    feature 2       elsewhere: the nearest edge or corner of the box
+                    or where it crosses an edge of the face; an end that is not above it against what is nearest to it
+    feature 2       the segment across an edge of the box, or against the corner nearest to it
+    feature 3, 4    the two corners of the edge of the box that the segment is most parallel to
 
 The normal of a face, of an edge across the segment, or between two points, each exact for its pair of elements. Deep
 inside, where the segment itself cuts the box, the face or edge of least penetration decides.
@@ -12,9 +13,21 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.axes import PARALLEL, Arrangement, deepest, edge_must_exceed, side_of, support
-from sim.collision.box import corner, distance_squared, nearest, vertex_on_box
-from sim.collision.clip import clip, common_normal, crossing, on_edges
+from sim.collision.axes import (
+    OPEN,
+    PARALLEL,
+    SWINGS,
+    Arrangement,
+    deepest,
+    edge_must_exceed,
+    opened,
+    separates_from,
+    side,
+    side_of,
+)
+from sim.collision.box import bits, corner, distance_squared, vertex_on_box
+from sim.collision.box_elements import CROSSING, code_of, edge_of, faces_of
+from sim.collision.clip import PAST, clip, common_normal, edge_normal, on_edges, side_edge
 from sim.collision.witness import (
     FACE,
     LINE,
@@ -34,81 +47,140 @@ from sim.model import Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
+# kinds of elements, beside the CROSSING of the segment and a side of the face
+END_FACE, EDGES, END_BOX, SEGMENT_CORNER = 1, 3, 5, 6
+
 
 @inner_kernel
-def capsule_box(feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
-    """Contact point `feature` of a capsule along the z axis of its frame against a box."""
+def choose_elements(
+    feature: int, arrangement: Arrangement, radius: float, half: float, h: Vec3, R: Vector, r: Vector, out: Vector
+) -> int:
+    """The elements that are contact point `feature` of a capsule along the z axis of its frame; writes it, too."""
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
-    radius, half, h = sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6])
-    face, edge, s = arrangement
-    top = 1.0 if c[face] >= 0.0 else -1.0
+    face, edge, s, top, over = arrangement
+    faces = (face, top, 0, 1.0)
     x, y = along(c, -half, u), along(c, half, u)
     m, o = (face + 1) % 3, (face + 2) % 3
     codes = clip((x[m], x[o]), (y[m], y[o]), (h[m], h[o]))
-    if feature < 2:
-        code = codes[feature]
-        if feature == 1:
-            x = y
-        if code > 1:
-            if not crossing(c, u, half, code - 2, face, top, h, radius, out):
-                code = 0
-        elif code == 1:
-            vertex_a(x, axis(face, top), NOWHERE, top * x[face] - h[face], (radius, 0.0), NOWHERE, FACE, out)
-        if code == 0 or out[0] + radius < deepest(s, h):
-            absent(out)
-    elif edge >= 0 and put_edge(edge, c, u, half, h, s, radius, out):
-        side = side_of(edge, (out[1], out[2], out[3]), face, top)
-        if side >= 0 and (codes[0] == 2 + side or codes[1] == 2 + side):
-            absent(out)
-    elif s <= 0.0 or not put_vertex(c, u, half, h, radius, out):
-        absent(out)
+    code = 0
+    if feature > 2:
+        code = edge_end(feature - 3, c, u, half, h) if s > 0.0 else 0
+    elif feature < 2:
+        where = codes[feature]
+        if where == 1:
+            code = code_of(END_FACE, faces, feature, 0)
+        elif where > 1:
+            z, ub, lb = side_edge(where - 2, face, top, h)
+            code = code_of(CROSSING, faces, 0, where - 2) if on_edges(c, u, half, z, ub, lb, PAST) else 0
+        if code == 0 and s > 0.0:
+            code = code_of(END_BOX, (0, 1.0, 0, 1.0), feature, 0)
+    elif edge >= 0 and two_edges(edge, s, over, c, u, half, h):
+        n = edge_normal(axis(edge, 1.0), u, over)
+        side = side_of(edge, n, face, top)
+        if side < 0 or (codes[0] != 2 + side and codes[1] != 2 + side):
+            code = code_of(EDGES, (edge, over, 0, 1.0), 0, bits(n))
+    elif s > 0.0:
+        code = nearest_corner(c, u, half, h)
+        if code == edge_end(0, c, u, half, h) or code == edge_end(1, c, u, half, h):
+            code = 0
+    if code != 0:
+        put_elements(code, radius, half, h, R, r, out)
+        if feature > 1:
+            return code
+        elif out[0] + radius >= deepest(s, h):
+            return code
+    absent(out)
+    return 0
 
 
 @inner_kernel
-def separation(c: Vec3, u: Vec3, half: float, h: Vec3) -> Arrangement:
-    """(face, edge, s): axis of the face that separates the segment c + t u most, |t| <= half, that of the edge of the
-    box, or -1 where the face does better, and the separation s along the better one, negative inside.
+def put_elements(code: int, radius: float, half: float, h: Vec3, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact of the two elements `code`, which is not 0."""
+    c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
+    kind, other = code & 7, (code >> 12) & 7
+    i, top, _, _ = faces_of(code)
+    end = along(c, half if code & 512 else -half, u)
+    if kind == END_FACE:
+        vertex_a(end, axis(i, top), NOWHERE, top * end[i] - h[i], (radius, 0.0), NOWHERE, FACE, out)
+    elif kind == CROSSING:
+        y, ub, _ = side_edge(other, i, top, h)
+        edges(c, u, y, ub, common_normal(u, ub, axis(i, top)), (radius, 0.0), out)
+    elif kind == EDGES:
+        b = axis(i, 1.0)
+        edges(c, u, edge_of(other, i, h), b, edge_normal(b, u, top), (radius, 0.0), out)
+    elif kind == END_BOX:
+        vertex_on_box(end, h, radius, out)
+    else:
+        y = corner(other, h)
+        n, d = direction(along(c, dot(u, y) - dot(u, c), u), y, u)
+        vertex_b(y, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
+
+
+@inner_kernel
+def across(i: int, c: Vec3, u: Vec3, h: Vec3) -> tuple[float, float, float]:
+    """(x, reach, length) along n = e_i x u: n.c, the reach of the box, and |n|."""
+    k, l = (i + 1) % 3, (i + 2) % 3
+    x = c[l] * u[k] - c[k] * u[l]
+    return x, h[k] * abs(u[l]) + h[l] * abs(u[k]), sqrt(u[k] * u[k] + u[l] * u[l])
+
+
+@inner_kernel
+def separation(c: Vec3, u: Vec3, half: float, h: Vec3, sides: int) -> Arrangement:
+    """(face, edge, s, side of the face, side of the edge) of the open sides, or of all faces where none is open.
+
+    face: axis of the face that separates the segment c + t u most, |t| <= half; edge: that of the edge of the box, or
+    -1 where the face does better; s: the separation along the better one, negative inside. Axis 3 + i is e_i x u.
     """
-    face, edge, s = 0, -1, -1e300
+    if sides & 63 == 0:
+        sides |= 63
+    face, edge, s, top, over = 0, -1, -1e300, 1.0, 1.0
     for i in range(3):
-        d = abs(c[i]) - h[i] - half * abs(u[i])
+        t = side(c[i], sides, i)
+        if t == 0.0:
+            continue
+        d = t * c[i] - h[i] - half * abs(u[i])
         if d > s:
-            face, s = i, d
+            face, s, top = i, d, t
     least = edge_must_exceed(s, h)
     for i in range(3):
-        k, l = (i + 1) % 3, (i + 2) % 3
-        q = sqrt(u[k] * u[k] + u[l] * u[l])
-        if q > PARALLEL:
-            d = (abs(c[l] * u[k] - c[k] * u[l]) - h[k] * abs(u[l]) - h[l] * abs(u[k])) / q
+        x, reach, q = across(i, c, u, h)
+        t = side(x, sides, 3 + i)
+        if q > PARALLEL and t != 0.0:
+            d = (t * x - reach) / q
             if d > least:
-                edge, s, least = i, d, d
-    return face, edge, s
+                edge, s, least, over = i, d, d, t
+    return face, edge, s, top, over
 
 
 @inner_kernel
-def put_edge(i: int, c: Vec3, u: Vec3, half: float, h: Vec3, s: float, radius: float, out: Vector) -> bool:
-    """Segment against the edge along e_i that its separating direction points to; False where they pass each other."""
+def open_sides(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
+    """The axes, with their sides, that separate the segment from the box."""
+    best = separates_from(separation(c, u, half, h, OPEN)[2], h)
+    found = 0
+    for i in range(3):
+        if abs(c[i]) - h[i] - half * abs(u[i]) >= best:
+            found |= opened(i, c[i])
+        x, reach, q = across(i, c, u, h)
+        if q < SWINGS:
+            found |= 3 << (2 * (3 + i))
+        elif abs(x) - reach >= best * q:
+            found |= opened(3 + i, x)
+    return found
+
+
+@inner_kernel
+def two_edges(i: int, s: float, over: float, c: Vec3, u: Vec3, half: float, h: Vec3) -> bool:
+    """Whether the segment and the edge along e_i that their separating direction points to do not pass each other."""
     b = axis(i, 1.0)
-    n = common_normal(u, b, c)
-    y = support(n, i, h)
-    if s > 0.0 and not on_edges(c, u, half, y, b, h[i], TIE):
-        return False
-    edges(c, u, y, b, n, (radius, 0.0), out)
-    return True
+    y = edge_of(bits(edge_normal(b, u, over)), i, h)
+    return s <= 0.0 or on_edges(c, u, half, y, b, h[i], TIE)
 
 
 @inner_kernel
-def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vector) -> bool:
-    """An end of the segment against an edge or corner of the box, or a corner of the box against the segment.
-
-    False where neither is the nearest pair: the direction between them does not separate the two.
-    """
-    x, y = along(c, -half, u), along(c, half, u)
-    d2 = distance_squared(x, h)
-    e2 = distance_squared(y, h)
-    if e2 < d2:
-        x, d2 = y, e2
-    near, at, at_end = x, 0.0, True
+def nearest_corner(c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
+    """The corner of the box nearest to the segment; 0 where an end of the segment is nearer to the box."""
+    d2 = min(distance_squared(along(c, -half, u), h), distance_squared(along(c, half, u), h))
+    near = -1
     for k in range(8):
         y = corner(k, h)
         t = dot(u, y) - dot(u, c)
@@ -117,14 +189,16 @@ def put_vertex(c: Vec3, u: Vec3, half: float, h: Vec3, radius: float, out: Vecto
             e = (z[0] - y[0], z[1] - y[1], z[2] - y[2])
             e2 = dot(e, e)
             if e2 < d2 * (1.0 - TIE):
-                near, at, at_end, d2 = y, t, False, e2
-    if at_end:
-        if nearest(x, h)[3] == 1:
-            return False
-        vertex_on_box(x, h, radius, out)
-    else:
-        n, d = direction(along(c, at, u), near, u)
-        vertex_b(near, n, u, d, (radius, 0.0), bend_line(d), LINE, out)
-    n = (out[1], out[2], out[3])
-    reach = half * abs(dot(n, u)) + abs(n[0]) * h[0] + abs(n[1]) * h[1] + abs(n[2]) * h[2]
-    return dot(n, c) - reach >= out[0] + radius - TIE * (half + h[0] + h[1] + h[2])
+                near, d2 = k, e2
+    return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, near) if near >= 0 else 0
+
+
+@inner_kernel
+def edge_end(k: int, c: Vec3, u: Vec3, half: float, h: Vec3) -> int:
+    """Corner k = 0, 1 of the edge most parallel to the segment, on its side of the box; 0 where it is past its ends."""
+    i = 0 if abs(u[0]) >= abs(u[1]) and abs(u[0]) >= abs(u[2]) else (1 if abs(u[1]) >= abs(u[2]) else 2)
+    other = bits(c) & (7 - (1 << i))
+    if k == 1:
+        other |= 1 << i
+    y = corner(other, h)
+    return code_of(SEGMENT_CORNER, (0, 1.0, 0, 1.0), 0, other) if abs(dot(u, y) - dot(u, c)) < half else 0

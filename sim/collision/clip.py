@@ -10,14 +10,13 @@ lines cross at a small angle, the normal that they share turns fast.
 
 from __future__ import annotations
 
-from sim.collision.witness import along, axis, dot, edges
-from sim.model import Vector
+from sim.collision.witness import along, axis, dot
 from sim.rotation import Vec3, cross
 from solvers.jit import inner_kernel
 
 BORDER = 1e-4  # a vertex this far outside of a face still belongs to it (relative)
 _ALONG = 1e-2  # sine of the angle below which an edge is parallel to a side
-_PAST = 2e-2  # closest points of two lines this far past the ends of their edges still belong to them (relative)
+PAST = 2e-2  # closest points of two lines this far past the ends of their edges still belong to them (relative)
 
 Vec2 = tuple[float, float]
 
@@ -72,6 +71,14 @@ def on_edges(x: Vec3, ua: Vec3, la: float, y: Vec3, ub: Vec3, lb: float, past: f
 
 
 @inner_kernel
+def edge_normal(ub: Vec3, ua: Vec3, over: float) -> Vec3:
+    """Unit vector along `over` ub x ua (over = 1, -1)."""
+    n = cross(ub[0], ub[1], ub[2], ua[0], ua[1], ua[2])
+    k = over * dot(n, n) ** 0.5
+    return n[0] / k, n[1] / k, n[2] / k
+
+
+@inner_kernel
 def common_normal(ua: Vec3, ub: Vec3, out_of: Vec3) -> Vec3:
     """Unit vector along ua x ub, on the side of `out_of`."""
     n = cross(ua[0], ua[1], ua[2], ub[0], ub[1], ub[2])
@@ -79,16 +86,3 @@ def common_normal(ua: Vec3, ub: Vec3, out_of: Vec3) -> Vec3:
     if dot(n, out_of) < 0.0:
         k = -k
     return n[0] / k, n[1] / k, n[2] / k
-
-
-@inner_kernel
-def crossing(x: Vec3, ua: Vec3, la: float, side: int, i: int, top: float, h: Vec3, radius: float, out: Vector) -> bool:
-    """Edge of a, with a radius around it, against the edge of b at `side` of its face `top` e_i.
-
-    False, and nothing written, where the closest points of the two lines are not on the edges.
-    """
-    y, ub, lb = side_edge(side, i, top, h)
-    if not on_edges(x, ua, la, y, ub, lb, _PAST):
-        return False
-    edges(x, ua, y, ub, common_normal(ua, ub, axis(i, top)), (radius, 0.0), out)
-    return True

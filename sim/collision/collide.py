@@ -1,25 +1,32 @@
-"""`collide`: one contact point of a pair of shapes. `arrange`: what all points of the pair have in common."""
+"""`collide`: one contact point of a pair of shapes, in two halves.
+
+choose           which elements of the shapes make it: a discrete choice, after that of `arrange` for all points
+collide_chosen   the contact of those elements: smooth in the pose
+"""
 
 from __future__ import annotations
 
-from sim.collision import box_axes, capsule_box
-from sim.collision.axes import Arrangement
-from sim.collision.box_box import box_box
+from sim.collision import box_axes, box_box, capsule_box, polytope
+from sim.collision.axes import OPEN, Arrangement
+from sim.collision.box_elements import put_elements
+from sim.collision.exchange import exchange
 from sim.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
-from sim.collision.kinds import Pair
-from sim.collision.segment import capsule_capsule
+from sim.collision.kinds import SWAPPED, Pair
+from sim.collision.segment import choose_points, put_points
 from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
-from sim.collision.witness import absent
-from sim.model import Vector
-from solvers.jit import kernel
+from sim.collision.witness import ABSENT, absent
+from sim.model import Matrix, Vector
+from solvers.jit import inner_kernel, kernel
 
 
 @kernel
-def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Distance, normal and point of contact point `feature` of shapes a and b, with derivatives by the twist of a.
 
-    kind     a Pair; feature: 0 to kinds.count(kind) - 1
+    kind     a Pair; feature: 0 to kinds.count(kind) - 1. Pair + SWAPPED: out is then that of b against a, in the frame
+             of a, by the twist of b
     sizes    (8,) sizes of a from 0, of b from 4 [m], in the order of kinds.Shape
+    hull     tables of polytopes (hull.py); one row will do where there are none
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
              0       phi, signed distance [m], negative inside; 1e9 where there is no such point now
@@ -29,30 +36,85 @@ def collide(kind: int, feature: int, sizes: Vector, R: Vector, r: Vector, out: V
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
-    collide_arranged(kind, feature, arrange(kind, sizes, R, r), sizes, R, r, out)
+    choose(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, hull, R, r, out)
 
 
 @kernel
-def arrange(kind: int, sizes: Vector, R: Vector, r: Vector) -> Arrangement:
-    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+def open_sides(kind: int, sizes: Vector, R: Vector, r: Vector) -> int:
+    """Which axes separate the shapes at this pose, and on which side: what `arrange` may choose from a step later.
 
-    Once per pair and pose, where it saves most of the time of `collide`. It may be kept while the pose changes little:
-    what `collide_arranged` then returns is smooth where `collide` would change over to another face.
+    Of the axes that separate shapes at the end of a step, one that did so at its beginning is the one that was there
+    all the time; the others mean that a body has gone around a corner of the other one, or through it, and a contact
+    along them would push it on its way: it would gain energy.
     """
+    kind %= SWAPPED
     if kind == Pair.BOX_BOX:
-        return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
+        return box_axes.open_sides((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r)
     if kind == Pair.CAPSULE_BOX:
         h = (sizes[4], sizes[5], sizes[6])
-        return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h)
-    return 0, -1, 0.0
+        return capsule_box.open_sides((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h)
+    return OPEN
 
 
 @kernel
-def collide_arranged(
-    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, R: Vector, r: Vector, out: Vector
+def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
+    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+
+    Once per pair and pose, where it saves most of the time of `collide`. sides: of the axes, those to choose from
+    (`open_sides`); OPEN for all.
+    """
+    kind %= SWAPPED
+    if kind == Pair.BOX_BOX:
+        return box_axes.separation((sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r, sides)
+    if kind == Pair.CAPSULE_BOX:
+        h = (sizes[4], sizes[5], sizes[6])
+        return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h, sides)
+    return 0, -1, 0.0, 1.0, 1.0
+
+
+@kernel
+def choose(
+    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> int:
+    """`collide`, with what `arrange` returns; and which elements of the shapes it found: a number, 0 for none."""
+    code = _choose(kind % SWAPPED, feature, arrangement, sizes, hull, R, r, out)
+    if kind >= SWAPPED and code != 0:
+        exchange(R, r, out)
+    return code
+
+
+@inner_kernel
+def _choose(
+    kind: int, feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> int:
+    if kind == Pair.BOX_BOX:
+        ha, hb = (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6])
+        return box_box.choose_elements(feature, arrangement, ha, hb, R, r, out)
+    if kind == Pair.CAPSULE_BOX:
+        h = (sizes[4], sizes[5], sizes[6])
+        return capsule_box.choose_elements(feature, arrangement, sizes[0], sizes[1], h, R, r, out)
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return polytope.choose_elements(feature, sizes, hull, R, r, out)
+    code = choose_points(feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
+    _put(kind, feature, code, sizes, hull, R, r, out)
+    return code if out[0] < ABSENT else 0
+
+
+@kernel
+def collide_chosen(
+    kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
 ) -> None:
-    """`collide`, with what `arrange` returns."""
-    if kind == Pair.SPHERE_SPHERE:
+    """Contact of the elements that `choose` found: smooth, wherever the shapes have moved to since then."""
+    _put(kind % SWAPPED, feature, code, sizes, hull, R, r, out)
+    if kind >= SWAPPED and code != 0:
+        exchange(R, r, out)
+
+
+@inner_kernel
+def _put(kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
+    if code == 0:
+        absent(out)
+    elif kind == Pair.SPHERE_SPHERE:
         sphere_sphere(sizes, r, out)
     elif kind == Pair.SPHERE_CAPSULE:
         sphere_capsule(sizes, r, out)
@@ -63,18 +125,20 @@ def collide_arranged(
     elif kind == Pair.SPHERE_HALFSPACE:
         sphere_halfspace(sizes, r, out)
     elif kind == Pair.CAPSULE_CAPSULE:
-        capsule_capsule(feature, sizes, R, r, out)
+        put_points(code, sizes, R, r, out)
     elif kind == Pair.CAPSULE_BOX:
-        capsule_box.capsule_box(feature, arrangement, sizes, R, r, out)
+        capsule_box.put_elements(code, sizes[0], sizes[1], (sizes[4], sizes[5], sizes[6]), R, r, out)
     elif kind == Pair.CAPSULE_HALFSPACE:
         capsule_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.BOX_BOX:
-        box_box(feature, arrangement, sizes, R, r, out)
+        put_elements(code, (sizes[0], sizes[1], sizes[2]), (sizes[4], sizes[5], sizes[6]), R, r, out)
     elif kind == Pair.BOX_HALFSPACE:
         box_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.CYLINDER_HALFSPACE:
         cylinder_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.STRING:
         string(sizes, r, out)
+    elif kind == Pair.POLYTOPE_POLYTOPE:
+        polytope.put_elements(feature, code, sizes, hull, R, r, out)
     else:
         absent(out)

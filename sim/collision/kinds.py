@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
+SWAPPED = 64  # added to a Pair: the two have changed places
 OUT = 43  # length of what `collide` writes
 
 
@@ -16,6 +17,7 @@ class Shape(IntEnum):
     BOX = 2  # half extents along x, y, z
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
+    POLYTOPE = 6  # row of its table (hull.py), radius around it; as other shapes are against a POLYTOPE
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
@@ -34,6 +36,7 @@ class Pair(IntEnum):
     BOX_HALFSPACE = 9
     CYLINDER_HALFSPACE = 10
     STRING = 11
+    POLYTOPE_POLYTOPE = 12
 
 
 _PAIRS = {
@@ -49,11 +52,12 @@ _PAIRS = {
     (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
     (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
     (Shape.STRING, Shape.STRING): Pair.STRING,
+    (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
 }
 
 _COUNT = {
     Pair.CAPSULE_CAPSULE: 3,  # ends of the overlap, crossing
-    Pair.CAPSULE_BOX: 3,  # ends of the part above the face, closest point elsewhere
+    Pair.CAPSULE_BOX: 5,  # ends of the part above the face, crossing of an edge, corners of an edge
     Pair.CAPSULE_HALFSPACE: 2,  # ends
     Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
     Pair.BOX_HALFSPACE: 8,  # corners
@@ -71,5 +75,5 @@ def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
 
 
 def count(kind: Pair) -> int:
-    """How many contact points the pair may have: features 0 to count - 1 of `collide`."""
+    """How many contact points the pair may have: features 0 to count - 1 of `collide`; of polytopes see polytope.py."""
     return _COUNT.get(kind, 1)

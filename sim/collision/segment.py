@@ -18,7 +18,6 @@ from sim.collision.witness import (
     NOWHERE,
     TIE,
     Z,
-    absent,
     along,
     bend_line,
     bend_point,
@@ -38,8 +37,11 @@ _PARALLEL = 1e-6  # squared sine of the angle below which two segments are paral
 
 
 @inner_kernel
-def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
-    """Contact point `feature` of two capsules, both along the z axes of their frames."""
+def choose_points(feature: int, sizes: Vector, R: Vector, r: Vector) -> int:
+    """The pair of points (s, t) that is contact point `feature` of two capsules, both along z; 0 for none.
+
+    1 + 3 (s + 1) + (t + 1), and 16 where the normal of a crossing is along ub x ua.
+    """
     c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
     la, lb = sizes[1], sizes[5]
     low, high = beside(-1.0, c, u, la, lb), beside(1.0, c, u, la, lb)
@@ -47,18 +49,15 @@ def capsule_capsule(feature: int, sizes: Vector, R: Vector, r: Vector, out: Vect
     if feature == 0:
         code = low
         if low == high:
-            absent(out)
-            return
+            return 0
     if feature == 2:
         s2 = 1.0 - u[2] * u[2]
         if s2 < _PARALLEL:
-            absent(out)
-            return
+            return 0
         code = closest(c, u, la, lb)
         if code == low or code == high:
-            absent(out)
-            return
-    put_pair(code, c, u, (la, lb), (sizes[0], sizes[4]), out)
+            return 0
+    return 5 + 3 * int(code[0]) + int(code[1]) + (16 if u[1] * c[0] - u[0] * c[1] >= 0.0 else 0)
 
 
 @inner_kernel
@@ -97,14 +96,15 @@ def sign_at(s: float, half: float) -> float:
 
 
 @inner_kernel
-def put_pair(code: Vec2, c: Vec3, u: Vec3, half: Vec2, radii: Vec2, out: Vector) -> None:
-    """Contact of the points (s, t)."""
-    s, t = code
+def put_points(code: int, sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact of the points of `choose_points`, which are not 0."""
+    c, u = (r[0], r[1], r[2]), (R[2], R[5], R[8])
+    half, radii = (sizes[1], sizes[5]), (sizes[0], sizes[4])
+    s, t = float((code - 1 & 15) // 3 - 1), float((code - 1 & 15) % 3 - 1)
     if s == 0.0 and t == 0.0:
         k = sqrt(1.0 - u[2] * u[2])
+        k = k if code & 16 else -k
         n = (u[1] / k, -u[0] / k, 0.0)
-        if dot(n, c) < 0.0:
-            n = (-n[0], -n[1], 0.0)
         edges(c, u, NOWHERE, Z, n, radii, out)
     elif s == 0.0:
         y = (0.0, 0.0, t * half[1])

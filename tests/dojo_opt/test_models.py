@@ -45,6 +45,7 @@ SIZES = {
     "orbital": (5, 8, 8, 0, 0, 8),
     "panda": (9, 9, 9, 0, 18, 9),
     "quadrotor": (1, 7, 6, 8, 0, 4),
+    "rexhopper": (8, 14, 13, 5, 4, 5),
     "slider": (1, 1, 1, 0, 0, 1),
     "snake": (2, 11, 9, 4, 0, 3),
     "stewart": (13, 22, 21, 0, 0, 6),
@@ -63,6 +64,7 @@ MASSES = {
     "humanoid": 40.844,
     "quadrotor": 1.04,
     "quadruped": 13.5,
+    "rexhopper": 8.13845,
     "uuv": 19.243,
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations, product
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ import dojo_opt as dojo
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Contact, Joint
+from sim.polytope import Polytope
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
 
 SHAPES: dict[str, Solid] = {
@@ -67,6 +70,102 @@ def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None
         assert energy[-1] < energy[0] + 2e-3  # kappa pushes from afar
         hit += bool(np.abs(t.contacts.impulse).max() > 0.1)
     assert hit > 0
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "seeds"),
+    [
+        ("box", "box", [9, 14, 20, 37, 61, 89, 102, 109, 148, 235]),
+        ("capsule", "box", [9, 12, 22, 43, 79, 94, 123, 152, 225, 227]),
+        ("capsule", "capsule", [0, 1]),
+    ],
+)
+def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None:
+    """Motions (benchmarks/collisions.py) whose steps have no solution, or one that gains energy, when the elements in
+    contact follow the iterates.
+    """
+    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
+    for seed in seeds:
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
+        assert t.success, (seed, t.message)
+        assert np.diff(sim.energy(t.x)).max() < 1e-2, seed  # kappa pushes from afar
+        assert t.contacts.gap.min() > 0.0
+
+
+@pytest.mark.parametrize("obstacle", ["sphere", "capsule", "cylinder", "box"])
+@pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
+def test_obstacles_of_every_shape(shape: str, obstacle: str) -> None:
+    """In either order of the two; a body dropped on an obstacle stays outside, and has the right derivatives."""
+    fixed = Cylinder(0.3, 0.4) if obstacle == "cylinder" else SHAPES[obstacle]
+    body, joint = Body("a", 1.0, (0.02, 0.03, 0.04), shape=SHAPES[shape]), Joint("floating", None, "a")
+    forward = Collision("a", shape_b=fixed, friction=0.4)
+    backward = Collision("world", "a", shape_a=fixed, friction=0.4)
+    if obstacle == "cylinder" and shape != "sphere":
+        with pytest.raises(ValueError, match="no collision of"):
+            dojo.Simulator(Mechanism([body], [joint], collisions=[forward]), time_step=0.01)
+        return
+    runs = []
+    for collision in (forward, backward):
+        mech = Mechanism([body], [joint], collisions=[collision])
+        sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-4, tolerance=1e-12)
+        x = np.concatenate([[0.05, 0.03, 0.9, 0.8, 0.4, -0.2, 0.4], [0.1, 0.0, -1.0, 2.0, -1.0, 0.5]])
+        x[3:7] /= np.linalg.norm(x[3:7])
+        t = sim.rollout(x, np.zeros((40, sim.nu)))
+        assert t.success, t.message
+        assert t.contacts.gap.min() > 0.0
+        assert np.abs(t.contacts.impulse).max() > 0.1
+        runs.append(t)
+    np.testing.assert_allclose(runs[0].x, runs[1].x, atol=1e-6)
+    hit = int(np.argmax(np.abs(t.contacts.impulse).max(axis=(1, 2))))
+    A, _ = sim.linearize(t.x[hit])
+    F = np.empty_like(A)
+    e = 1e-5
+    for k, d in enumerate(e * np.eye(sim.ndx)):
+        p, m, p2, m2 = (sim.step(sim.integrate(t.x[hit], s * d)).x for s in (1, -1, 2, -2))
+        F[:, k] = (8 * sim.difference(p, m) - sim.difference(p2, m2)) / (12 * e)
+    np.testing.assert_allclose(A, F, atol=1e-6 * np.abs(A).max())
+
+
+def balls(count: int, spacing: float) -> Mechanism:
+    """Balls on a line, all of which may collide."""
+    names = [f"b{k}" for k in range(count)]
+    bodies = [Body(n, 1.0 + k, shape=Sphere(0.1)) for k, n in enumerate(names)]
+    pairs = [Collision(a, b) for a, b in combinations(names, 2)]
+    neutral = {n: [spacing * k, 0, 0, 1, 0, 0, 0] for k, n in enumerate(names)}
+    joints = [Joint("floating", None, n) for n in names]
+    return Mechanism(bodies, joints, collisions=pairs, gravity=(0, 0, 0), neutral=neutral)
+
+
+@pytest.mark.parametrize("kappa", [1e-6, 1e-4])
+def test_far_pairs_are_the_same_as_near_ones(kappa: float) -> None:
+    """The law of a far pair is evaluated, not left out; momentum is kept, and derivatives have all pairs."""
+    sim, other = (dojo.Simulator(balls(4, 0.7), time_step=0.01, kappa=kappa, tolerance=1e-11) for _ in range(2))
+    other._calls.model.pair_far[:, 3] = np.inf  # nothing is far for bodies without inertia
+    x = sim.neutral()
+    x[sim.nq :] = np.random.default_rng(0).normal(size=sim.nv)
+    runs = [s.rollout(x, np.zeros((10, 0)), throw=True) for s in (sim, other)]
+    np.testing.assert_allclose(runs[0].x, runs[1].x, atol=1e-10)
+    np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-10)
+    np.testing.assert_allclose(np.ptp(sim.momentum(runs[0].x)[0], axis=0), 0.0, atol=1e-9)
+    for A, B in zip(sim.linearize(x), other.linearize(x), strict=True):
+        np.testing.assert_allclose(A, B, atol=1e-7)
+
+
+def test_a_far_pair_comes_near_within_a_step() -> None:
+    """A ball at rest above a fixed one: nothing says before the step that it falls through the gap in one."""
+    ball, joint = Body("a", 1.0, shape=Sphere(0.1)), Joint("floating", None, "a")
+    above = Collision("a", shape_b=Sphere(0.1))
+    falls = []
+    for gravity in (10.0, 1000.0):
+        mech = Mechanism([ball], [joint], collisions=[above], gravity=(0, 0, -gravity))
+        sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-8)
+        x = sim.neutral()
+        x[2] = 0.25
+        falls.append(sim.step(x, throw=True))
+        assert sim.left_out(x) == (("a-world",) if gravity == 10.0 else ())
+    assert falls[0].contacts.gap[0] == pytest.approx(0.049, abs=1e-6)
+    assert 0.0 < falls[1].contacts.gap[0] < 1e-8
+    assert falls[1].contacts.impulse[0, 2] == pytest.approx(5.0, rel=1e-6)  # 10 N s less 0.05 m / 0.01 s * 1 kg
 
 
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4])
@@ -132,6 +231,19 @@ def test_the_ground_as_a_collision_is_the_ground_as_a_contact() -> None:
     runs = [dojo.Simulator(m, time_step=0.01, kappa=1e-8).rollout(x, np.zeros((60, 0))) for m in (a, b)]
     np.testing.assert_allclose(runs[0].x, runs[1].x, atol=1e-5)
     np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-5)
+
+
+def test_a_polytope_falls_as_the_box_that_it_is() -> None:
+    corners = np.array(list(product((-0.2, 0.2), (-0.15, 0.15), (-0.25, 0.25))))
+    runs = []
+    for shape in (SHAPES["box"], Polytope(corners)):
+        slope = HalfSpace(orientation=(np.cos(0.05), 0.0, np.sin(0.05), 0.0))
+        mech = Mechanism([Body("a", 1.0, shape=shape)], [Joint("floating", None, "a")], collisions=[
+            Collision("a", shape_b=slope, friction=0.3)])  # fmt: skip
+        sim = dojo.Simulator(mech, time_step=0.01)
+        x = np.concatenate([[0, 0, 0.5, 0.8, 0.4, -0.2, 0.4], [0.5, 0.0, -1.0, 2.0, -1.0, 0.5]])
+        runs.append(sim.rollout(x, np.zeros((80, sim.nu)), throw=True).x)
+    np.testing.assert_allclose(runs[0], runs[1], atol=1e-5)
 
 
 def test_a_string_holds_and_does_not_push() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
+from sim.polytope import Polytope
 from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
 
 
@@ -44,3 +47,25 @@ def test_orientation_turns_the_inertia() -> None:
 def test_sizes_are_positive(make: object) -> None:
     with pytest.raises(ValueError, match=r"(Sphere|Box|Capsule)\((radius|y|length)=\.\.\.\)"):
         make()  # type: ignore[operator]
+
+
+def test_a_polytope_of_the_corners_of_a_box_is_the_box() -> None:
+    corners = 0.5 * np.array(list(product((-0.4, 0.4), (-0.3, 0.3), (-0.2, 0.2))))
+    turn = np.array([0.8, 0.4, -0.2, 0.4]) / np.sqrt(1.0)
+    turn /= np.linalg.norm(turn)
+    inside = np.vstack([corners, 0.1 * corners])  # points that are no corners are left out
+    polytope = Polytope(inside, orientation=turn)
+    assert len(np.asarray(polytope.vertices)) == 8
+    np.testing.assert_allclose(polytope.inertia(2.0), Box(0.4, 0.3, 0.2, orientation=turn).inertia(2.0), atol=1e-14)
+
+
+def test_a_tetrahedron_about_its_centroid() -> None:
+    """Corner at the origin, legs 1: centroid at a quarter, moments of a known integral."""
+    raw = np.vstack([np.zeros(3), np.eye(3)])
+    solid = Polytope.about_centroid(raw)
+    np.testing.assert_allclose(np.asarray(solid.vertices).mean(axis=0), 0.0, atol=1e-15)
+    # integrals over the tetrahedron of density 6: <x x> = 1/10, <x y> = 1/20, about the centroid less 1/16
+    diagonal, across = 1 / 10 - 1 / 16, 1 / 20 - 1 / 16
+    expected = 2.0 * diagonal * np.eye(3) - across * (np.ones((3, 3)) - np.eye(3))
+    np.testing.assert_allclose(solid.inertia(1.0), expected, atol=1e-14)
+    np.testing.assert_allclose(np.sort(np.linalg.eigvalsh(expected)), solid.principal(1.0), atol=1e-14)

@@ -1,0 +1,105 @@
+"""Which elements of two shapes are in contact: faces, edges, corners. A discrete choice, made once per attempt.
+
+A step finds the pose at its end; the elements that touch there are not known before. Were they chosen anew at every
+iterate, gaps and normals would jump from one to the next, and at a corner that slides over an edge there may be no
+solution at all. So they are chosen where an attempt starts, and kept: the equations are smooth. A solution at which
+the shapes overlap in other elements is none; these are chosen then, and the step is solved again.
+
+Only elements that did not overlap when the step began are chosen: a contact pushes along the normal that it has at the
+end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
+energy. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds energy.)
+"""
+
+from __future__ import annotations
+
+from sim.collision.axes import OPEN
+from sim.collision.collide import arrange, choose, collide_chosen, open_sides
+from sim.collision.witness import absent
+from sim.model import Late, Model, Work
+from sim.pair_pose import place_shapes
+from solvers.jit import kernel
+from solvers.late import late
+
+_OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
+_BEFORE = 1e-3  # part of the smallest size by which elements may overlap at its beginning
+
+
+@kernel
+def least_size(model: Model, j: int) -> float:
+    """The smallest of the sizes of the shapes of pair j."""
+    least = 1e300
+    for k in range(8):
+        if model.pair_sizes[j, k] > 0.0:
+            least = min(least, model.pair_sizes[j, k])
+    return least
+
+
+@kernel
+def open_pairs(model: Model, work: Work, j: int) -> float:
+    """Where a collision begins: pair_before, the pose at configuration 2 now in pair_relative, and pair_sides, the axes
+    that separate the shapes; returns their distance.
+    """
+    for k in range(12):
+        work.pair_before[j, k] = work.pair_relative[j, k]
+    pose = work.pair_before[j]
+    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:12])
+    apart = distance(model, work, j)
+    work.pair_before[j, 12] = min(apart, 0.0) - _BEFORE * least_size(model, j)
+    return apart
+
+
+@kernel
+def distance(model: Model, work: Work, first: int) -> float:
+    """Distance of the shapes of a collision at pair_relative, whatever elements are chosen."""
+    kind = model.pair_kind[first]
+    pose = work.pair_relative[first]
+    faces = arrange(kind, model.pair_sizes[first], pose[:9], pose[9:], OPEN)
+    g = work.pair_trial[0]
+    least = 1e300
+    j = first
+    while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
+        choose(kind, j - first, faces, model.pair_sizes[j], model.hull, pose[:9], pose[9:], g)
+        least = min(least, g[0])
+        j += 1
+    return least
+
+
+@kernel
+def choose_shapes(model: Model, work: Work, first: int) -> None:
+    """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
+    kind = model.pair_kind[first]
+    pose = work.pair_relative[first]
+    before = work.pair_before[first]
+    faces = arrange(kind, model.pair_sizes[first], pose[:9], pose[9:], work.pair_sides[first])
+    g = work.pair_trial[0]
+    j = first
+    while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
+        sizes = model.pair_sizes[j]
+        code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
+        if code > 1 or code < 0:  # a choice
+            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
+            if g[0] < before[12]:
+                code = 0
+                absent(work.pair_out[j])
+        work.pair_code[j] = code
+        j += 1
+
+
+@late(Late.CHOOSE_PAIRS)
+def choose_pairs(model: Model, work: Work) -> None:
+    """`choose_shapes` of the near collisions, at configuration 3."""
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
+            place_shapes(model, work, j, work.pos3, work.rot3)
+            choose_shapes(model, work, j)
+
+
+@late(Late.OVERLAPPING, False)
+def overlapping(model: Model, work: Work) -> bool:
+    """Whether shapes overlap at configuration 3, in elements that were not chosen."""
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0 and work.pair_free[0] == 0:
+            place_shapes(model, work, j, work.pos3, work.rot3)
+            if distance(model, work, j) < -_OVERLAP * least_size(model, j):
+                return True
+    return False

@@ -1,0 +1,178 @@
+"""Touch: a contact point that a collision may have, as kernels need it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.collision import kinds
+from sim.collision.broad import bounding_radius
+from sim.collision.polytope import EDGES
+from sim.parts import WORLD
+from sim.polytope import Polytope, hull_table
+from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
+
+if TYPE_CHECKING:
+    from sim.collisions import Collision
+    from sim.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+End = tuple[int, Solid]  # body, -1 for the world, and shape
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One contact point that a collision may have, as kernels need it: a and b in the order of `collide`."""
+
+    name: str
+    bodies: tuple[int, int]  # -1 for the world
+    kind: int
+    feature: int
+    sizes: Floats  # (8,)
+    hulls: tuple[Floats, ...]  # tables of polytopes a and b, in the order of the pair, at the first point
+    radii: tuple[float, float]  # of the balls around the shapes of a and b; infinite where there is none
+    places: Floats  # (2, 12) centre and rotation of the shapes in their bodies
+    friction: float
+    law: str
+    restitution: float
+
+
+def touches(mech: Mechanism) -> list[Touch]:
+    """All contact points of the collisions of a mechanism; those of the same two bodies follow one another."""
+    found = [touch for collision in mech.collisions for touch in _touches(mech, collision)]
+    order = list(dict.fromkeys(touch.bodies for touch in found))
+    return sorted(found, key=lambda touch: order.index(touch.bodies))
+
+
+def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
+    call = f"Mechanism({mech.name!r}): collision {collision.name!r}"
+    solids: list[End] = []
+    for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
+        index = -1 if body == WORLD else mech.body_names.index(body)
+        shape = given if given is not None else mech.bodies[index].shape
+        if shape is None:
+            raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
+        solids.append((index, shape))
+    (a, first), (b, second) = solids
+    if isinstance(first, Polytope) and isinstance(second, HalfSpace):
+        return _corners(collision, (a, first), (b, second))
+    if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
+        return _corners(collision, (b, second), (a, first))
+    if Polytope in (type(first), type(second)) and {type(first), type(second)} <= _CONVEX:
+        return _polytopes(collision, solids if isinstance(second, Polytope) else solids[::-1])
+    codes = [_CODES.get(type(first)), _CODES.get(type(second))]
+    match = None if codes[0] is None or codes[1] is None else kinds.pair(codes[0], codes[1])
+    if match is None:
+        names = f"{type(first).__name__} and {type(second).__name__}"
+        raise ValueError(f"{call}: there is no collision of {names}: {_REASON}")
+    kind, swapped = match
+    return _features(collision, kind, solids[::-1] if swapped else solids)
+
+
+def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[Touch]:
+    """The contact points of two shapes in the order of their pair."""
+    code, number = int(kind), kinds.count(kind)
+    sizes = np.zeros(8)
+    around = []
+    for k, (_, shape) in enumerate(ends):
+        values = _sizes(shape)
+        sizes[4 * k : 4 * k + len(values)] = values
+        around.append(bounding_radius(_CODES[type(shape)], values))
+    if ends[0][0] < 0:  # the world is always b
+        ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
+    places = np.array([_place(shape) for _, shape in ends])
+    return [
+        Touch(
+            collision.name if number == 1 else f"{collision.name}_{feature}",
+            (ends[0][0], ends[1][0]),
+            code,
+            feature,
+            sizes,
+            (),
+            (around[0], around[1]),
+            places,
+            collision.friction,
+            collision.law,
+            collision.restitution,
+        )
+        for feature in range(number)
+    ]
+
+
+_REASON = (
+    "a cylinder touches spheres and half-spaces, where its distance is known with its derivatives; "
+    "give one of the two another shape, such as a capsule, a box or a polytope"
+)
+
+
+def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> list[Touch]:
+    """A polytope above a half-space touches it with its corners: points, each a ball without radius."""
+    body, shape = solid
+    places = np.array([_place(shape), _place(ground[1])])
+    kind, bodies = int(kinds.Pair.SPHERE_HALFSPACE), (body, ground[0])
+    out = []
+    for k, point in enumerate(np.asarray(shape.vertices) @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
+        where = places.copy()
+        where[0, :3] = point
+        law = (collision.friction, collision.law, collision.restitution)
+        out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
+    return out
+
+
+_CONVEX: set[type] = {Polytope, Box, Capsule, Sphere}
+
+
+def _polytopes(collision: Collision, ends: list[End]) -> list[Touch]:
+    """The contact points of a shape and a polytope: corners, and crossings of edges."""
+    tables, radii = zip(*(hull_table(shape) for _, shape in ends), strict=True)
+    corners = [table[1 : 1 + int(table[0, 0]), :3] for table in tables]
+    around = [float(np.linalg.norm(c, axis=1).max()) + r for c, r in zip(corners, radii, strict=True)]
+    thick = [r if len(c) < 4 else float(np.ptp(c, axis=0).min()) for c, r in zip(corners, radii, strict=True)]
+    sizes = np.array([0.0, radii[0], thick[0], 0.0, 0.0, radii[1], thick[1], 0.0])
+    code, number = int(kinds.Pair.POLYTOPE_POLYTOPE), len(corners[0]) + len(corners[1])
+    number += EDGES if tables[0][0, 1] > 0 else 0
+    if ends[0][0] < 0:  # the world is always b
+        ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
+    places = np.array([_place(shape) for _, shape in ends])
+    bodies, circles = (ends[0][0], ends[1][0]), (around[0], around[1])
+    law = (collision.friction, collision.law, collision.restitution)
+    return [
+        Touch(f"{collision.name}_{k}", bodies, code, k, sizes, tables if k == 0 else (), circles, places, *law)
+        for k in range(number)
+    ]
+
+
+_CODES: dict[type, kinds.Shape] = {
+    Sphere: kinds.Shape.SPHERE,
+    Capsule: kinds.Shape.CAPSULE,
+    Box: kinds.Shape.BOX,
+    Cylinder: kinds.Shape.CYLINDER,
+    HalfSpace: kinds.Shape.HALFSPACE,
+    String: kinds.Shape.STRING,
+}
+
+
+def _sizes(shape: Solid) -> tuple[float, ...]:
+    """Sizes in the order of kinds.Shape."""
+    if isinstance(shape, Sphere):
+        return (shape.radius,)
+    if isinstance(shape, Capsule | Cylinder):
+        return shape.radius, 0.5 * shape.length
+    if isinstance(shape, Box):
+        return 0.5 * shape.x, 0.5 * shape.y, 0.5 * shape.z
+    return (shape.length,) if isinstance(shape, String) else ()
+
+
+def _place(shape: Solid) -> Floats:
+    """Centre and rotation of a shape in its body, (12,)."""
+    return np.concatenate([np.asarray(shape.center), rotation_matrix(shape.orientation).ravel()])
+
+
+def couples(found: Sequence[Touch]) -> list[tuple[int, int]]:
+    """The pairs of bodies, in the order of their touches."""
+    return [bodies for bodies, _ in groupby(found, key=lambda touch: touch.bodies)]
