@@ -22,7 +22,7 @@ def fivebar(
     density: float = 2.0,
     width: float = 0.03,
     angle: float = 0.6,
-    limits: tuple[float, float] | None = (-0.3, 1.2),
+    limits: tuple[float, float] | None = (0.0, 1.2),
     spring: float = 0.0,
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
@@ -37,8 +37,8 @@ def fivebar(
                   o pin
 
     Lengths [m], density [kg/m] of the links; angle [rad] by which the cranks open outwards in the neutral state, and
-    limits of that angle [rad]: with the forearms in one line the arm would be singular. spring [N m/rad, rest at the
-    neutral angle] and damper [N m s/rad] of the motors.
+    limits of that angle [rad]: with the forearms in one line, or on one another, the arm is singular. spring
+    [N m/rad, rest at the neutral angle] and damper [N m s/rad] of the motors.
     """
     up = {"crank": (0.0, 0.0, crank / 2), "forearm": (0.0, 0.0, forearm / 2)}
     down = {"crank": (0.0, 0.0, -crank / 2), "forearm": (0.0, 0.0, -forearm / 2)}
