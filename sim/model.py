@@ -233,7 +233,7 @@ class Work(NamedTuple):
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
-    couple_live: Integers  # (nrow, 2) rows of the dense system, with their couplings
+    couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     pair_free: Integers  # (1,) 1: elements are chosen anew at every pose
     far: Matrix  # (nground, 24) see far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
