@@ -7,9 +7,10 @@ import functools
 import numpy as np
 import pytest
 from jacobians import check_jacobian
-from parameter_scenes import CASES, Case, error
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.parameters import error
+from dojo_opt.report.mechanics.situations import CASES, Case
 from sim.parameters import KINDS
 
 case_of = functools.cache(lambda name: CASES[name]())
