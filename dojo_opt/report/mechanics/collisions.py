@@ -105,8 +105,8 @@ def derivative_error(case: Case, R: Floats, r: Floats) -> float:
     for (_, _, out), *expected in zip(found, *estimates, strict=True):
         n, p = out[1:4], out[4:7]
         J = np.vstack([np.append(n, np.cross(p, n)), out[7:].reshape(6, 6)])
-        worst = max(worst, min(np.abs(J - D).max() / max(1.0, np.abs(D).max()) for D in expected))
-    return worst
+        worst = np.maximum(worst, min(np.abs(J - D).max() / max(1.0, np.abs(D).max()) for D in expected))
+    return float(worst)
 
 
 def check(name: str) -> dict[str, float]:

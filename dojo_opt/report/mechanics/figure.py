@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 from dojo_opt.report.mechanics import collisions, joints, parameters
@@ -28,9 +29,10 @@ def margins(details: dict[str, Any]) -> Any:
         for y, values in enumerate(lines.values()):
             axes.plot([max(v, FLOOR) for v in values.values()], [y] * len(values), "o", color="#4477aa", alpha=0.5)
         axes.axvline(1.0, color="#cc3311")
+        largest = max((v for values in lines.values() for v in values.values() if isfinite(v)), default=1.0)
         axes.set_yticks(range(len(lines)), list(lines))
         axes.invert_yaxis()
-        axes.set(xscale="log", xlim=(0.5 * FLOOR, 10.0), xlabel="error / bar", title=title)
+        axes.set(xscale="log", xlim=(0.5 * FLOOR, max(10.0, 2.0 * largest)), xlabel="error / bar", title=title)
         axes.spines[["top", "right"]].set_visible(False)
     return figure
 

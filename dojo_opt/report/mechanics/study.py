@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 
 from dojo_opt.report.mechanics import collisions, joints, parameters
 from dojo_opt.report.mechanics.figure import margins
 from dojo_opt.report.mechanics.situations import CASES
 from dojo_opt.report.mechanics.solids import PAIRS
-from dojo_opt.report.result import Cell, Report, Row, Table
+from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.parameters import KINDS as PARAMETERS
 from sim.parts import KINDS
@@ -34,6 +35,7 @@ class Mechanics:
         self._pairs(report, progress)
         self._parameters(report, progress)
         report.figure = margins(report.details)
+        report.notes.append("Figure: error over bar, a dot per entry; at the left edge, exact ones and stops kept.")
         return report
 
     def _joints(self, report: Report, progress: Progress) -> None:
@@ -46,7 +48,8 @@ class Mechanics:
         for name, bar in joints.BARS.items():
             values = {kind: value for kind, v in found.items() if (value := v[name]) is not None}
             least = name == "energy"
-            worst = (min if least else max)(values, key=lambda kind: values[kind])
+            lost = [kind for kind in values if isnan(values[kind])]
+            worst = lost[0] if lost else (min if least else max)(values, key=lambda kind: values[kind])
             text = f"worst of {len(values)}: {worst}"
             report.rows.append(Row(f"joints: {name}", values[worst], "", bar, at_least=least, note=text))
 
@@ -55,7 +58,7 @@ class Mechanics:
         names = QUICK_PAIRS if self.quick else PAIRS
         found = {name: collisions.check(name) for name in progress([(name, name) for name in names], "pairs")}
         columns = list(found[names[0]])
-        lines: list[list[Cell]] = [[name, *(values[c] for c in columns)] for name, values in found.items()]
+        lines = [[name, *(_short(values[c]) for c in columns)] for name, values in found.items()]
         report.tables.append(Table("Pairs of shapes", ("", *columns), lines, _note(collisions.__doc__)))
         report.details["pairs"] = found
         groups: dict[tuple[str, float], dict[str, float]] = {}
@@ -64,14 +67,15 @@ class Mechanics:
                 group = groups.setdefault((c.partition(" ")[0], collisions.bar(name, c)), {})
                 group[f"{name}{c[c.index(' ') :]}"] = value
         for (what, bar), values in sorted(groups.items()):
-            report.rows.append(_worst(f"pairs: {what}", values, bar, "" if what == "derivative" else "m"))
+            title = f"pairs: {what}" + (", rounded" if bar > collisions.BARS[what] else "")
+            report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
 
     def _parameters(self, report: Report, progress: Progress) -> None:
         """A line per kind of parameter, a row per situation with the worst of them."""
         names = QUICK_CASES if self.quick else tuple(CASES)
         found = {name: parameters.check(name) for name in progress([(name, name) for name in names], "parameters")}
         kinds = [kind for kind in PARAMETERS if any(kind in values for values in found.values())]
-        lines = [[kind, *(values.get(kind) for values in found.values())] for kind in kinds]
+        lines = [[kind, *(_short(values.get(kind)) for values in found.values())] for kind in kinds]
         report.tables.append(Table("Derivatives by parameters", ("", *names), lines, _note(parameters.__doc__)))
         report.details["parameters"] = found
         for name, values in found.items():
@@ -83,7 +87,12 @@ def _note(doc: str | None) -> str:
     return (doc or "").partition("\n\n")[2]
 
 
+def _short(value: float | None) -> str:
+    """One digit: the tables are wide, and the report has all digits in its details."""
+    return "" if value is None else f"{value:.0e}"
+
+
 def _worst(name: str, values: dict[str, float], bar: float, unit: str) -> Row:
-    """The largest value, and what it belongs to."""
-    worst = max(values, key=lambda key: values[key])
+    """The largest value, and what it belongs to; NaN is larger than any."""
+    worst = max(values, key=lambda key: (isnan(values[key]), values[key]))
     return Row(name, values[worst], unit, bar, note=f"worst of {len(values)}: {worst}")
