@@ -16,7 +16,7 @@ from sim.effects import At, Effect
 from sim.loops import child_point, loop_frame, turned
 from sim.model import Matrix, Model, Vector, Work
 from sim.parameter_effects import add_wrench
-from sim.restitution import gap_wrench
+from sim.restitution_gradient import gap_wrench
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
 

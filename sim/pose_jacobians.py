@@ -7,7 +7,8 @@ A1   d/d(pose 1): the incoming momentum
 
 from __future__ import annotations
 
-from sim.dynamics import angular_momentum, angular_momentum_jacobian, body_jacobian
+from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
+from sim.dynamics import body_jacobian
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel

@@ -16,9 +16,10 @@ from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
-from sim.mechanism import Mechanism, with_contacts
+from sim.mechanism import Mechanism
 from sim.reactions import Reactions, reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
+from sim.scene import with_contacts
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
