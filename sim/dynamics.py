@@ -21,6 +21,7 @@ from solvers.jit import kernel
 _WORLD = int(InputKind.WORLD)
 _BODY = int(InputKind.BODY)
 _JOINT = int(InputKind.JOINT)
+_HALF_TURN, _WHOLE_TURN = 9.8696, 39.4784  # pi^2 and (2 pi)^2, rounded down
 
 
 @kernel
@@ -85,14 +86,14 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
             work.momentum_in[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + h * model.gravity[k])
             work.body_impulse[i, k] = 0.0
             work.body_impulse[i, 3 + k] = 0.0
-    representable = _turns_below_half(model, work, h, v)
+    representable = turns_below_half(model, work, h, v)
     for j in range(u.shape[0]):
         _apply_input(model, work, h, j, u[j])
     return representable
 
 
 @kernel
-def _turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
+def turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
     """|h omega| < pi for the angular velocity of each body, omega = sum of the ancestors' rotation rates about S2."""
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
@@ -102,7 +103,7 @@ def _turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
                 w += h * v[d] * work.S2[d, 3 + k]
             work.subtree[i, 3 + k] = w
         x, y, z = work.subtree[i, 3], work.subtree[i, 4], work.subtree[i, 5]
-        if not x * x + y * y + z * z < 9.8696 or not work.turn_in[i, 0] > 1e-3:  # pi^2
+        if not x * x + y * y + z * z < _HALF_TURN or not work.turn_in[i, 0] > 1e-3:
             return False
     return True
 
@@ -134,7 +135,7 @@ def joints_below_turn(model: Model, nu: Vector, h: float) -> bool:
         t = 0.0
         for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
             t += nu[d] * nu[d]
-        if not h * h * t < (9.8696 if model.body_parent[i] < 0 else 39.4784):
+        if not h * h * t < (_HALF_TURN if model.body_parent[i] < 0 else _WHOLE_TURN):
             return False
     return True
 

@@ -15,16 +15,16 @@ from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
 from sim.limits import add_limit_derivatives
 from sim.model import InputKind, Late, Matrix, Model, Vector, Work
+from sim.outer import input_wrench
 from sim.pair_far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
 from sim.restitution_gradient import add_bounce_composites, add_bounce_derivatives
-from sim.rotation import left_jacobian, quat_exp, quat_matrix, rotate
+from sim.rotation import left_jacobian, quat_exp, quat_matrix
 from solvers.jit import kernel
 from solvers.late import late
 
 _JOINT = int(InputKind.JOINT)
-_BODY = int(InputKind.BODY)
 
 
 @late(Late.GRADIENT, False)
@@ -99,22 +99,14 @@ def _input_columns(model: Model, work: Work, h: float) -> None:
         if model.input_kind[j] == _JOINT:
             work.columns[model.input_index[j], col] = h
             continue
+        w = work.couple_wrench
+        input_wrench(model, work, j, w)
         i = model.input_index[j]
-        w = model.input_wrench[j]
-        f = (w[0], w[1], w[2])
-        t = (w[3], w[4], w[5])
-        if model.input_kind[j] == _BODY:
-            f = rotate(work.rot2, i, f[0], f[1], f[2])
-            t = rotate(work.rot2, i, t[0], t[1], t[2])
-        x = work.pos2[i, 0] - work.origin[0]
-        y = work.pos2[i, 1] - work.origin[1]
-        z = work.pos2[i, 2] - work.origin[2]
-        t = (t[0] + y * f[2] - z * f[1], t[1] + z * f[0] - x * f[2], t[2] + x * f[1] - y * f[0])
         while i >= 0:
             for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
                 s = work.S2[d]
                 work.columns[d, col] = h * (
-                    s[0] * f[0] + s[1] * f[1] + s[2] * f[2] + s[3] * t[0] + s[4] * t[1] + s[5] * t[2]
+                    s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5]
                 )
             i = model.body_parent[i]
 

@@ -1,6 +1,7 @@
 """All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
 
-Far contacts (far.py) have no part in its variables and its matrix.
+Their complementarity products are in complementarity.py. Far contacts (far.py) have no part in its variables and its
+matrix.
 """
 
 from __future__ import annotations

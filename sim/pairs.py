@@ -1,4 +1,4 @@
-"""Contacts between two bodies a and b, or of a with fixed obstacles: geometry at configuration 3, wrench, derivatives.
+"""Contacts between two bodies a and b, or of a with fixed obstacles: geometry at configuration 3, and wrench.
 
     gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/collision
     slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
@@ -7,8 +7,7 @@
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
 to configuration 2, where the balance of momenta is taken; of a fixed obstacle, a alone carries it.
 
-Derivatives are by the twists of a and b about O at configuration 3. Everything moves with b, plus what the motion of a
-relative to b does:  dn = phi_b x n + N zeta,  dp = v_b + phi_b x (p - O) + M zeta,  zeta = zeta_a - zeta_b.
+Derivatives: pair_jacobian.py.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from sim.collision.collide import collide_chosen
 from sim.model import Late, Matrix, Model, Work
 from sim.pair_choice import choose_shapes
 from sim.pair_pose import place_shapes
-from sim.rotation import Vec3, cross, rotate
+from sim.rotation import Vec3, cross, rotate, transposed_times
 from solvers.jit import kernel
 from solvers.late import late
 
@@ -142,8 +141,7 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
 @kernel
 def pair_force(work: Work, j: int, fn: float, f1: float, f2: float) -> Vec3:
     """n fn + t1 f1 + t2 f2."""
-    F = work.pair_frame[j]
-    return F[0] * fn + F[3] * f1 + F[6] * f2, F[1] * fn + F[4] * f1 + F[7] * f2, F[2] * fn + F[5] * f1 + F[8] * f2
+    return transposed_times(work.pair_frame[j], fn, f1, f2)
 
 
 @kernel

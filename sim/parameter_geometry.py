@@ -186,7 +186,7 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
 
 @kernel
 def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col: int) -> None:
-    """As `add_bounce_derivatives` (restitution.py): a floor that the motion of one body raises pushes the other."""
+    """As `add_bounce_derivatives`: a floor that the motion of one body raises pushes the other."""
     c = model.contact_height.shape[0] + j
     b = work.bounce[c]
     rise = b[1] * _dot(b[2:8], at.twists[0]) + (1.0 - b[1]) * _dot(b[8:14], at.twists[3])

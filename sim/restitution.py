@@ -19,7 +19,7 @@ example). Where the impulses of a step did work in all,
 its restitutions are halved, all of them, and it is solved again: without restitution they never do.
 
 Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
-of 2, 14 phi1, 15 phi2. Derivatives of a step are those of the branch that was taken.
+of 2, 14 phi1, 15 phi2. Derivatives: restitution_gradient.py.
 
 Scenes without restitution do not compile these kernels.
 """

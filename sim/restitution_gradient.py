@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pairs import pair_arm, pair_force
-from sim.rotation import Vec3, cross
+from sim.rotation import Vec3, cross, transposed_times
 from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.late import late
@@ -24,14 +24,9 @@ def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
         f = pair_force(work, c - ground, W[0], W[3], W[6])
         a = pair_arm(model, work, c - ground)
     else:
-        F = work.contact_frame[c]
         k = work.contact_kin[c]
         i = model.contact_body[c]
-        f = (
-            F[0] * W[0] + F[3] * W[3] + F[6] * W[6],
-            F[1] * W[0] + F[4] * W[3] + F[7] * W[6],
-            F[2] * W[0] + F[5] * W[3] + F[8] * W[6],
-        )
+        f = transposed_times(work.contact_frame[c], W[0], W[3], W[6])
         o = work.origin
         p = work.pos2[i]
         a = (p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from sim.model import Matrix
+from sim.model import Matrix, Vector
 from solvers.jit import kernel
 
 Vec3 = tuple[float, float, float]
@@ -167,8 +167,8 @@ def times(M: Mat3, x: float, y: float, z: float) -> Vec3:
 
 
 @kernel
-def transposed_times(M: Mat3, x: float, y: float, z: float) -> Vec3:
-    """M^T (x, y, z)"""
+def transposed_times(M: Mat3 | Vector, x: float, y: float, z: float) -> Vec3:
+    """M^T (x, y, z): with the rows of M for a frame, x times the first one, + y the second, + z the third."""
     return (
         M[0] * x + M[3] * y + M[6] * z,
         M[1] * x + M[4] * y + M[7] * z,

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.calls import Settings
 from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
@@ -20,6 +19,7 @@ from sim.mechanism import Mechanism
 from sim.reactions import Reactions, reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
 from sim.scene import with_contacts
+from sim.settings import Settings
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
