@@ -324,7 +324,7 @@ def test_files_stay_readable() -> None:
     for package in PACKAGES:
         for file in (HOME / package).rglob("*.py"):
             length = len(file.read_text().splitlines())
-            if length > 350:
+            if length > 300 and file.name != "model.py":  # a table of fields
                 long[file.name] = length
     assert not long
 
