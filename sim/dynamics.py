@@ -18,7 +18,6 @@ from sim.model import InputKind, Matrix, Model, Vector, Work
 from sim.rotation import Mat3, quat_turn, rotate
 from solvers.jit import kernel
 
-_WORLD = int(InputKind.WORLD)
 _BODY = int(InputKind.BODY)
 _JOINT = int(InputKind.JOINT)
 _HALF_TURN, _WHOLE_TURN = 9.8696, 39.4784  # pi^2 and (2 pi)^2, rounded down

@@ -7,6 +7,7 @@ import pytest
 from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
+from sim.bind import bind_poses
 from sim.build import pack
 from sim.coordinates import maximal_states, minimal_states
 from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
@@ -24,6 +25,7 @@ class Maps:
     def __init__(self, mech: Mechanism) -> None:
         self.mech = mech
         self.model = pack(mech)
+        bind_poses(self.model)
         self.model_at = table(self.model)
         self.work = allocate_work(sizes_of(self.model))
         for array in self.work:
