@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import time
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -24,14 +25,14 @@ BALLS = [f"b{k}" for k in range(20)]
 GAIN = 1e-2  # [J] more than kappa pushes from afar
 
 
-def scene(a: str, b: str) -> dojo.Mechanism:
-    """Two free bodies that collide."""
+def scene(a: str, b: str, **options: Any) -> dojo.Mechanism:
+    """Two free bodies that collide; options: of the Collision."""
     bodies = [
         dojo.Body("a", 1.0, (0.02, 0.03, 0.04), shape=SHAPES[a]),
         dojo.Body("b", 2.0, (0.05, 0.06, 0.07), shape=SHAPES[b]),
     ]
     joints = [dojo.Joint("floating", None, name) for name in ("a", "b")]
-    return dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b")], gravity=(0, 0, 0))
+    return dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b", **options)], gravity=(0, 0, 0))
 
 
 def start(seed: int) -> np.ndarray:

@@ -35,17 +35,20 @@ __all__ = [
     "Mechanism",
     "MjcfMechanism",
     "MjcfWarning",
+    "Parameters",
     "Perturbation",
     "Plan",
     "Plant",
     "Polytope",
     "Problem",
     "Push",
+    "Reactions",
     "Sampled",
     "SimulationError",
     "Simulator",
     "Sphere",
     "Status",
+    "StepResult",
     "String",
     "Terrain",
     "Trajectory",
@@ -64,6 +67,7 @@ __all__ = [
     "monte_carlo",
     "plots",
     "problems",
+    "report",
     "tasks",
     "tracking_gains",
     "viewer",
@@ -79,26 +83,29 @@ _HOME: dict[str, str | None] = {
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
     "Disturbances": "dojo_opt.plant.disturbances",
+    "Gear": "sim.gear",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
-    "Gear": "sim.gear",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
     "MPC": "dojo_opt.mpc.controller",
     "Mechanism": "sim.mechanism",
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
+    "Parameters": "sim.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
     "Plant": "dojo_opt.plant.plant",
     "Polytope": "sim.polytope",
     "Problem": "dojo_opt.problem",
     "Push": "dojo_opt.plant.perturbation",
+    "Reactions": "sim.reactions",
     "Sampled": "dojo_opt.mpc.moving",
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
     "Status": "solvers.status",
+    "StepResult": "sim.results",
     "String": "sim.shapes",
     "Terrain": "sim.terrain",
     "Trajectory": "sim.results",
@@ -117,13 +124,14 @@ _HOME: dict[str, str | None] = {
     "monte_carlo": "dojo_opt.plant.study",
     "plots": None,
     "problems": None,
+    "report": None,
     "tasks": None,
     "tracking_gains": "dojo_opt.tracking",
     "viewer": None,
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, gaits, models, plots, problems, tasks, viewer
+    from dojo_opt import constraint, cost, gaits, models, plots, problems, report, tasks, viewer
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
     from dojo_opt.plan import Plan
@@ -140,9 +148,11 @@ if TYPE_CHECKING:
     from sim.gear import Gear
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
+    from sim.parameters import Parameters
     from sim.parts import Body, Contact, Input, Joint
     from sim.polytope import Polytope
-    from sim.results import Linearization, SimulationError, Trajectory
+    from sim.reactions import Reactions
+    from sim.results import Linearization, SimulationError, StepResult, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
     from sim.terrain import Terrain

@@ -18,7 +18,7 @@ Vector = NDArray[np.float64]
 __all__ = ["ControlBounds", "Goal", "ResidualConstraint", "StateBounds"]
 
 
-def _chosen(call: str, components: Any, count: int) -> Integers:
+def chosen_components(call: str, components: Any, count: int) -> Integers:
     """Component numbers as an array; None means all."""
     if components is None:
         return np.arange(count)
@@ -43,7 +43,7 @@ class Goal:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
         target = table("Goal(target=...)", self.target, knots.size, sim.nx)
         mask = np.zeros((knots.size, sim.ndx))
-        mask[:, _chosen("Goal(components=...)", self.components, sim.ndx)] = 1.0
+        mask[:, chosen_components("Goal(components=...)", self.components, sim.ndx)] = 1.0
         return StateTerm("Goal", knots, mask, target, layout)
 
 
@@ -75,7 +75,7 @@ class StateBounds:
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
         knots = knots[knots > 0] if self.knots is None else knots
-        chosen = _chosen("StateBounds(components=...)", self.components, sim.ndx)
+        chosen = chosen_components("StateBounds(components=...)", self.components, sim.ndx)
         reference, columns, sign = _bounds("StateBounds", self.lower, self.upper, knots.size, chosen)
         if np.any(layout[columns] < 0):
             bad = int(columns[layout[columns] < 0][0])
@@ -101,7 +101,7 @@ class ControlBounds:
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
         knots = knot_list("ControlBounds(knots=...)", self.knots, horizon, last=False)
-        chosen = _chosen("ControlBounds(components=...)", self.components, sim.nu)
+        chosen = chosen_components("ControlBounds(components=...)", self.components, sim.nu)
         reference, columns, sign = _bounds("ControlBounds", self.lower, self.upper, knots.size, chosen)
         pick = Pick(False, columns, sim.ndx + columns, sign)
         return PickTerm("ControlBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)

@@ -13,7 +13,6 @@ from dojo_opt.problem import Problem
 from dojo_opt.term import Term
 
 Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
 
 _LEAST = 1e-3  # of the largest unit: what a component gets at least
 

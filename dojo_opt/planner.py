@@ -112,8 +112,7 @@ class Solver:
         """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
 
         Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
-        few times; after that the solve ends, where it used to repeat failed line searches up to its iteration limit.
-        It ends, too, when updates in a row no longer bring the violation down.
+        few times; after that the solve ends. It ends, too, when updates in a row do not bring the violation down.
         """
         options = self.options
         last = len(options.stages) - 1

@@ -16,10 +16,12 @@ from sim import (
     loops,
     pair_choice,
     pair_far,
+    pair_jacobian,
     pair_stiffness,
     pairs,
     pyramid,
     restitution,
+    restitution_gradient,
     swing,
     terrain_contact,
 )
@@ -44,7 +46,7 @@ _LOOPS = (
 )
 _PAIRS = (
     pairs.pair_kinematics,
-    pairs.pair_rate,
+    pair_jacobian.pair_rate,
     pair_stiffness.condense_pairs,
     pair_stiffness.apply_pairs,
     pair_stiffness.pair_constants,
@@ -146,6 +148,6 @@ def bind_gradient(model: Model) -> None:
     if len(model.pair_kind):
         _bind(model, (pair_far.all_near,))
     if np.any(model.contact_restitution):
-        _bind(model, (restitution.add_bounce_composites,))
+        _bind(model, (restitution_gradient.add_bounce_composites,))
         if len(model.pair_kind):
-            _bind(model, (restitution.add_bounce_derivatives,))
+            _bind(model, (restitution_gradient.add_bounce_derivatives,))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.clusters import pack_clusters
 from sim.collisions import pack_collisions
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
@@ -174,47 +175,7 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
         model.contact_restitution[c] = contact.restitution
         model.contact_frame[c] = contact_frame(contact.normal).ravel()
         model.contact_height[c] = contact.height
-    _pack_clusters(model)
-
-
-def _pack_clusters(model: Model) -> None:
-    """Contacts that follow one another on one body, against one direction: the ball around them (far.py)."""
-    first, count = 0, len(model.contact_height)
-    while first < count:
-        level = model.contact_terrain == 0
-        same = (
-            (model.contact_body[:count] == model.contact_body[first])
-            & level
-            & np.all(model.contact_frame == model.contact_frame[first], axis=1)
-        )
-        end = first + int(np.argmin(np.append(same[first:], False))) if not model.contact_terrain[first] else first + 1
-        points, radii = model.contact_point[first:end], model.contact_radius[first:end]
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        around = float(np.max(np.linalg.norm(points - centre, axis=1) + radii))
-        arm = float(np.max(np.linalg.norm(points, axis=1) + radii))
-        body = int(model.contact_body[first])
-        mass, turning = _mobility(model, body)
-        inertia, easy = model.body_inertia[body], turning**0.5
-        swing = max(_swing(inertia, p) + r * easy for p, r in zip(points, radii, strict=True))
-        spread = float(np.max(np.linalg.norm(points - centre, axis=1)))
-        mobility = mass + swing * swing + 2.0 * spread * swing * easy
-        friction = model.contact_friction[first:end].max()
-        model.cluster_end[first] = end
-        model.cluster[first] = *centre, around, arm, mobility, friction, _swing(inertia, points.mean(axis=0)) * easy
-        first = end
-
-
-def _swing(inertia: Floats, p: Floats) -> float:
-    """Largest |J^-1/2 (p x f)| of a unit force f: how easily a body turns under a force at p."""
-    values, axes = np.linalg.eigh(inertia.reshape(3, 3))
-    return float(np.linalg.norm(np.cross(axes.T, p) / np.sqrt(values)[:, None], ord=2))
-
-
-def _mobility(model: Model, body: int) -> tuple[float, float]:
-    """1/m and 1/J, J the least principal moment of inertia: no joint makes a body easier to move."""
-    least = float(np.linalg.eigvalsh(model.body_inertia[body].reshape(3, 3))[0])
-    mass = float(model.body_mass[body])
-    return (1.0 / mass, 1.0 / least) if mass > 0.0 else (np.inf, np.inf)
+    pack_clusters(model)
 
 
 def _pack_loops(mech: Mechanism, model: Model) -> None:

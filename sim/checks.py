@@ -105,3 +105,11 @@ def distinct(call: str, names: Iterable[str]) -> None:
         if n in seen:
             raise ValueError(f"{call}: the name {n!r} is used twice")
         seen.add(n)
+
+
+def share(call: str, value: Any) -> float:
+    """A number from 0 to 1."""
+    share = number(call, value, at_least=0.0)
+    if share > 1.0:
+        raise ValueError(f"{call}: expected a number from 0 to 1, got {share:g}")
+    return share

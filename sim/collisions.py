@@ -12,7 +12,7 @@ import numpy as np
 from sim import checks
 from sim.collision import kinds
 from sim.model import Law, Model
-from sim.parts import LAWS, WORLD, share
+from sim.parts import LAWS, WORLD
 from sim.shapes import Solid
 from sim.touch import Touch, couples
 
@@ -65,7 +65,7 @@ class Collision:
         friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
         object.__setattr__(self, "friction", friction)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
-        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
+        object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
 
 
 def pack_collisions(mech: Mechanism, model: Model) -> None:

@@ -15,7 +15,7 @@ contact_frame holds the rows n, T: those of the half-space, or on terrain those 
 from __future__ import annotations
 
 from sim.model import Matrix, Model, Work
-from sim.rotation import cross, rotate
+from sim.rotation import cross, rotate, transposed_times
 from sim.terrain_contact import place_on_terrain, turn_on_terrain
 from solvers.jit import kernel
 
@@ -88,10 +88,7 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
     """out[body] -= wrench about O of the impulse n fn + t1 f1 + t2 f2 at contact c (accumulated)."""
     i = model.contact_body[c]
     k = work.contact_kin[c]
-    f = work.contact_frame[c]
-    x = f[0] * fn + f[3] * f1 + f[6] * f2
-    y = f[1] * fn + f[4] * f1 + f[7] * f2
-    z = f[2] * fn + f[5] * f1 + f[8] * f2
+    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
     ax = work.pos2[i, 0] - work.origin[0] + k[3]
     ay = work.pos2[i, 1] - work.origin[1] + k[4]
     az = work.pos2[i, 2] - work.origin[2] + k[5]
@@ -125,18 +122,14 @@ def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f
         gn = W[0] * c0 + W[1] * c1 + W[2] * c2
         g1 = W[3] * c0 + W[4] * c1 + W[5] * c2
         g2 = W[6] * c0 + W[7] * c1 + W[8] * c2
-        x = F[0] * gn + F[3] * g1 + F[6] * g2
-        y = F[1] * gn + F[4] * g1 + F[7] * g2
-        z = F[2] * gn + F[5] * g1 + F[8] * g2
+        x, y, z = transposed_times(F, gn, g1, g2)
         A[j] -= x
         A[6 + j] -= y
         A[12 + j] -= z
         A[18 + j] -= ay * z - az * y
         A[24 + j] -= az * x - ax * z
         A[30 + j] -= ax * y - ay * x
-    x = F[0] * fn + F[3] * f1 + F[6] * f2
-    y = F[1] * fn + F[4] * f1 + F[7] * f2
-    z = F[2] * fn + F[5] * f1 + F[8] * f2
+    x, y, z = transposed_times(F, fn, f1, f2)
     px, py, pz = k[6], k[7], k[8]
     dot = x * px + y * py + z * pz
     A[21] -= px * x - dot

@@ -6,13 +6,13 @@ dz    per body [position, velocity, rotation, angular velocity], (12 nbody,): ro
 
 from __future__ import annotations
 
-from sim.coordinates import body_turn, joint_frame, node_poses, poses_of_maximal, translation_axis
+from sim.coordinates import body_turn, joint_frame, node_poses, poses_of_maximal
+from sim.joint_rows import joint_rows
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import (
     Mat3,
-    Quat,
     Vec3,
     cross,
     inverse_right_jacobian,
@@ -21,36 +21,12 @@ from sim.rotation import (
     quat_log,
     quat_matrix,
     quat_mul,
-    rotate,
+    rows_of,
+    times,
+    transposed_times,
 )
 from solvers.jit import kernel
 from solvers.record import Table
-
-
-@kernel
-def times(M: Mat3, x: float, y: float, z: float) -> Vec3:
-    """M (x, y, z)"""
-    return (
-        M[0] * x + M[1] * y + M[2] * z,
-        M[3] * x + M[4] * y + M[5] * z,
-        M[6] * x + M[7] * y + M[8] * z,
-    )
-
-
-@kernel
-def transposed_times(M: Mat3, x: float, y: float, z: float) -> Vec3:
-    """M^T (x, y, z)"""
-    return (
-        M[0] * x + M[3] * y + M[6] * z,
-        M[1] * x + M[4] * y + M[7] * z,
-        M[2] * x + M[5] * y + M[8] * z,
-    )
-
-
-@kernel
-def rows_of(R: Matrix, i: int) -> Mat3:
-    """R[i] as a tuple."""
-    return R[i, 0], R[i, 1], R[i, 2], R[i, 3], R[i, 4], R[i, 5], R[i, 6], R[i, 7], R[i, 8]
 
 
 @kernel
@@ -113,68 +89,6 @@ def _maximal_column(work: Work, h: float, i: int, d: int, J: Mat3, R: Mat3, out:
 
 
 @kernel
-def _joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, out: Matrix) -> None:
-    """out[d] = d(coordinate d)/d(pose) of joint i: (child position, child rotation, parent position, parent rotation).
-
-        translation     a . (dx_c - dx_p) + ((R c) x a) . phi_c - ((R c + x_c - x_p) x a) . phi_p,   a = R(Q) t_k
-        one axis        a . (phi_c - phi_p)
-        swing           a . (phi_c - phi_p),   a = R(Q) J(t)^-T V_k
-        quaternion      R_c^T (phi_c - phi_p)
-
-    World rotations; consistent poses.   out: (nv, 12 or more).
-    """
-    d, p = model.body_vadr[i], model.body_parent[i]
-    for e in range(d, model.body_vadr[i + 1]):
-        for k in range(12):
-            out[e, k] = 0.0
-    _, Q = joint_frame(model, i, pos, quat, rot)
-    c = model.joint_child_point[i]
-    cx, cy, cz = rotate(rot, i, c[0], c[1], c[2])
-    px, py, pz = cx, cy, cz
-    if p >= 0:
-        px, py, pz = px + pos[i, 0] - pos[p, 0], py + pos[i, 1] - pos[p, 1], pz + pos[i, 2] - pos[p, 2]
-    for k in range(model.joint_ntrans[i]):
-        a = translation_axis(model, i, k, Q)
-        mc = cross(cx, cy, cz, a[0], a[1], a[2])
-        mp = cross(px, py, pz, a[0], a[1], a[2])
-        for j in range(3):
-            out[d, j] = a[j]
-            out[d, 3 + j] = mc[j]
-            out[d, 6 + j] = -a[j]
-            out[d, 9 + j] = -mp[j]
-        d += 1
-    if model.joint_nrot[i] == 1:
-        t = model.joint_axis[i]
-        a = rotate(rot, i, t[0], t[1], t[2])
-        for j in range(3):
-            out[d, 3 + j] = a[j]
-            out[d, 9 + j] = -a[j]
-    elif model.joint_nrot[i] == 2:
-        t = joint_swing(i, Q, quat)
-        J = inverse_right_jacobian(t[0], t[1], t[2])
-        R = quat_matrix(Q[0], Q[1], Q[2], Q[3])
-        for k in range(2):
-            V = model.joint_swing_axes[i, 3 * k : 3 * k + 3]
-            b = times(J, V[0], V[1], V[2])
-            a = times(R, b[0], b[1], b[2])
-            for j in range(3):
-                out[d + k, 3 + j] = a[j]
-                out[d + k, 9 + j] = -a[j]
-    elif model.joint_nrot[i] == 3:
-        for k in range(3):
-            for j in range(3):
-                out[d + k, 3 + j] = rot[i, 3 * j + k]
-                out[d + k, 9 + j] = -rot[i, 3 * j + k]
-
-
-@kernel
-def joint_swing(i: int, Q: Quat, quat: Matrix) -> Vec3:
-    """log(Q^* quat): rotation vector of a swing, from the frame Q of its joint."""
-    r = quat_mul(Q[0], -Q[1], -Q[2], -Q[3], quat[i, 0], quat[i, 1], quat[i, 2], quat[i, 3])
-    return quat_log(r[0], r[1], r[2], r[3])
-
-
-@kernel
 def _difference_rows(model: Model, work: Work, h: float, i: int, w: Vec3) -> None:
     """Rows of the quaternion of joint i turned into those of its rotation vector over the interval, w = log(r1^* r2).
 
@@ -223,8 +137,8 @@ def minimal_jacobian(model: Model, work: Work, h: float, z: Matrix, out: Matrix)
             out[r, c] = 0.0
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
-        _joint_rows(model, i, work.pos2, work.quat2, work.rot2, work.F)
-        _joint_rows(model, i, work.pos1, work.quat1, work.rot1, work.G)
+        joint_rows(model, i, work.pos2, work.quat2, work.rot2, work.F)
+        joint_rows(model, i, work.pos1, work.quat1, work.rot1, work.G)
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
             _configuration_row(work, d, 0, i, out)
             if p >= 0:

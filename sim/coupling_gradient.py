@@ -8,11 +8,11 @@ dR_dq pair by pair of joints.
 
 from __future__ import annotations
 
-from sim.coupling import cross_block, is_loop
+from sim.coupling_rows import is_loop
 from sim.friction import contact_impulse
 from sim.gears import gear_derivatives
 from sim.loops import loop_stiffness
-from sim.model import Late, Model, Work
+from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pair_stiffness import add_earlier_slip, centre_shift
 from sim.pairs import is_absent, pair_force
 from sim.rotation import Vec3, cross
@@ -96,3 +96,25 @@ def add_coupling_derivatives(model: Model, work: Work) -> None:
                         for c in range(6):
                             X[row, d] += work.couple_R[row, 6 * side + c] * work.S3[d, c]
                     i = model.body_parent[i]
+
+
+@kernel
+def cross_block(model: Model, work: Work, rows: int, cols: int, sign: float, K: Vector, S: Matrix) -> None:
+    """dR_dq[j, k] += sign S2[j].K S[k], j from body `rows` up to the root, k from body `cols`."""
+    k = cols
+    while k >= 0:
+        for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
+            w = work.couple_wrench
+            for r in range(6):
+                t = 0.0
+                for c in range(6):
+                    t += K[6 * r + c] * S[e, c]
+                w[r] = t
+            j = rows
+            while j >= 0:
+                for d in range(model.body_vadr[j], model.body_vadr[j + 1]):
+                    s = work.S2[d]
+                    t = s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5]
+                    work.dR_dq[d, e] += sign * t
+                j = model.body_parent[j]
+        k = model.body_parent[k]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from sim.complementarity import boundary_step, products_ahead
 from sim.coupling import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance_jacobian
 from sim.elimination import factor, solve
-from sim.inequalities import boundary_step, condense_inequalities, inequality_rhs, products_ahead, recover_inequalities
+from sim.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.model import Goal, Model, Vector, Work

@@ -12,78 +12,15 @@ about a fixed axis is right to fourth order) and keeps the barrier at a half tur
 from __future__ import annotations
 
 from sim.advance import advance, follows_on
+from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.kinematics import displace, tree_poses
 from sim.model import InputKind, Matrix, Model, Vector, Work
-from sim.rotation import Mat3, Vec3, quat_turn, rotate
+from sim.rotation import Mat3, quat_turn, rotate
 from solvers.jit import kernel
 
-_WORLD = int(InputKind.WORLD)
 _BODY = int(InputKind.BODY)
 _JOINT = int(InputKind.JOINT)
-
-
-@kernel
-def spin(
-    J: Matrix, i: int, c: float, x: float, y: float, z: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """m = c J s + s x J s,  k = s.J s  and J s, for s = (x, y, z): returns (m, J s, k) as seven numbers."""
-    jx, jy, jz = rotate(J, i, x, y, z)
-    k = x * jx + y * jy + z * jz
-    return c * jx + y * jz - z * jy, c * jy + z * jx - x * jz, c * jz + x * jy - y * jx, jx, jy, jz, k
-
-
-@kernel
-def angular_momentum(J: Matrix, i: int, h: float, c: float, x: float, y: float, z: float) -> Vec3:
-    """P = (2/h) (psi m - k psi'/2 s): momentum at the start of an interval with rotation (c, s).
-
-    The momentum at the end of an interval, with J at the end, is -P(c, -s).   J: (n, 9) world axes.
-    """
-    psi = 2.0 / 3.0 + 1.0 / (3.0 * c * c)
-    dpsi = -2.0 / (3.0 * c * c * c)
-    mx, my, mz, _, _, _, k = spin(J, i, c, x, y, z)
-    a = 2.0 / h * psi
-    b = -k * dpsi / h
-    return a * mx + b * x, a * my + b * y, a * mz + b * z
-
-
-@kernel
-def angular_momentum_jacobian(J: Matrix, i: int, h: float, c: float, x: float, y: float, z: float) -> Mat3:
-    """dP/dphi, phi the world rotation of the end of the interval:
-
-    h dP/dphi = psi ((c J + [s] J - [J s]) (c I - [s]) - J s s^T)
-                - psi' (m s^T + s m^T + k/2 (c I - [s])) + (k/2) psi'' s s^T
-    """
-    psi = 2.0 / 3.0 + 1.0 / (3.0 * c * c)
-    dpsi = -2.0 / (3.0 * c * c * c)
-    mx, my, mz, jx, jy, jz, k = spin(J, i, c, x, y, z)
-    e = k / (c * c * c * c)  # k psi'' / 2
-    # T = c J + [s] J - [J s]
-    t00 = c * J[i, 0] - z * J[i, 3] + y * J[i, 6]
-    t01 = c * J[i, 1] - z * J[i, 4] + y * J[i, 7] + jz
-    t02 = c * J[i, 2] - z * J[i, 5] + y * J[i, 8] - jy
-    t10 = c * J[i, 3] + z * J[i, 0] - x * J[i, 6] - jz
-    t11 = c * J[i, 4] + z * J[i, 1] - x * J[i, 7]
-    t12 = c * J[i, 5] + z * J[i, 2] - x * J[i, 8] + jx
-    t20 = c * J[i, 6] - y * J[i, 0] + x * J[i, 3] + jy
-    t21 = c * J[i, 7] - y * J[i, 1] + x * J[i, 4] - jx
-    t22 = c * J[i, 8] - y * J[i, 2] + x * J[i, 5]
-    g = -0.5 * dpsi * k
-    a = psi / h
-    b = -dpsi / h
-    gc = g * c / h
-    gx, gy, gz = g * x / h, g * y / h, g * z / h
-    e /= h
-    return (
-        a * (c * t00 - t01 * z + t02 * y - jx * x) + 2.0 * b * mx * x + e * x * x + gc,
-        a * (c * t01 + t00 * z - t02 * x - jx * y) + b * (mx * y + x * my) + e * x * y + gz,
-        a * (c * t02 - t00 * y + t01 * x - jx * z) + b * (mx * z + x * mz) + e * x * z - gy,
-        a * (c * t10 - t11 * z + t12 * y - jy * x) + b * (my * x + y * mx) + e * y * x - gz,
-        a * (c * t11 + t10 * z - t12 * x - jy * y) + 2.0 * b * my * y + e * y * y + gc,
-        a * (c * t12 - t10 * y + t11 * x - jy * z) + b * (my * z + y * mz) + e * y * z + gx,
-        a * (c * t20 - t21 * z + t22 * y - jz * x) + b * (mz * x + z * mx) + e * z * x + gy,
-        a * (c * t21 + t20 * z - t22 * x - jz * y) + b * (mz * y + z * my) + e * z * y - gx,
-        a * (c * t22 - t20 * y + t21 * x - jz * z) + 2.0 * b * mz * z + e * z * z + gc,
-    )
+_HALF_TURN, _WHOLE_TURN = 9.8696, 39.4784  # pi^2 and (2 pi)^2, rounded down
 
 
 @kernel
@@ -148,14 +85,14 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
             work.momentum_in[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + h * model.gravity[k])
             work.body_impulse[i, k] = 0.0
             work.body_impulse[i, 3 + k] = 0.0
-    representable = _turns_below_half(model, work, h, v)
+    representable = turns_below_half(model, work, h, v)
     for j in range(u.shape[0]):
         _apply_input(model, work, h, j, u[j])
     return representable
 
 
 @kernel
-def _turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
+def turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
     """|h omega| < pi for the angular velocity of each body, omega = sum of the ancestors' rotation rates about S2."""
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
@@ -165,7 +102,7 @@ def _turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
                 w += h * v[d] * work.S2[d, 3 + k]
             work.subtree[i, 3 + k] = w
         x, y, z = work.subtree[i, 3], work.subtree[i, 4], work.subtree[i, 5]
-        if not x * x + y * y + z * z < 9.8696 or not work.turn_in[i, 0] > 1e-3:  # pi^2
+        if not x * x + y * y + z * z < _HALF_TURN or not work.turn_in[i, 0] > 1e-3:
             return False
     return True
 
@@ -197,7 +134,7 @@ def joints_below_turn(model: Model, nu: Vector, h: float) -> bool:
         t = 0.0
         for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
             t += nu[d] * nu[d]
-        if not h * h * t < (9.8696 if model.body_parent[i] < 0 else 39.4784):
+        if not h * h * t < (_HALF_TURN if model.body_parent[i] < 0 else _WHOLE_TURN):
             return False
     return True
 

@@ -8,9 +8,10 @@ Contacts, dampers and inputs act between nodes and are not part of it.
 
 from __future__ import annotations
 
+from sim.angular_momentum import angular_momentum
 from sim.ball_spring import relative_to_rest
 from sim.coordinates import node_poses
-from sim.dynamics import angular_momentum, world_inertia
+from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work

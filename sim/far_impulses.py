@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.far_bounds import NEARER, bound_changes, keep_motion
+from sim.far_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.friction import contact_impulse, start_contact
-from sim.model import Law, Matrix, Model, Work
-from sim.rotation import Vec3, cross, rotate
+from sim.model import Law, Model, Work
+from sim.rotation import cross, rotate, transposed_times
 from sim.terrain_far import evaluate_on_terrain
 from solvers.jit import kernel
 
 _LINEAR = int(Law.LINEAR)
-_ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
 @kernel
@@ -35,7 +34,7 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
         dw += abs(omega - row[14 + k])
         w += abs(omega)
     arm = model.cluster[c, 4]
-    turn = _ANGLE * dq
+    turn = ANGLE * dq
     if dx + arm * turn > NEARER * row[23]:
         return True
     change = row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)) + row[3] * turn
@@ -55,16 +54,6 @@ def far_impulses(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def _to_body(R: Matrix, i: int, x: float, y: float, z: float) -> Vec3:
-    """R[i]^T (x, y, z)."""
-    return (
-        R[i, 0] * x + R[i, 3] * y + R[i, 6] * z,
-        R[i, 1] * x + R[i, 4] * y + R[i, 7] * z,
-        R[i, 2] * x + R[i, 5] * y + R[i, 8] * z,
-    )
-
-
-@kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     """far[c, 4:24] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
 
@@ -77,12 +66,12 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     f = model.contact_frame[c]
     R = work.rot3
     x, y, z = cross(f[3], f[4], f[5], row[14], row[15], row[16])
-    a0, a1, a2 = _to_body(R, i, x, y, z)
+    a0, a1, a2 = transposed_times(R[i], x, y, z)
     ra = f[0] * x + f[1] * y + f[2] * z
     x, y, z = cross(f[6], f[7], f[8], row[14], row[15], row[16])
-    b0, b1, b2 = _to_body(R, i, x, y, z)
+    b0, b1, b2 = transposed_times(R[i], x, y, z)
     rb = f[0] * x + f[1] * y + f[2] * z
-    n0, n1, n2 = _to_body(R, i, f[0], f[1], f[2])
+    n0, n1, n2 = transposed_times(R[i], f[0], f[1], f[2])
     D = f[0] * row[4] + f[1] * row[5] + f[2] * row[6]
     va = f[3] * row[11] + f[4] * row[12] + f[5] * row[13]
     vb = f[6] * row[11] + f[7] * row[12] + f[8] * row[13]

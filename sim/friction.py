@@ -10,7 +10,7 @@ from __future__ import annotations
 from sim.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
 from sim.contact import contact_rate
 from sim.model import Goal, Law, Model, Work
-from sim.pairs import pair_rate
+from sim.pair_jacobian import pair_rate
 from sim.pyramid import (
     condense_pyramid,
     pyramid_boundary,

@@ -8,12 +8,13 @@ import numpy as np
 
 from sim import bodies, coordinates, runge_kutta
 from sim.bind import bind_smooth
-from sim.calls import BOUND, CONE, REPORT, Calls, Floats, Settings
+from sim.calls import BOUND, CONE, REPORT, Calls, Floats
 from sim.hamilton_gradient import Slopes
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
 from sim.policy import Path, Policy
 from sim.rollout import Linearized
+from sim.settings import Settings
 from sim.tableau import stable, tableau
 from sim.tangents import Tangents
 from solvers.status import Status
@@ -44,7 +45,7 @@ class HighOrder(Calls):
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         xs[0] = x
         knot = runge_kutta.roll(
-            self._table(bind_smooth), self._work(), self.settings.time_step, self._scheme(), us, xs, reports
+            self._table(bind_smooth), self._scratch.table(), self.settings.time_step, self._scheme(), us, xs, reports
         )
         return int(knot), xs, reports, np.zeros((steps, 0, 8))
 
@@ -85,7 +86,7 @@ class HighOrder(Calls):
         still = zs.copy()
         still[..., 3:6] = still[..., 10:] = 0.0
         xs = np.zeros((len(zs), self.nx))
-        coordinates.minimal_states(self._model, self._work(), 1.0, still.reshape(-1, 13), xs)
+        coordinates.minimal_states(self._model, self._scratch.table(), 1.0, still.reshape(-1, 13), xs)
         for x, z in zip(xs, zs, strict=True):
             columns, weighted = self._columns(x)
             rates = np.concatenate([z[:, 3:6], z[:, 10:]], axis=1).ravel()
@@ -131,7 +132,7 @@ class HighOrder(Calls):
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         line = Linearized(xs, us, A, B, x_next, reports)
         h = self.settings.time_step
-        runge_kutta.linearize(self._model, self._work(), h, self._scheme(), substeps, line, self._tangents())
+        runge_kutta.linearize(self._model, self._scratch.table(), h, self._scheme(), substeps, line, self._tangents())
         unsolved = reports[:, 0] != Status.SOLVED
         for array in (A, B, x_next):
             array[unsolved] = 0.0
@@ -160,7 +161,7 @@ class HighOrder(Calls):
         path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
         h = self.settings.time_step
         knot = runge_kutta.closed_loop(
-            self._table(bind_smooth), self._work(), h, self._scheme(), x, policy, alpha, limits, substeps, path
+            self._table(bind_smooth), self._scratch.table(), h, self._scheme(), x, policy, alpha, limits, substeps, path
         )
         return int(knot), path
 

@@ -1,6 +1,7 @@
 """All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
 
-Far contacts (far.py) have no part in its variables and its matrix.
+Their complementarity products are in complementarity.py. Far contacts (far.py) have no part in its variables and its
+matrix.
 """
 
 from __future__ import annotations
@@ -15,15 +16,11 @@ from sim.elimination import subtree_sums
 from sim.far_impulses import add_far_wrenches, far_impulses
 from sim.friction import (
     condense_contact,
-    contact_boundary,
     contact_constant,
     contact_error,
     contact_impulse,
-    contact_products,
-    contact_products_ahead,
     keep_in_cone,
     recover_contact,
-    slip_violation,
     start_contact,
 )
 from sim.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
@@ -35,7 +32,6 @@ from sim.pairs import pair_kinematics
 from sim.pose_jacobians import add_slip_jacobian
 from sim.restitution import subtract_floors
 from sim.terrain_contact import add_frame_matrix
-from solvers.cones import orthant_step
 from solvers.jit import kernel
 from solvers.late import late
 
@@ -177,68 +173,6 @@ def recover_inequalities(model: Model, work: Work, h: float, share: float) -> No
         for c in range(work.near[m, 0], work.near[m, 1]):
             recover_contact(model, work, c, share)
     recover_limits(model, work, h, share)
-
-
-@kernel
-def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
-    """Mean of all complementarity products, kappa where there is none, and their largest distance from kappa."""
-    total = 0.0
-    count = 0.0
-    violation = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            t, n, low, high = contact_products(model, work, c)
-            total += t
-            count += n
-            violation = max(violation, high - kappa, kappa - low)
-    for k in range(model.limit_dof.shape[0]):
-        t = work.bound[k, 0] * work.bound[k, 1]
-        total += t
-        count += 1.0
-        violation = max(violation, abs(t - kappa))
-    return total / count if count > 0.0 else kappa, violation
-
-
-@kernel
-def slip_error(model: Model, work: Work, kappa: float) -> float:
-    """Largest violation of the friction law of the central path of kappa, in units of kappa."""
-    e = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            e = max(e, slip_violation(model, work, c, kappa))
-    return e
-
-
-@kernel
-def products_ahead(model: Model, work: Work, alpha: float) -> float:
-    """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
-    total = 0.0
-    count = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            t, n = contact_products_ahead(model, work, c, alpha)
-            total += t
-            count += n
-    for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
-        total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
-        count += 1.0
-    return total / count if count > 0.0 else work.far_law[0]
-
-
-@kernel
-def boundary_step(model: Model, work: Work) -> float:
-    """Largest step that keeps every cone variable in its cone, or 1e30."""
-    a = 1e30
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            a = min(a, contact_boundary(model, work, c))
-    for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
-        a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
-    return a
 
 
 @kernel

@@ -19,10 +19,10 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 from __future__ import annotations
 
 from sim.central_path import AGAIN, first_attempt, start
+from sim.complementarity import products, slip_error
 from sim.direction import direction, linearize_step
 from sim.far import came_near, choose_far
 from sim.friction import slip_noise
-from sim.inequalities import products, slip_error
 from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work

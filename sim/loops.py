@@ -14,7 +14,7 @@ A loop joint sits on b (the parent) with the frame Q = R_b offset, and holds the
 
 from __future__ import annotations
 
-from sim.coupling import is_loop
+from sim.coupling_rows import is_loop
 from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pair_stiffness import add_wrench_column, point_shift, unit_vector
 from sim.rotation import Vec3, cross, rotate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,10 +14,12 @@ from sim import checks
 from sim.closing import carried
 from sim.collisions import Collision
 from sim.gear import Gear, check_gears
+from sim.naming import name_contacts, name_inputs
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
 from sim.terrain import Terrain
 from sim.touch import Touch, touches
+from sim.tree import check_loops, check_masses, sort_tree
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,11 @@ class Mechanism:
         bodies, tree, loops = carried(f"{call})", self.bodies, tree, loops, driven)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", tree)
-        object.__setattr__(self, "loops", _check_loops(f"{call})", loops, self.bodies, self.joints))
-        bodies, joints = _sort_tree(f"{call})", self.bodies, self.joints)
+        object.__setattr__(self, "loops", check_loops(f"{call})", loops, self.bodies, self.joints))
+        bodies, joints = sort_tree(f"{call})", self.bodies, self.joints)
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
-        _check_masses(f"{call})", bodies, joints)
+        check_masses(f"{call})", bodies, joints)
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
@@ -67,8 +69,8 @@ class Mechanism:
             for name in (c.a, c.b):
                 checks.one_of(f"{call}): body of collision {c.name!r}", name, [*self.body_names, WORLD])
         checks.distinct(f"{call}): collisions", (c.name for c in self.collisions))
-        object.__setattr__(self, "contacts", _name_contacts(f"{call})", self.contacts, self.body_names))
-        object.__setattr__(self, "inputs", self._name_inputs(call))
+        object.__setattr__(self, "contacts", name_contacts(f"{call})", self.contacts, self.body_names))
+        object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
         object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
         object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
 
@@ -170,23 +172,6 @@ class Mechanism:
 
         return with_obstacle(self, shape, bodies, name, **options)
 
-    def _name_inputs(self, call: str) -> tuple[Input, ...]:
-        """The inputs with names, after a look at what they act on."""
-        out = []
-        for part in self.inputs or ():
-            if part.joint is not None:
-                label = checks.one_of(f"{call}, inputs=...): joint", part.joint, self.joint_names)
-                nv = self.joints[self.joint_names.index(label)].nv
-                if not isinstance(part.dof, int | np.integer) or not 0 <= part.dof < nv:
-                    raise ValueError(
-                        f"{call}): Input({label!r}, dof={part.dof!r}): the joint has {nv} degrees of freedom"
-                    )
-                label += f"[{part.dof}]" if nv > 1 else ""
-            else:
-                label = checks.one_of(f"{call}, inputs=...): body", part.body, self.body_names)
-            out.append(_renamed(part, part.name or label))
-        return tuple(_number_repeats(out))
-
     def _coordinates(self, call: str, given: Any) -> tuple[float, ...]:
         """q from a table by joint, or from a vector; quaternions are checked and normalised."""
         q = np.zeros(self.nq)
@@ -225,22 +210,6 @@ def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
     return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
 
 
-def _check_loops(
-    call: str, loops: Sequence[Joint], bodies: Sequence[Body], joints: Sequence[Joint]
-) -> tuple[Joint, ...]:
-    """Joints that close a loop, after a look at their bodies and names."""
-    names = [b.name for b in bodies]
-    for j in loops:
-        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *names])
-        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, names)
-        if j.nv == 6:
-            raise ValueError(f"{call}: joint {j.name!r} closes a loop, but constrains nothing")
-        if j.parent == j.child:
-            raise ValueError(f"{call}: joint {j.name!r} closes a loop from {j.child!r} to itself")
-    checks.distinct(f"{call}: joints", (j.name for j in (*joints, *loops)))
-    return tuple(loops)
-
-
 def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
     """The parts as a tuple, each of the expected kind."""
     parts = tuple(given) if isinstance(given, Iterable) else (given,)
@@ -248,98 +217,3 @@ def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
         if not isinstance(part, kind):
             raise ValueError(f"{call}: expected a list of {kind.__name__}, got {part!r}")
     return parts
-
-
-def _sort_tree(
-    call: str, bodies: Sequence[Body], joints: Sequence[Joint]
-) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
-    """Joints with parents before children, otherwise in the given order; bodies in the order of their joints."""
-    if not bodies:
-        raise ValueError(f"{call}: expected at least one body")
-    checks.distinct(f"{call}: bodies", (b.name for b in bodies))
-    checks.distinct(f"{call}: joints", (j.name for j in joints))
-    by_name = {b.name: b for b in bodies}
-    if WORLD in by_name:
-        raise ValueError(f"{call}: a body cannot be named {WORLD!r}")
-    hangs_on: dict[str, str] = {}
-    for j in joints:
-        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *by_name])
-        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, by_name)
-        if j.child in hangs_on:
-            raise ValueError(
-                f"{call}: body {j.child!r} is the child of two joints, {hangs_on[j.child]!r} and {j.name!r}; "
-                "a joint that closes a loop needs close=True"
-            )
-        hangs_on[j.child] = j.name
-    for name in by_name:
-        if name not in hangs_on:
-            raise ValueError(
-                f"{call}: body {name!r} hangs on no joint; a free body needs Joint('floating', None, {name!r})"
-            )
-    placed, order, waiting = {WORLD}, [], list(joints)
-    while waiting:
-        ready = [j for j in waiting if j.parent in placed]
-        if not ready:
-            raise ValueError(f"{call}: joints in a cycle: {', '.join(repr(j.name) for j in waiting)}")
-        # one at a time, so that the given order survives wherever it is a tree order
-        placed.add(ready[0].child)
-        order.append(ready[0])
-        waiting.remove(ready[0])
-    return tuple(by_name[j.child] for j in order), tuple(order)
-
-
-def _check_masses(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
-    """Refuse a body without mass that carries none either and can move: nothing would hold its joint."""
-    carries = {b.name: b.mass > 0.0 for b in bodies}
-    for body, joint in zip(reversed(bodies), reversed(joints), strict=True):
-        if joint.parent in carries:
-            carries[joint.parent] |= carries[body.name]
-        if not carries[body.name]:
-            raise ValueError(f"{call}: body {body.name!r} has no mass, nor has anything that hangs on it")
-
-
-def _renamed(part: Any, name: str) -> Any:
-    """The part under another name; frozen parts are rebuilt without repeating their checks."""
-    if part.name == name:
-        return part
-    out = object.__new__(type(part))
-    for field, value in vars(part).items():
-        object.__setattr__(out, field, value)
-    object.__setattr__(out, "name", name)
-    return out
-
-
-def _number_repeats(parts: Sequence[Any]) -> list[Any]:
-    """Parts of equal name get numbers: foot, foot -> foot_0, foot_1."""
-    names = [p.name for p in parts]
-    counts: dict[str, int] = {}
-    out = []
-    for part in parts:
-        if names.count(part.name) > 1:
-            k = counts.get(part.name, 0)
-            counts[part.name] = k + 1
-            out.append(_renamed(part, f"{part.name}_{k}"))
-        else:
-            out.append(part)
-    return out
-
-
-def _name_contacts(call: str, contacts: Sequence[Contact], bodies: Sequence[str]) -> tuple[Contact, ...]:
-    """The contacts with names, after a look at their bodies."""
-    for c in contacts:
-        checks.one_of(f"{call}: body of contact {c.name!r}" if c.name else f"{call}: contact body", c.body, bodies)
-    checks.distinct(f"{call}: contacts", (c.name for c in contacts if c.name))
-    named = _number_repeats([_renamed(c, c.name or c.body) for c in contacts])
-    checks.distinct(f"{call}: contacts", (c.name for c in named))
-    return tuple(named)
-
-
-def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
-    """The mechanism with another friction or law, of all contacts or by name."""
-    if isinstance(value, Mapping):
-        for name in value:
-            checks.one_of(f"Simulator.replace({field}=...)", name, mech.contact_names)
-        contacts = [replace(c, **{field: value.get(c.name, getattr(c, field))}) for c in mech.contacts]
-    else:
-        contacts = [replace(c, **{field: value}) for c in mech.contacts]
-    return replace(mech, contacts=contacts)

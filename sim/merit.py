@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.complementarity import products, slip_error
 from sim.elimination import project, subtree_sums
 from sim.gears import apply_gears
-from sim.inequalities import apply_inequalities, apply_limits, products, slip_error
+from sim.inequalities import apply_inequalities, apply_limits
 from sim.joints import joint_impulses
 from sim.loops import apply_loops
 from sim.model import Model, Vector, Work

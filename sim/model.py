@@ -45,7 +45,7 @@ class InputKind(IntEnum):
 
 
 class Late(IntEnum):
-    """Kernels called by their address (solvers/late.py), bound by sim/late.py: where each is in `Model.late`."""
+    """Kernels called by their address (solvers/late.py), bound by sim/bind.py: where each is in `Model.late`."""
 
     # what all scenes do, compiled once
     STEP = 0

@@ -21,6 +21,7 @@ bound of the change of their wrenches per displacement, 0 where there is none.
 from __future__ import annotations
 
 from sim.collision.axes import OPEN
+from sim.far_bounds import ANGLE
 from sim.friction import contact_impulse, start_contact
 from sim.model import Late, Model, Options, Work
 from sim.pair_choice import choose_shapes, open_pairs
@@ -30,7 +31,6 @@ from solvers.jit import kernel
 from solvers.late import late
 
 COUPLED = 1e-2  # largest sum of e over the far collisions of a body
-_ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 
 
 @late(Late.ENLIST_PAIRS)
@@ -177,7 +177,7 @@ def _moved(model: Model, work: Work) -> bool:
             d += abs(work.pos3[i, k] - work.far_pose[i, k])
         for k in range(4):
             turn += abs(work.quat3[i, k] - work.far_pose[i, 3 + k])
-        if not d + reach * _ANGLE * turn <= work.pair_far_state[0]:
+        if not d + reach * ANGLE * turn <= work.pair_far_state[0]:
             return True
     return False
 

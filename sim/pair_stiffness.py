@@ -10,7 +10,8 @@ from __future__ import annotations
 from sim.friction import condense_contact, contact_constant, contact_error, contact_impulse
 from sim.model import Goal, Late, Matrix, Model, Vector, Work
 from sim.pair_far import add_far_pairs
-from sim.pairs import add_pair_wrench, is_absent, pair_arm, pair_force, pair_jacobian, shares
+from sim.pair_jacobian import pair_jacobian
+from sim.pairs import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
 from solvers.late import late

@@ -16,7 +16,7 @@ from sim.effects import At, Effect
 from sim.loops import child_point, loop_frame, turned
 from sim.model import Matrix, Model, Vector, Work
 from sim.parameter_effects import add_wrench
-from sim.restitution import gap_wrench
+from sim.restitution_gradient import gap_wrench
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from solvers.jit import kernel
 
@@ -189,7 +189,7 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
 
 @kernel
 def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col: int) -> None:
-    """As `add_bounce_derivatives` (restitution.py): a floor that the motion of one body raises pushes the other."""
+    """As `add_bounce_derivatives`: a floor that the motion of one body raises pushes the other."""
     c = model.contact_height.shape[0] + j
     b = work.bounce[c]
     rise = b[1] * _dot(b[2:8], at.twists[0]) + (1.0 - b[1]) * _dot(b[8:14], at.twists[3])

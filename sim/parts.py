@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.inertia import inertia_of
+from sim.joint_settings import cone_of, limits_of, per_dof
 from sim.polytope import Polytope
 from sim.shapes import Shape, Solid
 from sim.terrain import Terrain
@@ -59,34 +61,7 @@ class Body:
         if self.shape is not None and not isinstance(self.shape, Solid):
             known = "Sphere, Box, Cylinder, Capsule or Polytope"
             raise ValueError(f"{call}, shape=...): expected {known}, got {self.shape!r}")
-        object.__setattr__(self, "inertia", _inertia(call, self))
-
-
-def _inertia(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
-    """The inertia as rows, after the tests that every rigid body passes."""
-    if body.mass == 0.0:
-        return ((0.0, 0.0, 0.0),) * 3
-    if body.inertia is None:
-        if body.shape is None:
-            raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
-        if np.any(np.asarray(body.shape.center)):
-            raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
-        matrix = body.shape.inertia(body.mass)
-    else:
-        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
-        matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
-    if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * np.abs(matrix).max()):
-        raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
-    matrix = 0.5 * (matrix + matrix.T)
-    a, b, c = np.linalg.eigvalsh(matrix)
-    if a <= 0.0:
-        raise ValueError(f"{call}, inertia=...): not positive definite, its principal moments are {a:g}, {b:g}, {c:g}")
-    if c > (a + b) * (1 + 1e-6):
-        raise ValueError(
-            f"{call}, inertia=...): no rigid body has principal moments {a:g}, {b:g}, {c:g}: "
-            "the largest exceeds the sum of the others"
-        )
-    return tuple(tuple(float(x) for x in row) for row in matrix)
+        object.__setattr__(self, "inertia", inertia_of(call, self))
 
 
 @dataclass(frozen=True)
@@ -134,9 +109,9 @@ class Joint:
         object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
         for field in ("spring", "damper", "rest", "armature"):
-            object.__setattr__(self, field, self._per_dof(call, field))
-        object.__setattr__(self, "limits", self._limits(call))
-        self._check_cone(f"{call}, cone=...)")
+            object.__setattr__(self, field, per_dof(call, self, field))
+        object.__setattr__(self, "limits", limits_of(f"{call}, limits=...)", self))
+        object.__setattr__(self, "cone", cone_of(f"{call}, cone=...)", self))
 
     @property
     def ntrans(self) -> int:
@@ -157,72 +132,6 @@ class Joint:
     def nq(self) -> int:
         """Number of coordinates: one per degree of freedom, four for three rotations."""
         return self.nv + (self.nrot == 3)
-
-    def _per_dof(self, call: str, field: str) -> tuple[float, ...]:
-        """One value per degree of freedom."""
-        call, value = f"{call}, {field}=...)", getattr(self, field)
-        if np.ndim(value) == 0:
-            values = (checks.number(call, value),) * self.nv
-            if field == "rest" and self.nrot == 3 and any(values):
-                raise ValueError(f"{call}: expected {self.nv} numbers, the last three a rotation vector, got {value!r}")
-        else:
-            values = checks.vector(call, value, self.nv)
-        if field != "rest" and any(x < 0.0 for x in values):
-            raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
-        if field == "armature" and self.nrot == 3 and any(values[-3:]):
-            raise ValueError(f"{call}: the rotations of a quaternion joint have none, got {value!r}")
-        if field == "spring" and self.nrot == 3 and len(set(values[-3:])) > 1:
-            raise ValueError(
-                f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}"
-            )
-        return values
-
-    def _limits(self, call: str) -> tuple[tuple[float, float], ...]:
-        """One (lo, hi) per degree of freedom, infinite where there is none."""
-        call = f"{call}, limits=...)"
-        free = (-np.inf, np.inf)
-        given = self.limits
-        if given is None:
-            return (free,) * self.nv
-        if (
-            len(given) == 2
-            and all(np.ndim(x) == 0 for x in given)
-            and (self.nv == 1 or any(x is not None for x in given))
-        ):
-            given = (given,)
-        if len(given) != self.nv:
-            raise ValueError(f"{call}: expected {self.nv} pairs (lo, hi), one per degree of freedom, got {len(given)}")
-        out = []
-        for dof, pair in enumerate(given):
-            lo, hi = _bounds(call, free if pair is None else pair)
-            if self.nrot == 3 and dof >= self.ntrans and (lo, hi) != free:
-                raise ValueError(
-                    f"{call}: the three rotations of a {self.kind} joint have no bounds; cone=... limits them"
-                )
-            out.append((lo, hi))
-        return tuple(out)
-
-    def _check_cone(self, call: str) -> None:
-        """An angle between 0 and pi, on kinds with three rotations."""
-        if self.cone is None:
-            return
-        if self.nrot != 3:
-            raise ValueError(f"{call}: a {self.kind} joint has no three rotations to limit; see limits=...")
-        angle = checks.number(call, self.cone, above=0.0)
-        if angle > 3.1:
-            raise ValueError(f"{call}: expected an angle below 3.1 rad, got {angle:g}")
-        object.__setattr__(self, "cone", angle)
-
-
-def _bounds(call: str, pair: Any) -> tuple[float, float]:
-    """(lo, hi) with lo < hi; None stands for no bound."""
-    try:
-        lo, hi = (float(x) if x is not None else s * np.inf for x, s in zip(pair, (-1, 1), strict=True))
-    except (TypeError, ValueError):
-        raise ValueError(f"{call}: expected a pair (lo, hi), got {pair!r}") from None
-    if not lo < hi or lo == np.inf or hi == -np.inf:
-        raise ValueError(f"{call}: expected lo < hi, got ({lo:g}, {hi:g})")
-    return lo, hi
 
 
 @dataclass(frozen=True)
@@ -255,7 +164,7 @@ class Contact:
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
         object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
         object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
-        object.__setattr__(self, "restitution", share(f"{call}, restitution=...)", self.restitution))
+        object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
         if self.terrain is not None:
             self._put_on(f"{call}, terrain=...)", self.terrain)
 
@@ -285,14 +194,6 @@ class Contact:
         if self.terrain is None:
             return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
         return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])
-
-
-def share(call: str, value: Any) -> float:
-    """A number from 0 to 1."""
-    share = checks.number(call, value, at_least=0.0)
-    if share > 1.0:
-        raise ValueError(f"{call}: expected a number from 0 to 1, got {share:g}")
-    return share
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ A1   d/d(pose 1): the incoming momentum
 
 from __future__ import annotations
 
-from sim.dynamics import angular_momentum, angular_momentum_jacobian, body_jacobian
+from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
+from sim.dynamics import body_jacobian
 from sim.model import Matrix, Model, Vector, Work
-from sim.rotation import Vec3, cross
+from sim.rotation import Vec3, cross, transposed_times
 from solvers.jit import kernel
 
 
@@ -111,9 +112,7 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
         gn = ih * (W[1] * C1[j] + W[2] * C2[j])
         g1 = ih * (W[4] * C1[j] + W[5] * C2[j])
         g2 = ih * (W[7] * C1[j] + W[8] * C2[j])
-        x = F[0] * gn + F[3] * g1 + F[6] * g2
-        y = F[1] * gn + F[4] * g1 + F[7] * g2
-        z = F[2] * gn + F[5] * g1 + F[8] * g2
+        x, y, z = transposed_times(F, gn, g1, g2)
         A[j] -= x
         A[6 + j] -= y
         A[12 + j] -= z

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
 
-from sim.model import Matrix
+from sim.model import Matrix, Vector
 from solvers.jit import kernel
 
 Vec3 = tuple[float, float, float]
@@ -154,3 +154,29 @@ def inverse_right_jacobian(x: float, y: float, z: float) -> Mat3:
         e * y * z + 0.5 * x,
         1 - e * (x * x + y * y),
     )
+
+
+@kernel
+def times(M: Mat3, x: float, y: float, z: float) -> Vec3:
+    """M (x, y, z)"""
+    return (
+        M[0] * x + M[1] * y + M[2] * z,
+        M[3] * x + M[4] * y + M[5] * z,
+        M[6] * x + M[7] * y + M[8] * z,
+    )
+
+
+@kernel
+def transposed_times(M: Mat3 | Vector, x: float, y: float, z: float) -> Vec3:
+    """M^T (x, y, z): with the rows of M for a frame, x times the first one, + y the second, + z the third."""
+    return (
+        M[0] * x + M[3] * y + M[6] * z,
+        M[1] * x + M[4] * y + M[7] * z,
+        M[2] * x + M[5] * y + M[8] * z,
+    )
+
+
+@kernel
+def rows_of(R: Matrix, i: int) -> Mat3:
+    """R[i] as a tuple."""
+    return R[i, 0], R[i, 1], R[i, 2], R[i, 3], R[i, 4], R[i, 5], R[i, 6], R[i, 7], R[i, 8]

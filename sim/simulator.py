@@ -11,14 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.calls import Settings
 from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
-from sim.mechanism import Mechanism, with_contacts
+from sim.mechanism import Mechanism
 from sim.reactions import Reactions, reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
+from sim.scene import with_contacts
+from sim.settings import Settings
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics import _turns_below_half, momentum_balance_jacobian, turns
+from sim.dynamics import momentum_balance_jacobian, turns, turns_below_half
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
@@ -106,7 +106,7 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
     error = momentum_error(model, work, h, x, work.nu, work.residual)
     for _ in range(50):
         _turn_back(work)
-        if not _turns_below_half(model, work, h, v):
+        if not turns_below_half(model, work, h, v):
             return _ANGULAR_STEP
         if not error < 1e300:
             return _NOT_FINITE
@@ -122,7 +122,7 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
                 v[d] = work.nu_trial[d] + alpha * work.dnu[d]
             trial = momentum_error(model, work, h, x, work.nu, work.residual)
             _turn_back(work)
-            if trial < error and _turns_below_half(model, work, h, v):
+            if trial < error and turns_below_half(model, work, h, v):
                 break
             alpha *= 0.5
         if alpha <= 1e-6:

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
-from sim.calls import Calls, Settings
+from sim.calls import Calls
 from sim.closure import Closure, LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.results import SimulationError
+from sim.settings import Settings
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]

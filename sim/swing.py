@@ -15,7 +15,7 @@ from __future__ import annotations
 from math import cos, sqrt
 
 from sim.model import Late, Model, Vector, Work
-from sim.rotation import Quat, Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients
+from sim.rotation import Quat, Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients, transposed_times
 from solvers.jit import kernel
 from solvers.late import late
 
@@ -89,10 +89,7 @@ def swing_curvature(model: Model, work: Work, i: int, p1: float, p2: float) -> N
     f = work.subtree[i]
     x, y, z = cross(x, y, z, f[0], f[1], f[2])
     x, y, z = f[3] - x, f[4] - y, f[5] - z
-    R = work.rot2[i]
-    m0 = R[0] * x + R[3] * y + R[6] * z
-    m1 = R[1] * x + R[4] * y + R[7] * z
-    m2 = R[2] * x + R[5] * y + R[8] * z
+    m0, m1, m2 = transposed_times(work.rot2[i], x, y, z)
     d = model.body_vadr[i + 1] - 2
     t = swing(model, i, p1, p2)
     V = model.joint_swing_axes[i]

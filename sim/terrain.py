@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.spline import spline, spline_coefficients
 
 Floats = NDArray[np.float64]
 
@@ -190,49 +191,6 @@ def _lines(call: str, given: ArrayLike) -> Floats:
     if not np.allclose(np.diff(lines), lines[-1] - lines[-2] if len(lines) > 1 else 0.0, rtol=1e-6, atol=0.0):
         raise ValueError(f"{call}: expected equally spaced grid lines, as of np.linspace")
     return lines
-
-
-def spline_coefficients(heights: ArrayLike) -> Floats:
-    """(nx + 2, ny + 2) coefficients of the cubic B-spline through heights (nx, ny); not-a-knot at the edges."""
-    out = np.asarray(heights, dtype=np.float64)
-    for _ in range(2):
-        out = np.linalg.solve(_collocation(len(out)), np.concatenate([out, np.zeros((2, out.shape[1]))])).T
-    return np.ascontiguousarray(out)
-
-
-def _collocation(n: int) -> Floats:
-    """(n + 2, n + 2): values at the grid lines, then the conditions at both edges.
-
-    Four lines and more: no jump of the third derivative at the second line. Fewer: as straight as they can be.
-    """
-    A = np.zeros((n + 2, n + 2))
-    for k in range(n):
-        A[k, k : k + 3] = 1 / 6, 4 / 6, 1 / 6
-    end = [1.0, -4.0, 6.0, -4.0, 1.0] if n >= 4 else [1.0, -2.0, 1.0] if n > 1 else [1.0, -1.0]
-    A[n, : len(end)] = end
-    A[n + 1, n + 2 - len(end) :] = end
-    return A
-
-
-def spline(coefficients: Floats, s: Floats, t: Floats) -> tuple[Floats, Floats, Floats]:
-    """(F, F_s, F_t) of a cubic B-spline at grid coordinates; see height_field.py."""
-    bs, ds, rows = _basis(s, coefficients.shape[0])
-    bt, dt, columns = _basis(t, coefficients.shape[1])
-    c = coefficients[rows[..., :, None], columns[..., None, :]]
-    pick = "...i,...ij,...j->..."
-    return np.einsum(pick, bs, c, bt), np.einsum(pick, ds, c, bt), np.einsum(pick, bs, c, dt)
-
-
-def _basis(s: Floats, count: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Weights of four coefficients, their derivatives, and which coefficients they are."""
-    s = np.clip(s, -4.0, count + 2.0)
-    i = np.floor(s)
-    t = s - i
-    u = 1.0 - t
-    b = [u**3 / 6, (4 + t * t * (3 * t - 6)) / 6, (4 + u * u * (3 * u - 6)) / 6, t**3 / 6]
-    d = [-0.5 * u * u, t * (1.5 * t - 2), -u * (1.5 * u - 2), 0.5 * t * t]
-    index = np.clip(i.astype(np.int64)[..., None] + np.arange(4), 0, count - 1)
-    return np.stack(b, axis=-1), np.stack(d, axis=-1), index
 
 
 def _raised(coefficients: Floats, spacing: Floats, here: Floats, radius: float) -> Floats:

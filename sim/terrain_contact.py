@@ -19,7 +19,7 @@ from math import sqrt
 
 from sim.height_field import height_field
 from sim.model import Late, Matrix, Model, Vector, Work
-from sim.rotation import Vec3, cross, rotate
+from sim.rotation import Vec3, cross, rotate, transposed_times
 from solvers.jit import kernel
 from solvers.late import late
 
@@ -132,9 +132,7 @@ def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2:
     F = work.contact_frame[c]
     W = work.contact_turn[c]
     A = out[i]
-    x = F[0] * fn + F[3] * f1 + F[6] * f2
-    y = F[1] * fn + F[4] * f1 + F[7] * f2
-    z = F[2] * fn + F[5] * f1 + F[8] * f2
+    x, y, z = transposed_times(F, fn, f1, f2)
     rho = model.contact_radius[c]
     ax = work.pos2[i, 0] - work.origin[0] + k[3]
     ay = work.pos2[i, 1] - work.origin[1] + k[4]

@@ -23,8 +23,6 @@ PACKAGES = ("dojo_opt", "sim", "solvers")
 HOME = Path(dojo.__file__).resolve().parent.parent  # where the three packages are: the source tree, or an installation
 ROOT = Path(__file__).resolve().parent.parent
 
-# small kernels that are called with literals and with variables, or with rows and with slices: cheap to compile twice
-
 
 def python(program: str, *, cwd: Path | None = None, home: Path = HOME, **environment: str) -> str:
     """Output of `program` in a new process that finds the packages below `home`."""
@@ -66,6 +64,7 @@ def test_every_public_name_exists() -> None:
     for name in dojo.__all__:
         assert getattr(dojo, name) is not None, name
     assert set(dojo.__all__) <= set(dir(dojo))
+    assert dojo.__all__ == sorted(dojo._HOME) == list(dojo._HOME)
 
 
 def test_ilqr_stays_a_function_after_its_module_was_imported() -> None:
@@ -175,7 +174,7 @@ print(json.dumps(compiled_signatures()))
 """
     kernels = json.loads(python(program))
     assert any(name.startswith("sim.") for name in kernels)
-    hard = "contact friction interior_point inequalities limits central_path direction line_search merit".split()
+    hard = "contact complementarity friction interior_point inequalities limits central_path direction line_search merit".split()
     foreign = ("solvers.cones", *(f"sim.{name}" for name in hard))
     assert [name for name in kernels if name.startswith(foreign)] == []
 
@@ -325,7 +324,7 @@ def test_files_stay_readable() -> None:
     for package in PACKAGES:
         for file in (HOME / package).rglob("*.py"):
             length = len(file.read_text().splitlines())
-            if length > 350:
+            if length > 300 and file.name != "model.py":  # a table of fields
                 long[file.name] = length
     assert not long
 

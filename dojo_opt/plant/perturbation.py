@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.mechanism import Mechanism, with_contacts
+from sim.mechanism import Mechanism
 from sim.parts import Input
+from sim.scene import with_contacts
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -120,7 +120,7 @@ def _body(model: Model, body: int, hinges: bool) -> list[str]:
     return [*lines, "</body>"]
 
 
-def _is_free(model: Model, body: int) -> bool:
+def is_free(model: Model, body: int) -> bool:
     """Whether joint `body` is what MuJoCo calls a free joint: q is the pose of the body itself in the world."""
     at_origin = not np.any(model.joint_parent_point[body]) and not np.any(model.joint_child_point[body])
     straight = np.array_equal(model.joint_trans_axes[body], np.eye(3).ravel()) and model.joint_offset[body, 0] == 1.0
@@ -130,7 +130,7 @@ def _is_free(model: Model, body: int) -> bool:
 
 def _joints(model: Model, body: int, hinges: bool) -> list[str]:
     """<joint> per degree of freedom; a quaternion is one ball, a floating base one free joint."""
-    if _is_free(model, body):
+    if is_free(model, body):
         return [_tag("freejoint", {"name": f"free{body}"})]
     first = int(model.body_vadr[body])
     ntrans, nrot = int(model.joint_ntrans[body]), int(model.joint_nrot[body])
@@ -189,7 +189,7 @@ def _actuator(model: Model, k: int) -> str:
         body = int(model.dof_body[index])
         within = index - int(model.body_vadr[body])
         ntrans = int(model.joint_ntrans[body])
-        if _is_free(model, body):
+        if is_free(model, body):
             return _tag("motor", {"joint": f"free{body}", "gear": _numbers(np.eye(6)[within])})
         if within < ntrans or model.joint_nrot[body] < 3:
             return _tag("motor", {"joint": f"joint{index}", "gear": "1"})

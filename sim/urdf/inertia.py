@@ -33,9 +33,6 @@ class RigidInertia(NamedTuple):
         return self.mass == 0.0 and not self.inertia.any()
 
 
-NOTHING = RigidInertia(0.0, np.zeros(3), np.zeros((3, 3)))
-
-
 def combined(parts: list[RigidInertia]) -> RigidInertia:
     """One rigid body out of several in the same frame.
 

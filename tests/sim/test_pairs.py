@@ -2,47 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations, product
+from types import ModuleType
 
 import numpy as np
 import pytest
+from benchmark import loaded
 
 import dojo_opt as dojo
+from dojo_opt.report.stability.stacks import tower
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Contact, Joint
 from sim.polytope import Polytope
-from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
+from sim.shapes import Box, Cylinder, HalfSpace, Sphere, String
 
-SHAPES: dict[str, Solid] = {
-    "sphere": Sphere(0.2),
-    "capsule": Capsule(0.15, 0.4),
-    "box": Box(0.4, 0.3, 0.5),
-}
+SHAPES = ("sphere", "capsule", "box")
 
 
-def two(a: Solid, b: Solid, friction: float = 0.5, law: str = "nonlinear") -> Mechanism:
-    """Two free bodies without gravity."""
-    bodies = [Body("a", 1.0, (0.02, 0.03, 0.04), shape=a), Body("b", 2.0, (0.05, 0.06, 0.07), shape=b)]
-    joints = [Joint("floating", None, "a"), Joint("floating", None, "b")]
-    return Mechanism(bodies, joints, collisions=[Collision("a", "b", friction=friction, law=law)], gravity=(0, 0, 0))
+@pytest.fixture(scope="module")
+def bench() -> Iterator[ModuleType]:
+    """Two bodies that collide, and random motions of theirs towards one another."""
+    yield from loaded("collisions")
 
 
-def approaching(sim: dojo.Simulator, seed: int, distance: float) -> np.ndarray:
-    """Random poses about so far apart, moving towards one another and spinning."""
-    rng = np.random.default_rng(seed)
-    n = rng.normal(size=3)
-    n /= np.linalg.norm(n)
-    turns = [q / np.linalg.norm(q) for q in rng.normal(size=(2, 4))]
-    v = rng.normal(size=12)
-    v[:3] -= 2.0 * n
-    v[6:9] += 2.0 * n
-    return np.concatenate([distance * n, turns[0], np.zeros(3), turns[1], v])
-
-
-def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:
-    """The state of a motion towards one another when they are about to touch."""
-    x = approaching(sim, seed, 1.0)
+def touching(sim: dojo.Simulator, x: np.ndarray) -> np.ndarray:
+    """The state of a motion from x when the bodies are about to touch."""
     for _ in range(60):
         r = sim.step(x)
         assert r.success, r.message
@@ -54,11 +40,11 @@ def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("b", SHAPES)
 @pytest.mark.parametrize("a", SHAPES)
-def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None:
-    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01, tolerance=1e-11)
+def test_collisions_conserve_momentum_and_do_not_overlap(bench: ModuleType, a: str, b: str) -> None:
+    sim = dojo.Simulator(bench.scene(a, b), time_step=0.01, tolerance=1e-11)
     hit = 0
     for seed in range(4):
-        x = approaching(sim, seed, 1.0)
+        x = bench.start(seed)
         p0, L0 = sim.momentum(x)
         t = sim.rollout(x, np.zeros((60, sim.nu)))
         assert t.success, t.message
@@ -80,13 +66,13 @@ def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None
         ("capsule", "capsule", [0, 1]),
     ],
 )
-def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None:
+def test_corners_that_slide_over_edges(bench: ModuleType, a: str, b: str, seeds: list[int]) -> None:
     """Motions (benchmarks/collisions.py) whose steps have no solution, or one that gains energy, when the elements in
     contact follow the iterates.
     """
-    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
+    sim = dojo.Simulator(bench.scene(a, b), time_step=0.01)
     for seed in seeds:
-        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
+        t = sim.rollout(bench.start(seed), np.zeros((60, sim.nu)))
         assert t.success, (seed, t.message)
         assert np.diff(sim.energy(t.x)).max() < 1e-2, seed  # kappa pushes from afar
         assert t.contacts.gap.min() > 0.0
@@ -94,10 +80,10 @@ def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None
 
 @pytest.mark.parametrize("obstacle", ["sphere", "capsule", "cylinder", "box"])
 @pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
-def test_obstacles_of_every_shape(shape: str, obstacle: str) -> None:
+def test_obstacles_of_every_shape(bench: ModuleType, shape: str, obstacle: str) -> None:
     """In either order of the two; a body dropped on an obstacle stays outside, and has the right derivatives."""
-    fixed = Cylinder(0.3, 0.4) if obstacle == "cylinder" else SHAPES[obstacle]
-    body, joint = Body("a", 1.0, (0.02, 0.03, 0.04), shape=SHAPES[shape]), Joint("floating", None, "a")
+    fixed = Cylinder(0.3, 0.4) if obstacle == "cylinder" else bench.SHAPES[obstacle]
+    body, joint = Body("a", 1.0, (0.02, 0.03, 0.04), shape=bench.SHAPES[shape]), Joint("floating", None, "a")
     forward = Collision("a", shape_b=fixed, friction=0.4)
     backward = Collision("world", "a", shape_a=fixed, friction=0.4)
     if obstacle == "cylinder" and shape != "sphere":
@@ -171,11 +157,12 @@ def test_a_far_pair_comes_near_within_a_step() -> None:
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4])
 @pytest.mark.parametrize(("law", "friction"), [("nonlinear", 0.5), ("linear", 0.5), ("impact", 0.0)])
 @pytest.mark.parametrize("pair", [("sphere", "sphere"), ("sphere", "box"), ("capsule", "capsule"), ("box", "box")])
-def test_derivatives_of_a_step_with_a_collision(pair: tuple[str, str], law: str, friction: float, kappa: float) -> None:
-    sim = dojo.Simulator(
-        two(SHAPES[pair[0]], SHAPES[pair[1]], friction, law), time_step=0.01, kappa=kappa, tolerance=1e-12
-    )
-    x = touching(sim, 3 if pair[0] != "box" else 5)
+def test_derivatives_of_a_step_with_a_collision(
+    bench: ModuleType, pair: tuple[str, str], law: str, friction: float, kappa: float
+) -> None:
+    mech = bench.scene(*pair, friction=friction, law=law)
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=kappa, tolerance=1e-12)
+    x = touching(sim, bench.start(3 if pair[0] != "box" else 5))
     A, _ = sim.linearize(x)
     best = np.inf
     for e in (1e-5, 1e-6):  # the curvature of a contact and rounding each want another step
@@ -188,27 +175,16 @@ def test_derivatives_of_a_step_with_a_collision(pair: tuple[str, str], law: str,
     assert best < 1e-6
 
 
-def tower(count: int, shape: Solid, masses: list[float], kind: str = "floating") -> Mechanism:
-    """Bodies of height 0.2 on top of one another, the lowest on the ground."""
-    names = [f"b{k}" for k in range(count)]
-    bodies = [Body(n, m, shape=shape) for n, m in zip(names, masses, strict=True)]
-    heights = [0.1 + 0.2 * k + 1e-4 * (k + 1) for k in range(count)]
-    neutral = {n: [0, 0, z, 1, 0, 0, 0] if kind == "floating" else [z] for n, z in zip(names, heights, strict=True)}
-    pairs = [Collision(a, b) for a, b in zip(names[1:], names[:-1], strict=True)]
-    ground = Collision(names[0], shape_b=HalfSpace())
-    return Mechanism(bodies, [Joint(kind, None, n) for n in names], collisions=[ground, *pairs], neutral=neutral)
-
-
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
 def test_heavy_balls_rest_on_light_ones(ratio: float) -> None:
-    sim = dojo.Simulator(tower(2, Sphere(0.1), [1.0, ratio], "prismatic"), time_step=0.01)
+    sim = dojo.Simulator(tower(Sphere(0.1), [1.0, ratio], "prismatic"), time_step=0.01)
     t = sim.rollout(sim.neutral(), np.zeros((200, sim.nu)))
     assert t.success, t.message
     assert t.contacts.gap.min() > 0.0 and t.x[-1, 1] == pytest.approx(0.3, abs=1e-6)
 
 
 def test_a_stack_of_boxes_stands() -> None:
-    sim = dojo.Simulator(tower(4, Box(0.2, 0.2, 0.2), [1.0] * 4), time_step=0.01)
+    sim = dojo.Simulator(tower(Box(0.2, 0.2, 0.2), [1.0] * 4), time_step=0.01)
     t = sim.rollout(sim.neutral(), np.zeros((100, sim.nu)))
     assert t.success, t.message
     centres = sim.maximal(t.x[-1])[:, :3]
@@ -216,7 +192,7 @@ def test_a_stack_of_boxes_stands() -> None:
     load = t.contacts.force[-1, :, 2]
     names = sim.mechanism.contact_names
     for k in range(4):
-        below = sum(f for f, name in zip(load, names, strict=True) if name.startswith(f"b{k}-"))
+        below = sum(f for f, name in zip(load, names, strict=True) if name.startswith(f"body{k}-"))
         assert abs(below) == pytest.approx(9.81 * (4 - k), rel=1e-3)  # Newton's third law, whoever comes first
 
 
@@ -233,10 +209,10 @@ def test_the_ground_as_a_collision_is_the_ground_as_a_contact() -> None:
     np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-5)
 
 
-def test_a_polytope_falls_as_the_box_that_it_is() -> None:
+def test_a_polytope_falls_as_the_box_that_it_is(bench: ModuleType) -> None:
     corners = np.array(list(product((-0.2, 0.2), (-0.15, 0.15), (-0.25, 0.25))))
     runs = []
-    for shape in (SHAPES["box"], Polytope(corners)):
+    for shape in (bench.SHAPES["box"], Polytope(corners)):
         slope = HalfSpace(orientation=(np.cos(0.05), 0.0, np.sin(0.05), 0.0))
         mech = Mechanism([Body("a", 1.0, shape=shape)], [Joint("floating", None, "a")], collisions=[
             Collision("a", shape_b=slope, friction=0.3)])  # fmt: skip

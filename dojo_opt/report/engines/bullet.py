@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.report.engines import bullet_scene
 from dojo_opt.report.engines.bullet_scene import World
 from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
-from dojo_opt.report.mujoco_scene import _is_free
+from dojo_opt.report.mujoco_scene import is_free
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Model
 from sim.simulator import Simulator
@@ -164,7 +164,7 @@ def write(world: World, model: Model, x: Floats) -> None:
     for body, (multibody, link) in enumerate(world.links):
         q = x[model.body_qadr[body] : model.body_qadr[body + 1]]
         v = x[nq + model.body_vadr[body] : nq + model.body_vadr[body + 1]]
-        if _is_free(model, body):
+        if is_free(model, body):
             turn = np.roll(q[3:], -1)
             local = bullet.getDynamicsInfo(multibody, -1, **here)[4]
             inertial = bullet.multiplyTransforms((0, 0, 0), turn.tolist(), (0, 0, 0), local)[1]
@@ -184,7 +184,7 @@ def read(world: World, model: Model) -> Floats:
     q: list[float] = []
     v: list[float] = []
     for body, (multibody, link) in enumerate(world.links):
-        if _is_free(model, body):
+        if is_free(model, body):
             position, turn = _frame(world, body)
             linear, angular = bullet.getBaseVelocity(multibody, **here)
             q += [*position, turn[3], *turn[:3]]

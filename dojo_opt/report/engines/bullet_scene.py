@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dojo_opt.report.mujoco_scene import POINT_RADIUS, _is_free
+from dojo_opt.report.mujoco_scene import POINT_RADIUS, is_free
 from sim.model import InputKind, Model
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,7 @@ def check(model: Model) -> None:
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("PyBullet: terrain and restitution are not represented")
     several = (model.joint_ntrans > 0) & (model.joint_ntrans + model.joint_nrot > 1)
-    if np.any(several & ~np.array([_is_free(model, i) for i in range(len(several))])):
+    if np.any(several & ~np.array([is_free(model, i) for i in range(len(several))])):
         raise ValueError("PyBullet: joints with several translations are not represented")
     balls = np.flatnonzero(model.joint_nrot == 3)
     dofs = [int(model.body_vadr[i + 1]) - 1 for i in balls]
@@ -98,7 +98,7 @@ def _tree(world: World, model: Model, root: int) -> None:
     for body in range(root + 1, len(model.body_mass)):
         if model.body_parent[body] in members:
             members.append(body)
-    bullet, free = world.bullet, _is_free(model, root)
+    bullet, free = world.bullet, is_free(model, root)
     flags = bullet.URDF_USE_INERTIA_FROM_FILE
     here = {"physicsClientId": world.client}
     with TemporaryDirectory() as folder:
@@ -144,7 +144,7 @@ def _text(values: Any) -> str:
 
 def _link(model: Model, body: int) -> str:
     """<link> with its inertia along the principal axes and a ball per contact; its frame is at its joint."""
-    at = np.zeros(3) if _is_free(model, body) else model.joint_child_point[body]
+    at = np.zeros(3) if is_free(model, body) else model.joint_child_point[body]
     moments, axes = np.linalg.eigh(model.body_inertia[body].reshape(3, 3))
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] = -axes[:, 0]

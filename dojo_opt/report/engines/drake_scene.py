@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.mujoco_scene import POINT_RADIUS, _is_free
+from dojo_opt.report.mujoco_scene import POINT_RADIUS, is_free
 from sim.model import InputKind, Model
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ def load(model: Model, time_step: float, approximation: str = "") -> Plant:
     plant.mutable_gravity_field().set_gravity_vector(model.gravity)
     count = len(model.body_mass)
     bodies = [plant.AddRigidBody(f"body{i}", _inertia(model, i)) for i in range(count)]
-    scene = Plant(None, plant, bodies, [_is_free(model, i) for i in range(count)])
+    scene = Plant(None, plant, bodies, [is_free(model, i) for i in range(count)])
     for i in range(count):
         scene.joints.append([] if scene.free[i] else _joint(model, scene, i))
     _add_forces(model, scene)

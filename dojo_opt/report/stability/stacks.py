@@ -14,13 +14,16 @@ from sim.shapes import Box, HalfSpace, Shape, Sphere
 EDGE = 0.2  # [m] height of every body
 
 
-def tower(shape: Shape, masses: list[float], kind: str) -> Mechanism:
-    """Bodies on top of one another, the lowest on the ground."""
+def tower(shape: Shape, masses: list[float], kind: str = "floating") -> Mechanism:
+    """Bodies on top of one another, the lowest on the ground, in neutral 0.1 mm apart; on rails when `prismatic`."""
     names = [f"body{k}" for k in range(len(masses))]
+    heights = [EDGE * (0.5 + k) + 1e-4 * (k + 1) for k in range(len(masses))]
+    neutral = {n: [0, 0, z, 1, 0, 0, 0] if kind == "floating" else [z] for n, z in zip(names, heights, strict=True)}
     bodies = [Body(name, mass, shape=shape) for name, mass in zip(names, masses, strict=True)]
     collisions = [Collision(a, b) for a, b in zip(names[1:], names[:-1], strict=True)]
     collisions.append(Collision(names[0], shape_b=HalfSpace()))
-    return Mechanism(bodies, [Joint(kind, None, name) for name in names], collisions=collisions, name="tower")
+    joints = [Joint(kind, None, name) for name in names]
+    return Mechanism(bodies, joints, collisions=collisions, neutral=neutral, name="tower")
 
 
 def out_of_place(mechanism: Mechanism, run: Run) -> float:
@@ -31,14 +34,13 @@ def out_of_place(mechanism: Mechanism, run: Run) -> float:
 
 def stack(count: int, time_step: float) -> Trial:
     """Boxes of 1 kg, set down from 0.1 mm above one another."""
-    mechanism = tower(Box(EDGE, EDGE, EDGE), [1.0] * count, "floating")
-    q = [(0.0, 0.0, EDGE * (0.5 + k) + 1e-4 * (k + 1), 1.0, 0.0, 0.0, 0.0) for k in range(count)]
+    mechanism = tower(Box(EDGE, EDGE, EDGE), [1.0] * count)
     return Trial(
         "stacks",
         f"{count} boxes, 2 s at {1e3 * time_step:g} ms",
         "every box at its place after 2 s (0.1 mm)",
         mechanism,
-        np.ravel(q),
+        np.asarray(mechanism.neutral),
         np.zeros(6 * count),
         time_step,
         2.0,
@@ -52,13 +54,12 @@ def stack(count: int, time_step: float) -> Trial:
 def heavy_on_light(ratio: float, time_step: float) -> Trial:
     """A heavy ball on one of 1 kg, both on a rail."""
     mechanism = tower(Sphere(0.5 * EDGE), [1.0, ratio], "prismatic")
-    q = [EDGE * (0.5 + k) + 1e-4 * (k + 1) for k in range(2)]
     return Trial(
         "stacks",
         f"ball of {ratio:g} kg on one of 1 kg, 2 s at {1e3 * time_step:g} ms",
         "both at their places after 2 s (0.1 mm)",
         mechanism,
-        q,
+        np.asarray(mechanism.neutral),
         np.zeros(2),
         time_step,
         2.0,

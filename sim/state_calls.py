@@ -1,0 +1,101 @@
+"""StateCalls: the kernels about single states, as functions of checked arrays: poses, coordinates, energy, momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import coordinates, coordinates_jacobian, energy, start, state, velocity
+from sim.bind import bind_poses
+from sim.layout import sizes_of, table
+from sim.model import Model, Vector
+from sim.scratch import Scratch
+from sim.settings import Settings
+
+Floats = NDArray[np.float64]
+
+
+class StateCalls:
+    """A packed mechanism, the scratch of its kernels, and what they say of states."""
+
+    def __init__(self, model: Model, settings: Settings) -> None:
+        self.model, self.settings = model, settings
+        self.sizes = sizes_of(model)
+        self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
+        bind_poses(model)
+        self._model = table(model)
+        self._scratch = Scratch(self.sizes, model.contact_frame)
+
+    def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
+        """(status, state) with the velocity v at the node q."""
+        x = np.concatenate([q, v])
+        status = start.start_at(self._model, self._scratch.table(), self.settings.time_step, v, x)
+        return int(status), x
+
+    def node_velocities(self, xs: Floats) -> Floats:
+        """Joint velocities at the node of every row, (n, nv)."""
+        out = np.zeros((len(xs), self.sizes.nv))
+        velocity.node_velocities(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        return out
+
+    def bodies(self, xs: Floats) -> Floats:
+        """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
+        nbody = self.sizes.nbody
+        out = np.zeros((len(xs) * nbody, 13))
+        velocity.body_states(self._model, self._scratch.table(), xs, out)
+        return out.reshape(len(xs), nbody, 13)
+
+    def integrate(self, xs: Floats, dxs: Floats) -> Floats:
+        """x (+) dx of every row."""
+        out = np.zeros_like(xs)
+        state.integrate_states(self._model, xs, dxs, out)
+        return out
+
+    def difference(self, x0s: Floats, x1s: Floats) -> Floats:
+        """x1 (-) x0 of every row."""
+        out = np.zeros((len(x0s), self.ndx))
+        state.state_differences(self._model, x0s, x1s, out)
+        return out
+
+    def normalise(self, xs: Floats, tolerance: float) -> int:
+        """Normalise quaternions in place; see `normalise_quaternions`."""
+        return int(state.normalise_quaternions(self._model, xs, tolerance))
+
+    def maximal(self, xs: Floats, nbody: int) -> Floats:
+        """z of every row, (n, nbody, 13)."""
+        out = np.zeros((len(xs) * nbody, 13))
+        coordinates.maximal_states(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        return out.reshape(len(xs), nbody, 13)
+
+    def minimal(self, zs: Floats) -> Floats:
+        """x of every z, (n, nbody, 13)."""
+        out = np.zeros((len(zs), self.nx))
+        flat = zs.reshape(-1, 13)
+        coordinates.minimal_states(self._model, self._scratch.table(), self.settings.time_step, flat, out)
+        return out
+
+    def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
+        """dz/dx."""
+        out = np.zeros((12 * nbody, self.ndx))
+        h = self.settings.time_step
+        coordinates_jacobian.maximal_jacobian_at(self._model, self._scratch.table(), h, x, out)
+        return out
+
+    def minimal_jacobian(self, z: Floats) -> Floats:
+        """dx/dz."""
+        out = np.zeros((self.ndx, 12 * len(z)))
+        h = self.settings.time_step
+        coordinates_jacobian.minimal_jacobian_at(self._model, self._scratch.table(), h, z, out)
+        return out
+
+    def energies(self, xs: Floats) -> Floats:
+        """(kinetic, potential) energy of every row."""
+        out = np.zeros((len(xs), 2))
+        energy.energies(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        return out
+
+    def momenta(self, xs: Floats) -> Floats:
+        """(linear, angular) momentum of every row."""
+        out = np.zeros((len(xs), 6))
+        energy.momenta(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        return out

@@ -1,0 +1,70 @@
+"""The tree of bodies and joints, parents before children, and the joints that close loops in it: sorted, validated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sim import checks
+from sim.parts import WORLD, Body, Joint
+
+
+def check_loops(
+    call: str, loops: Sequence[Joint], bodies: Sequence[Body], joints: Sequence[Joint]
+) -> tuple[Joint, ...]:
+    """Joints that close a loop, after a look at their bodies and names."""
+    names = [b.name for b in bodies]
+    for j in loops:
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *names])
+        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, names)
+        if j.nv == 6:
+            raise ValueError(f"{call}: joint {j.name!r} closes a loop, but constrains nothing")
+        if j.parent == j.child:
+            raise ValueError(f"{call}: joint {j.name!r} closes a loop from {j.child!r} to itself")
+    checks.distinct(f"{call}: joints", (j.name for j in (*joints, *loops)))
+    return tuple(loops)
+
+
+def sort_tree(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
+    """Joints with parents before children, otherwise in the given order; bodies in the order of their joints."""
+    if not bodies:
+        raise ValueError(f"{call}: expected at least one body")
+    checks.distinct(f"{call}: bodies", (b.name for b in bodies))
+    checks.distinct(f"{call}: joints", (j.name for j in joints))
+    by_name = {b.name: b for b in bodies}
+    if WORLD in by_name:
+        raise ValueError(f"{call}: a body cannot be named {WORLD!r}")
+    hangs_on: dict[str, str] = {}
+    for j in joints:
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *by_name])
+        checks.one_of(f"{call}: child of joint {j.name!r}", j.child, by_name)
+        if j.child in hangs_on:
+            raise ValueError(
+                f"{call}: body {j.child!r} is the child of two joints, {hangs_on[j.child]!r} and {j.name!r}; "
+                "a joint that closes a loop needs close=True"
+            )
+        hangs_on[j.child] = j.name
+    for name in by_name:
+        if name not in hangs_on:
+            raise ValueError(
+                f"{call}: body {name!r} hangs on no joint; a free body needs Joint('floating', None, {name!r})"
+            )
+    placed, order, waiting = {WORLD}, [], list(joints)
+    while waiting:
+        ready = [j for j in waiting if j.parent in placed]
+        if not ready:
+            raise ValueError(f"{call}: joints in a cycle: {', '.join(repr(j.name) for j in waiting)}")
+        # one at a time, so that the given order survives wherever it is a tree order
+        placed.add(ready[0].child)
+        order.append(ready[0])
+        waiting.remove(ready[0])
+    return tuple(by_name[j.child] for j in order), tuple(order)
+
+
+def check_masses(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
+    """Refuse a body without mass that carries none either and can move: nothing would hold its joint."""
+    carries = {b.name: b.mass > 0.0 for b in bodies}
+    for body, joint in zip(reversed(bodies), reversed(joints), strict=True):
+        if joint.parent in carries:
+            carries[joint.parent] |= carries[body.name]
+        if not carries[body.name]:
+            raise ValueError(f"{call}: body {body.name!r} has no mass, nor has anything that hangs on it")
