@@ -13,8 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import dojo_opt as dojo
 
-DURATION = 6.0 if QUICK else 10.0
-GRIP, HELD = 20.0, 1e-3  # force that closes a jaw [N]; share of the relative motion that may be left
+GRIP, HELD, DURATION = 20.0, 1e-3, 3.0 if QUICK else 10.0  # force on a jaw [N], share of the motion left, [s]
 
 bodies = [
     dojo.Body("chaser", 60.0, shape=dojo.Box(0.6, 0.6, 0.6)),
@@ -53,10 +52,9 @@ own = np.einsum("tij,j,tkj,tk->ti", turns[1].as_matrix(), np.diag(mech.bodies[1]
 orbit = own + 12.0 * np.cross(z[:, 1, :3], z[:, 1, 3:6])
 for part, name in ((orbit, "debris"), (angular - orbit, "chaser and jaws"), (angular, "all")):
     bottom.plot(t.time, part[:, 1], label=name)
-bottom.set_title("angular momentum about y [N m s]")
-bottom.set_xlabel("time [s]")
+bottom.set(title="angular momentum about y [N m s]", xlabel="time [s]", xlim=(0.0, 3.0))
 for ax in (top, bottom):
-    ax.legend(loc="center right")
+    ax.legend(loc="upper right")
 assert drift < 1e-9, drift
 assert speed[-1] < HELD * speed[0] and spin[-1] < HELD * spin[0], (speed[-1], spin[-1])
 finish(figure, __file__)
