@@ -75,10 +75,10 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         sizes = model.pair_sizes[j]
         code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
-        if code != 1:  # a choice
+        if code > 1 or code < 0:  # a choice
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-            if code == 0 or g[0] < before[12]:
-                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12], pose[:9], pose[9:])
+            if g[0] < before[12]:
+                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1

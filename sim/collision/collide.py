@@ -111,13 +111,9 @@ def collide_chosen(
 
 
 @kernel
-def instead(
-    kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, R_now: Vector, r_now: Vector
-) -> int:
-    """Elements for a point that has none now, or some that overlapped where the step began, at (R, r); 0 for none."""
-    if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE:
-        return polytope.elements_before(feature, sizes, hull, R, r, R_now, r_now)
-    return 0
+def instead(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is left out."""
+    return polytope.face_towards(feature, sizes, hull, R, r) if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE else 0
 
 
 @inner_kernel

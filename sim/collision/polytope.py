@@ -156,7 +156,7 @@ def two_edges(m: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
             if d < 0.0:
                 if deepest == 1.0:
                     deepest = min(separation(sizes, hull, R, r), 0.5)
-                if deepest > 0.0 or abs(d - deepest) > TIE * abs(deepest):
+                if deepest > 0.0 or d < (1.0 + TIE) * deepest:
                     continue
             if m == 0:
                 return code
@@ -165,12 +165,9 @@ def two_edges(m: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
 
 
 @inner_kernel
-def elements_before(
-    feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, R_now: Vector, r_now: Vector
-) -> int:
-    """Elements of feature `feature` that were apart at a pose (R, r) of shapes that overlap now; 0 where there are none.
-
-    A corner and the face of the other shape that it was highest above, or two edges that crossed.
+def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """The elements of feature `feature` where it is a corner and the face of the other shape that it is highest above;
+    0 where there is none.
     """
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
@@ -182,8 +179,7 @@ def elements_before(
         y = row(hull, ob + 1 + feature - na)
         face, _ = highest_face(hull, oa, to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])))
         return 2 + face - oa if face > 0 else 0
-    code = two_edges(feature - na - nb, sizes, hull, R, r)
-    return code if code != 0 and separation(sizes, hull, R_now, r_now) < sizes[1] + sizes[5] else 0
+    return 0
 
 
 @inner_kernel
