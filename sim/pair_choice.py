@@ -13,8 +13,7 @@ energy. (Shapes that overlap at the beginning have no others; they are pushed ou
 from __future__ import annotations
 
 from sim.collision.axes import OPEN
-from sim.collision.collide import arrange, choose, collide_chosen, open_sides
-from sim.collision.witness import absent
+from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
 from sim.model import Late, Model, Work
 from sim.pair_pose import place_shapes
 from solvers.jit import kernel
@@ -79,8 +78,8 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
         if code > 1 or code < 0:  # a choice
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             if g[0] < before[12]:
-                code = 0
-                absent(work.pair_out[j])
+                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
+                collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
 

@@ -110,6 +110,12 @@ def collide_chosen(
         exchange(R, r, out)
 
 
+@kernel
+def instead(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is left out."""
+    return polytope.face_towards(feature, sizes, hull, R, r) if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE else 0
+
+
 @inner_kernel
 def _put(kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     if code == 0:

@@ -18,6 +18,7 @@ from sim.collision.witness import (
     FACE,
     LINE,
     NOWHERE,
+    TIE,
     absent,
     along,
     bend_line,
@@ -71,8 +72,8 @@ def element(hull: Matrix, o: int, k: int, x: Vec3) -> tuple[Vec3, Vec3, float, V
 
 
 @inner_kernel
-def _points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3) -> bool:
-    """Whether n, across edge e along u, lies between the normals of its two faces, or nearly so."""
+def _points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3, leaning: float) -> bool:
+    """Whether n, across edge e along u, lies between the normals of its two faces, or `leaning` beyond them."""
     f, g = edge_faces(hull, o, e)
     if f < 0:
         return True
@@ -80,38 +81,104 @@ def _points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3) -> bool:
     s = dot(u, cross(p[0], p[1], p[2], q[0], q[1], q[2]))
     a = dot(u, cross(n[0], n[1], n[2], q[0], q[1], q[2])) / s
     b = dot(u, cross(p[0], p[1], p[2], n[0], n[1], n[2])) / s
-    return a > -_LEANING and b > -_LEANING
+    return a > -leaning and b > -leaning
+
+
+@inner_kernel
+def _edge_axis(
+    i: int, j: int, leaning: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector
+) -> tuple[int, float, bool]:
+    """Code of edge i of a and edge j of b where their normal points out of b and into a, 0 where none does; their
+    distance along it; whether they cross, seen along it.
+    """
+    oa, ob = int(sizes[0]), int(sizes[4])
+    x, u, la = edge(hull, oa, i)
+    y, ub, lb = edge(hull, ob, j)
+    ua = to_b(R, u)
+    c = dot(ua, ub)
+    if 1.0 - c * c < _CROSSING * _CROSSING:
+        return 0, 0.0, False
+    x, y = to_b(R, along(x, 0.5 * la, u)), along(y, 0.5 * lb, ub)
+    x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+    n = edge_normal(ub, ua, 1.0)
+    over = 1
+    if not _points_out(hull, ob, j, ub, n, leaning):
+        over, n = -1, (-n[0], -n[1], -n[2])
+        if not _points_out(hull, ob, j, ub, n, leaning):
+            return 0, 0.0, False
+    w = to_a(R, n)
+    if not _points_out(hull, oa, i, u, (-w[0], -w[1], -w[2]), leaning):
+        return 0, 0.0, False
+    d = dot(n, x) - dot(n, y)
+    return over * (2 + i + _MANY * j), d, on_edges(x, ua, 0.5 * la, y, ub, 0.5 * lb, 0.0)
+
+
+@inner_kernel
+def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
+    """Of the normals of faces and of pairs of edges, the largest distance along one; negative where the two overlap."""
+    oa, ob = int(sizes[0]), int(sizes[4])
+    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    best = -1e300
+    for f in range(ob + 1 + nb + int(hull[ob, 1]), ob + 1 + nb + int(hull[ob, 1]) + int(hull[ob, 2])):
+        least = 1e300
+        for k in range(na):
+            x = to_b(R, row(hull, oa + 1 + k))
+            least = min(least, dot(row(hull, f), (x[0] + r[0], x[1] + r[1], x[2] + r[2])) - hull[f, 3])
+        best = max(best, least)
+    for f in range(oa + 1 + na + int(hull[oa, 1]), oa + 1 + na + int(hull[oa, 1]) + int(hull[oa, 2])):
+        least = 1e300
+        for k in range(nb):
+            y = row(hull, ob + 1 + k)
+            least = min(least, dot(row(hull, f), to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))) - hull[f, 3])
+        best = max(best, least)
+    for i in range(int(hull[oa, 1])):
+        for j in range(int(hull[ob, 1])):
+            code, d, _ = _edge_axis(i, j, 0.0, sizes, hull, R, r)
+            if code != 0:
+                best = max(best, d)
+    return best
 
 
 @inner_kernel
 def two_edges(m: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
-    """The m-th pair of edges that cross with a normal out of b; 0 where there are fewer."""
+    """The m-th pair of edges that cross with a normal out of b; 0 where there are fewer.
+
+    Edges on the far sides of the two cross as well, with a negative distance. Such pairs count only where the shapes
+    overlap, and least along that normal.
+    """
     oa, ob = int(sizes[0]), int(sizes[4])
+    deepest = 1.0  # not known yet
     for i in range(int(hull[oa, 1])):
-        x, u, la = edge(hull, oa, i)
-        mine = along(x, 0.5 * la, u)
-        ua = to_b(R, u)
-        x = to_b(R, mine)
-        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
         for j in range(int(hull[ob, 1])):
-            y, ub, lb = edge(hull, ob, j)
-            y = along(y, 0.5 * lb, ub)
-            c = dot(ua, ub)
-            if 1.0 - c * c < _CROSSING * _CROSSING or not on_edges(x, ua, 0.5 * la, y, ub, 0.5 * lb, 0.0):
+            code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
+            if code == 0 or not crosses:
                 continue
-            n = edge_normal(ub, ua, 1.0)
-            over = 1.0
-            if not _points_out(hull, ob, j, ub, n):
-                over = -1.0
-                n = (-n[0], -n[1], -n[2])
-                if not _points_out(hull, ob, j, ub, n):
+            if d < 0.0:
+                if deepest == 1.0:
+                    deepest = min(separation(sizes, hull, R, r), 0.5)
+                if deepest > 0.0 or d < (1.0 + TIE) * deepest:
                     continue
-            w = to_a(R, n)
-            if not _points_out(hull, oa, i, u, (-w[0], -w[1], -w[2])):
-                continue
             if m == 0:
-                return int(over) * (2 + i + _MANY * j)
+                return code
             m -= 1
+    return 0
+
+
+@inner_kernel
+def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """The elements of feature `feature` where it is a corner and the face of the other shape that it is highest above;
+    0 where there is none.
+    """
+    oa, ob = int(sizes[0]), int(sizes[4])
+    na, nb = int(hull[oa, 0]), int(hull[ob, 0])
+    if feature < na:
+        x = to_b(R, row(hull, oa + 1 + feature))
+        face, _ = highest_face(hull, ob, (x[0] + r[0], x[1] + r[1], x[2] + r[2]))
+        return 2 + face - ob if face > 0 else 0
+    if feature < na + nb:
+        y = row(hull, ob + 1 + feature - na)
+        face, _ = highest_face(hull, oa, to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])))
+        return 2 + face - oa if face > 0 else 0
     return 0
 
 

@@ -170,6 +170,34 @@ def test_an_open_loop_that_cannot_close_is_named_when_a_step_fails() -> None:
         sim.step(np.zeros(4), throw=True)
 
 
+def test_a_loop_that_is_open_at_the_start_closes_in_the_first_step() -> None:
+    """From a state that nobody closed: one that fits is closed by the step, and the start can be closed before it."""
+    sim = dojo.Simulator(fourbar("pin"), time_step=0.01)
+    x = sim.neutral()
+    x[0] += 0.02
+    assert np.abs(sim.loop_gaps(x)["pin"]).max() > 5e-3
+    first = sim.step(x, throw=True)
+    assert np.abs(sim.loop_gaps(first.x)["pin"]).max() < 1e-8
+    assert np.abs(sim.loop_gaps(sim.close(x))["pin"]).max() < 1e-10
+
+
+def test_a_rollout_from_a_loop_that_cannot_close_stops_at_its_first_step() -> None:
+    mech = Mechanism(
+        [Body("a", 1.0, shape=Sphere(0.1)), Body("b", 1.0, shape=Sphere(0.1))],
+        [
+            Joint("revolute", None, "a", child_point=(0.5, 0, 0), axis=Y),
+            Joint("revolute", None, "b", parent_point=(5.0, 0, 0), child_point=(0.5, 0, 0), axis=Y),
+            Joint("spherical", "a", "b", "far", (-0.5, 0, 0), (-0.5, 0, 0), close=True),
+        ],
+    )
+    sim = dojo.Simulator(mech)
+    with pytest.raises(ValueError, match="loop joint 'far' cannot be closed near this state, it is off by"):
+        sim.close(np.zeros(4))
+    t = sim.rollout(np.zeros(4), np.zeros((5, 2)))
+    assert not t.success and t.status != dojo.Status.SOLVED and len(t.x) == 1
+    assert "step 0" in t.message and "far" in t.message
+
+
 def test_what_carries_a_share_has_a_mass() -> None:
     bodies = [Body("a", 1.0, shape=Sphere(0.1)), Body("middle", 0.0), Body("b", 1.0, shape=Sphere(0.1))]
     joints = [

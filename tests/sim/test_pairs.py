@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import combinations, product
-from types import ModuleType
 
 import numpy as np
 import pytest
-from benchmark import loaded
+from encounters import SHAPES, approaching, two
 
 import dojo_opt as dojo
 from dojo_opt.report.stability.stacks import tower
@@ -18,17 +16,10 @@ from sim.parts import Body, Contact, Joint
 from sim.polytope import Polytope
 from sim.shapes import Box, Cylinder, HalfSpace, Sphere, String
 
-SHAPES = ("sphere", "capsule", "box")
 
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[ModuleType]:
-    """Two bodies that collide, and random motions of theirs towards one another."""
-    yield from loaded("collisions")
-
-
-def touching(sim: dojo.Simulator, x: np.ndarray) -> np.ndarray:
-    """The state of a motion from x when the bodies are about to touch."""
+def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:
+    """The state of a motion towards one another when they are about to touch."""
+    x = approaching(sim, seed, 1.0)
     for _ in range(60):
         r = sim.step(x)
         assert r.success, r.message
@@ -40,11 +31,11 @@ def touching(sim: dojo.Simulator, x: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("b", SHAPES)
 @pytest.mark.parametrize("a", SHAPES)
-def test_collisions_conserve_momentum_and_do_not_overlap(bench: ModuleType, a: str, b: str) -> None:
-    sim = dojo.Simulator(bench.scene(a, b), time_step=0.01, tolerance=1e-11)
+def test_collisions_conserve_momentum_and_do_not_overlap(a: str, b: str) -> None:
+    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01, tolerance=1e-11)
     hit = 0
     for seed in range(4):
-        x = bench.start(seed)
+        x = approaching(sim, seed, 1.0)
         p0, L0 = sim.momentum(x)
         t = sim.rollout(x, np.zeros((60, sim.nu)))
         assert t.success, t.message
@@ -66,13 +57,13 @@ def test_collisions_conserve_momentum_and_do_not_overlap(bench: ModuleType, a: s
         ("capsule", "capsule", [0, 1]),
     ],
 )
-def test_corners_that_slide_over_edges(bench: ModuleType, a: str, b: str, seeds: list[int]) -> None:
+def test_corners_that_slide_over_edges(a: str, b: str, seeds: list[int]) -> None:
     """Motions (benchmarks/collisions.py) whose steps have no solution, or one that gains energy, when the elements in
     contact follow the iterates.
     """
-    sim = dojo.Simulator(bench.scene(a, b), time_step=0.01)
+    sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
     for seed in seeds:
-        t = sim.rollout(bench.start(seed), np.zeros((60, sim.nu)))
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
         assert t.success, (seed, t.message)
         assert np.diff(sim.energy(t.x)).max() < 1e-2, seed  # kappa pushes from afar
         assert t.contacts.gap.min() > 0.0
@@ -80,10 +71,10 @@ def test_corners_that_slide_over_edges(bench: ModuleType, a: str, b: str, seeds:
 
 @pytest.mark.parametrize("obstacle", ["sphere", "capsule", "cylinder", "box"])
 @pytest.mark.parametrize("shape", ["sphere", "capsule", "box"])
-def test_obstacles_of_every_shape(bench: ModuleType, shape: str, obstacle: str) -> None:
+def test_obstacles_of_every_shape(shape: str, obstacle: str) -> None:
     """In either order of the two; a body dropped on an obstacle stays outside, and has the right derivatives."""
-    fixed = Cylinder(0.3, 0.4) if obstacle == "cylinder" else bench.SHAPES[obstacle]
-    body, joint = Body("a", 1.0, (0.02, 0.03, 0.04), shape=bench.SHAPES[shape]), Joint("floating", None, "a")
+    fixed = Cylinder(0.3, 0.4) if obstacle == "cylinder" else SHAPES[obstacle]
+    body, joint = Body("a", 1.0, (0.02, 0.03, 0.04), shape=SHAPES[shape]), Joint("floating", None, "a")
     forward = Collision("a", shape_b=fixed, friction=0.4)
     backward = Collision("world", "a", shape_a=fixed, friction=0.4)
     if obstacle == "cylinder" and shape != "sphere":
@@ -157,12 +148,11 @@ def test_a_far_pair_comes_near_within_a_step() -> None:
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4])
 @pytest.mark.parametrize(("law", "friction"), [("nonlinear", 0.5), ("linear", 0.5), ("impact", 0.0)])
 @pytest.mark.parametrize("pair", [("sphere", "sphere"), ("sphere", "box"), ("capsule", "capsule"), ("box", "box")])
-def test_derivatives_of_a_step_with_a_collision(
-    bench: ModuleType, pair: tuple[str, str], law: str, friction: float, kappa: float
-) -> None:
-    mech = bench.scene(*pair, friction=friction, law=law)
-    sim = dojo.Simulator(mech, time_step=0.01, kappa=kappa, tolerance=1e-12)
-    x = touching(sim, bench.start(3 if pair[0] != "box" else 5))
+def test_derivatives_of_a_step_with_a_collision(pair: tuple[str, str], law: str, friction: float, kappa: float) -> None:
+    sim = dojo.Simulator(
+        two(SHAPES[pair[0]], SHAPES[pair[1]], friction, law), time_step=0.01, kappa=kappa, tolerance=1e-12
+    )
+    x = touching(sim, 3 if pair[0] != "box" else 5)
     A, _ = sim.linearize(x)
     best = np.inf
     for e in (1e-5, 1e-6):  # the curvature of a contact and rounding each want another step
@@ -209,10 +199,10 @@ def test_the_ground_as_a_collision_is_the_ground_as_a_contact() -> None:
     np.testing.assert_allclose(runs[0].contacts.impulse, runs[1].contacts.impulse, atol=1e-5)
 
 
-def test_a_polytope_falls_as_the_box_that_it_is(bench: ModuleType) -> None:
+def test_a_polytope_falls_as_the_box_that_it_is() -> None:
     corners = np.array(list(product((-0.2, 0.2), (-0.15, 0.15), (-0.25, 0.25))))
     runs = []
-    for shape in (bench.SHAPES["box"], Polytope(corners)):
+    for shape in (SHAPES["box"], Polytope(corners)):
         slope = HalfSpace(orientation=(np.cos(0.05), 0.0, np.sin(0.05), 0.0))
         mech = Mechanism([Body("a", 1.0, shape=shape)], [Joint("floating", None, "a")], collisions=[
             Collision("a", shape_b=slope, friction=0.3)])  # fmt: skip

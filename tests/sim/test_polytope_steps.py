@@ -1,0 +1,76 @@
+"""Polytopes in motion: steps against every shape are solved, keep momentum, gain no energy; their derivatives."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from encounters import SHAPES, approaching, two
+from jacobians import check_jacobian
+
+import dojo_opt as dojo
+from sim.collisions import Collision
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.polytope import Polytope
+from sim.shapes import Box
+
+ROCK = Polytope.about_centroid(
+    [[0.3, 0, 0], [-0.2, 0.2, -0.1], [-0.2, -0.25, -0.1], [0, 0.05, 0.3], [0.1, 0.2, 0.1], [0.05, -0.2, -0.2]]
+)
+OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
+
+
+@pytest.mark.parametrize("first", [True, False], ids=["rock first", "rock second"])
+@pytest.mark.parametrize("name", OTHERS)
+def test_motions_keep_momentum_and_gain_no_energy(name: str, first: bool) -> None:
+    pair = (ROCK, OTHERS[name]) if first else (OTHERS[name], ROCK)
+    sim = dojo.Simulator(two(*pair), time_step=0.01, kappa=1e-8, tolerance=1e-12)
+    hit = 0
+    for seed in range(12):
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
+        assert t.success, (seed, t.message)
+        for total in sim.momentum(t.x):
+            assert np.ptp(total, axis=0).max() < 1e-9, seed
+        assert np.diff(sim.energy(t.x)).max() < 1e-3, seed  # kappa pushes from afar
+        assert t.contacts.gap.min() > 0.0
+        hit += bool(np.abs(t.contacts.impulse).max() > 0.1)
+    assert hit > 5
+
+
+def moved(sim: dojo.Simulator, after: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Where a step from x leads, seen from `after`."""
+    return sim.difference(sim.step(x, throw=True).x, after)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_derivatives_of_a_step(name: str) -> None:
+    """In the step that hits, and in the one before."""
+    sim = dojo.Simulator(two(ROCK, OTHERS[name]), time_step=0.01, kappa=1e-4, tolerance=1e-12)
+    checked = 0
+    for seed in (0, 1, 3, 4):
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)), throw=True)
+        push = np.abs(t.contacts.impulse).max(axis=(1, 2))
+        if push.max() < 0.1:
+            continue
+        for k in (int(push.argmax()) - 1, int(push.argmax())):
+            A, _ = sim.linearize(t.x[k])
+            check_jacobian(partial(moved, sim, t.x[k + 1]), A, t.x[k], sim.integrate)
+            checked += 1
+    assert checked >= 4
+
+
+def test_a_polytope_rests_on_a_box_as_the_box_that_it_is() -> None:
+    """Lowered onto a table, face on face; then pushed along it below its friction: it stays."""
+    corners = 0.1 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    table = Collision("a", shape_b=Box(1.0, 1.0, 0.2, center=(0, 0, -0.1)), friction=0.5)
+    body = Body("a", 1.0, shape=Polytope(corners))
+    mech = Mechanism([body], [Joint("floating", None, "a")], collisions=[table], gravity=(3.0, 0, -9.81))
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-10)
+    x = sim.neutral()
+    x[2] = 0.105
+    t = sim.rollout(x, np.zeros((100, sim.nu)), throw=True)
+    np.testing.assert_allclose(t.x[-1, 2], 0.1, atol=1e-6)
+    np.testing.assert_allclose(t.x[-1, sim.nq :], 0.0, atol=1e-4)
+    np.testing.assert_allclose(t.contacts.force[-1].sum(axis=0), [-3.0, 0.0, 9.81], atol=1e-4)
