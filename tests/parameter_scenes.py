@@ -7,10 +7,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from linkage import fourbar
 from naive import rotation as rot
 from scenes import chain, gaps, limited, random_state
 
 import dojo_opt as dojo
+from sim.gear import Gear
 from sim.parameters import KINDS
 
 H = 0.02
@@ -114,6 +116,55 @@ def _loop(kind: str, tree: str = "spherical") -> Case:
     return Case(sim, sim.close(x), np.zeros(sim.nu))
 
 
+def _acting() -> Case:
+    """A floating ring, its closing joint with springs, dampers and limits: it divides its child in two."""
+    plain = _loop("spherical").sim.mechanism
+    ends = plain.loops[0].parent_point, plain.loops[0].child_point
+    action = {"spring": (50.0, 2.0), "damper": 0.1, "limits": ((-0.1, 0.1), None)}
+    last = dojo.Joint("cylindrical", "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True, **action)
+    mech = dataclasses.replace(plain, joints=[*plain.joints, last], loops=(), inputs=None, neutral=None)
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-4, tolerance=1e-12)
+    x = sim.neutral()
+    x[sim.nq :] = np.random.default_rng(1).normal(size=sim.nv)
+    return Case(sim, sim.close(x), 0.1 * np.random.default_rng(2).normal(size=sim.nu))
+
+
+def _geared(crank: bool) -> Case:
+    """A floating body with geared arms, one with a rack and a limit; or the crank of a four-bar turns a flywheel."""
+    y = (0.0, 1.0, 0.0)
+    if crank:
+        plain = fourbar("pin", inputs=("crank",), spring=3.0, damper=0.2)
+        wheel = dojo.Joint("revolute", None, "wheel", axis=y, armature=0.1)
+        mech = dataclasses.replace(
+            plain,
+            bodies=[*plain.bodies, dojo.Body("wheel", 1.0, (0.1, 0.2, 0.15))],
+            joints=[*plain.joints, wheel],
+            gears=[Gear("wheel", "crank", 3.0)],
+            neutral=(*plain.neutral, -3.0),
+        )
+    else:
+        bodies = [
+            dojo.Body(name, 1.0 + 0.5 * k, (0.02, 0.03, 0.04)) for k, name in enumerate(("base", "l", "r", "rack"))
+        ]
+        joints = [
+            dojo.Joint("floating", None, "base"),
+            dojo.Joint("revolute", "base", "l", "", (0.2, 0, 0), (-0.2, 0, 0), axis=y, spring=2.0, armature=0.1),
+            dojo.Joint("revolute", "base", "r", "", (-0.2, 0, 0), (0.2, 0, 0), axis=y, limits=(-0.5, 0.8)),
+            dojo.Joint("cylindrical", "r", "rack", "", (-0.2, 0, 0), axis=(1.0, 0.0, 0.0), damper=(0.1, 0.0)),
+        ]
+        foot = dojo.Contact("rack", point=(0.1, -0.05, -0.2), height=-0.25, friction=0.4)
+        mech = dojo.Mechanism(bodies, joints, [foot], gears=[Gear("l", "r", -1.0), Gear("rack", "l", 0.15, 0.02)])
+    sim = dojo.Simulator(mech, time_step=0.02, kappa=1e-4, tolerance=1e-12)
+    x = sim.neutral()
+    x[sim.nq :] = np.random.default_rng(5).normal(size=sim.nv)
+    x = sim.rollout(sim.close(x), np.zeros((3, sim.nu)), throw=True).x[-1]
+    names = sim.parameters().names
+    if crank:  # it stays a planar linkage, of rods
+        out = ("inertia", "orientation", "axis")
+        names = tuple(n for n in names if not n.startswith(out) and not ("_point" in n and n.endswith("[1]")))
+    return Case(sim, x, np.random.default_rng(2).normal(size=sim.nu), names)
+
+
 def _colliding(b: dojo.Box | dojo.Sphere, restitution: float = 0.0) -> Case:
     """Two spinning bodies run into each other."""
     bodies = [
@@ -151,6 +202,9 @@ CASES: dict[str, Callable[[], Case]] = {
     "in a loop": lambda: _loop("revolute"),
     "in a loop, orbital": lambda: _loop("spherical", "orbital"),
     "in a loop, fixed": lambda: _loop("fixed"),
+    "in a loop, acting": _acting,
+    "geared": lambda: _geared(False),
+    "geared, in a loop": lambda: _geared(True),
     "colliding, box and sphere": lambda: _colliding(dojo.Sphere(0.2)),
     "colliding, bouncing": lambda: _colliding(dojo.Sphere(0.2), 0.5),
     "colliding, boxes": lambda: _colliding(dojo.Box(0.3, 0.3, 0.4)),
