@@ -166,7 +166,8 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
         for side in range(2):
             i = model.coupling_body[k, side]
             other = model.coupling_body[k, 1 - side]
-            if i < 0 or at.below[i] == 0.0:
+            far = k < loops and work.coupling_live[k] == 0  # its rows are those of an earlier step
+            if i < 0 or at.below[i] == 0.0 or far:
                 continue
             K2 = work.coupling_K2[2 * k + side]
             for r in range(6):
@@ -175,6 +176,8 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
                 t = _dot(work.couple_R[row, 6 * side : 6 * side + 6], T3)
                 if k >= loops:
                     work.couple_panel[row, col] += w * t
+                    continue
+                if work.couple_E[row] == 0.0:  # no row
                     continue
                 for r in range(6):
                     F[r] += work.couple_B[row, r] * t / work.couple_E[row]

@@ -20,7 +20,7 @@ STUDIES = {
     "gradients": ("error and cost of derivatives, of one step and of whole motions", "gradients", "Gradients"),
     "planning": ("cost and violation of plans against run time", "planning", "Planning"),
     "stability": ("stiff and extreme scenes, each with its pass rule", "stability", "Stability"),
-    "mechanics": ("joint kinds, each measure against its bar", "mechanics", "Mechanics"),
+    "mechanics": ("joint kinds, pairs of shapes and parameters, each against its bar", "mechanics", "Mechanics"),
     "lean": ("what a scene leaves out, and what that saves", "lean", "Lean"),
     "timing": ("microseconds per step, gradient and planner iteration", "timing", "Timing"),
     "compile": ("seconds from a cold and a warm start to the first plan", "compile_time", "CompileTime"),

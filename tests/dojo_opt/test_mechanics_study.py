@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dojo_opt.report.mechanics import Mechanics, joints
+from dojo_opt.report.mechanics import Mechanics, collisions, joints, parameters
+from dojo_opt.report.mechanics.situations import CASES
+from dojo_opt.report.mechanics.study import QUICK_CASES, QUICK_PAIRS
 from dojo_opt.report.study import Progress, study
+from sim.collision.kinds import OUT
 from sim.parts import KINDS
 
 
@@ -51,9 +54,43 @@ def _damped(changes: dict[str, object]) -> dict[str, object]:
     return {"damper": 1e6} if "damper" in changes else {}
 
 
+def test_a_wrong_distance_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    true = collisions.nearest
+    monkeypatch.setattr(collisions, "nearest", lambda *case: true(*case) + np.eye(1, OUT)[0] * 1e-3)
+    errors = collisions.check("sphere_sphere")
+    assert errors["distance near"] == pytest.approx(1e-3, rel=1e-3)
+    assert errors["frame deep"] == pytest.approx(0.5e-3, rel=1e-3)  # half of it at either surface
+
+
+def test_a_wrong_derivative_by_a_parameter_is_seen() -> None:
+    case = CASES["touching"]()
+
+    class Off:
+        def __getattr__(self, name: str) -> object:
+            return getattr(case.sim, name)
+
+        def linearize(self, *args: object, **options: object) -> dict[str, np.ndarray]:
+            return {name: 1.001 * block for name, block in case.sim.linearize(*args, **options).items()}
+
+    assert parameters.error(case, "mass") < parameters.BAR
+    assert parameters.error(case._replace(sim=Off()), "mass") == pytest.approx(1e-3, rel=1e-2)
+
+
 def test_the_study_by_its_name() -> None:
     assert isinstance(study("mechanics", quick=True), Mechanics)
     report = Mechanics(quick=True).run(Progress(io.StringIO()))
     assert report.met(), [row.name for row in report.rows if row.met is False]
-    assert report.tables[0].header[1:] == tuple(joints.BARS)
-    assert len(report.tables[0].rows) == 4
+    kinds, pairs, by_parameters = report.tables
+    assert kinds.header[1:] == tuple(joints.BARS)
+    assert len(kinds.rows) == 4
+    assert len(pairs.header) == 10
+    assert [row[0] for row in pairs.rows] == list(QUICK_PAIRS)
+    assert by_parameters.header[1:] == QUICK_CASES
+    assert {"mass", "friction", "gravity", "time_step"} <= {row[0] for row in by_parameters.rows}
+    bars = {row.name: row.bar for row in report.rows}
+    assert (bars["pairs: distance"], bars["pairs: distance, rounded"]) == (1e-5, 1e-4)
+    assert [axes.get_title() for axes in report.figure.axes] == [
+        "joint kinds",
+        "pairs of shapes",
+        "derivatives by parameters",
+    ]

@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 
-from dojo_opt.report.mechanics import joints
+from dojo_opt.report.mechanics import collisions, joints, parameters
+from dojo_opt.report.mechanics.figure import margins
+from dojo_opt.report.mechanics.situations import CASES
+from dojo_opt.report.mechanics.solids import PAIRS
 from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.report.study import Progress
+from sim.parameters import KINDS as PARAMETERS
 from sim.parts import KINDS
+
+QUICK_PAIRS = ("sphere_capsule", "box_halfspace", "cylinder_halfspace")
+QUICK_CASES = ("touching", "sliding")
 
 
 @dataclass(frozen=True)
 class Mechanics:
-    """Joint kinds; quick takes every fourth kind."""
+    """Joint kinds, pairs of shapes, parameters; quick takes a few of each."""
 
     quick: bool = False
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
         report = Report("Mechanics", "dojo-opt report mechanics" + (" --quick" if self.quick else ""))
-        report.summary = "Every kind of joint against what it should do. Empty: the kind has no such thing."
+        report.summary = (
+            "Every kind of joint, every pair of shapes that can collide and the derivatives by every kind of parameter "
+            "against what they should be. Empty: there is no such thing."
+        )
         self._joints(report, progress)
+        self._pairs(report, progress)
+        self._parameters(report, progress)
+        report.figure = margins(report.details)
+        report.notes.append("Figure: error over bar, a dot per entry; at the left edge, exact ones and stops kept.")
         return report
 
     def _joints(self, report: Report, progress: Progress) -> None:
@@ -28,12 +43,56 @@ class Mechanics:
         kinds = list(KINDS)[:: 4 if self.quick else 1]
         found = {kind: joints.check(kind) for kind in progress([(kind, kind) for kind in kinds], "joints")}
         lines = [[kind, *values.values()] for kind, values in found.items()]
-        note = (joints.__doc__ or "").partition("\n\n")[2]
-        report.tables.append(Table("Joint kinds", ("", *joints.BARS), lines, note))
+        report.tables.append(Table("Joint kinds", ("", *joints.BARS), lines, _note(joints.__doc__)))
         report.details["joints"] = found
         for name, bar in joints.BARS.items():
             values = {kind: value for kind, v in found.items() if (value := v[name]) is not None}
             least = name == "energy"
-            worst = (min if least else max)(values, key=lambda kind: values[kind])
+            lost = [kind for kind in values if isnan(values[kind])]
+            worst = lost[0] if lost else (min if least else max)(values, key=lambda kind: values[kind])
             text = f"worst of {len(values)}: {worst}"
             report.rows.append(Row(f"joints: {name}", values[worst], "", bar, at_least=least, note=text))
+
+    def _pairs(self, report: Report, progress: Progress) -> None:
+        """A line per pair of shapes, a row per measure with the worst of them, rounded shapes apart."""
+        names = QUICK_PAIRS if self.quick else PAIRS
+        found = {name: collisions.check(name) for name in progress([(name, name) for name in names], "pairs")}
+        columns = list(found[names[0]])
+        lines = [[name, *(_short(values[c]) for c in columns)] for name, values in found.items()]
+        report.tables.append(Table("Pairs of shapes", ("", *columns), lines, _note(collisions.__doc__)))
+        report.details["pairs"] = found
+        groups: dict[tuple[str, float], dict[str, float]] = {}
+        for name, values in found.items():
+            for c, value in values.items():
+                group = groups.setdefault((c.partition(" ")[0], collisions.bar(name, c)), {})
+                group[f"{name}{c[c.index(' ') :]}"] = value
+        for (what, bar), values in sorted(groups.items()):
+            title = f"pairs: {what}" + (", rounded" if bar > collisions.BARS[what] else "")
+            report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
+
+    def _parameters(self, report: Report, progress: Progress) -> None:
+        """A line per kind of parameter, a row per situation with the worst of them."""
+        names = QUICK_CASES if self.quick else tuple(CASES)
+        found = {name: parameters.check(name) for name in progress([(name, name) for name in names], "parameters")}
+        kinds = [kind for kind in PARAMETERS if any(kind in values for values in found.values())]
+        lines = [[kind, *(_short(values.get(kind)) for values in found.values())] for kind in kinds]
+        report.tables.append(Table("Derivatives by parameters", ("", *names), lines, _note(parameters.__doc__)))
+        report.details["parameters"] = found
+        for name, values in found.items():
+            report.rows.append(_worst(f"parameters: {name}", values, parameters.BAR, ""))
+
+
+def _note(doc: str | None) -> str:
+    """What stands below the first line of a docstring."""
+    return (doc or "").partition("\n\n")[2]
+
+
+def _short(value: float | None) -> str:
+    """One digit: the tables are wide, and the report has all digits in its details."""
+    return "" if value is None else f"{value:.0e}"
+
+
+def _worst(name: str, values: dict[str, float], bar: float, unit: str) -> Row:
+    """The largest value, and what it belongs to; NaN is larger than any."""
+    worst = max(values, key=lambda key: (isnan(values[key]), values[key]))
+    return Row(name, values[worst], unit, bar, note=f"worst of {len(values)}: {worst}")

@@ -1,0 +1,216 @@
+"""Steps in which parameters matter, one situation each: flying, touching, sliding, at a limit, in a loop, ..."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.bodies import rotated
+from sim.collisions import Collision
+from sim.mechanism import Mechanism
+from sim.parameters import KINDS
+from sim.parts import KINDS as JOINTS
+from sim.parts import Body, Contact, Input, Joint
+from sim.shapes import Box, Sphere
+from sim.simulator import Simulator
+from sim.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+H = 0.02  # [s]
+GRID = np.linspace(-3.0, 3.0, 25)
+HILLS = Terrain.from_function(lambda x, y: 0.1 * np.sin(2.0 * x + 0.3) * np.cos(1.5 * y - 0.2), GRID, GRID)
+LEVEL = (0.0, 0.0, -9.81)
+
+
+class Case(NamedTuple):
+    """A step."""
+
+    sim: Simulator
+    x: Floats
+    u: Floats
+
+    def kinds(self) -> list[str]:
+        """The kinds of its parameters; without restitution, a step need not be a continuous function of it."""
+        known = self.sim.parameters().names
+        bounces = self.sim.model.contact_restitution.any()
+        return [k for k in KINDS if any(kind_of(n) == k for n in known) and (bounces or k != "restitution")]
+
+
+def kind_of(name: str) -> str:
+    """Kind of the parameter of that name: "com" of "com:body[2]"."""
+    return name.partition(":")[0].partition("[")[0]
+
+
+def _pair(kind: str, base: str | None, gravity: ArrayLike, **options: Any) -> Mechanism:
+    """Two bodies without symmetry: the first on a joint `base`, the second on one of `kind`, with inputs.
+
+    Without a base, the first is on one of `kind` too.
+    """
+    rng = np.random.default_rng(5)
+    bodies, joints = [], []
+    for i, parent in enumerate((None, "body0")):
+        inertia = np.diag([0.11, 0.17, 0.23]) * (1.0 + 0.3 * i)
+        inertia[0, 1] = inertia[1, 0] = 0.01
+        bodies.append(Body(f"body{i}", 1.0 + 0.5 * i, inertia))
+        if base is not None and parent is None:
+            joints.append(Joint(base, None, "body0"))
+            continue
+        joints.append(
+            Joint(
+                kind,
+                parent,
+                f"body{i}",
+                orientation=_turn(rng.normal(size=3)),
+                axis=rng.normal(size=3),
+                parent_point=rng.normal(size=3) / 4.0,
+                child_point=rng.normal(size=3) / 4.0,
+                **options,
+            )
+        )
+    inputs = [Input(j.name, dof=d) for j in joints if j.kind == kind for d in range(j.nv)]
+    return Mechanism(bodies, joints, inputs=inputs, gravity=gravity)
+
+
+def _random_state(sim: Simulator, rng: np.random.Generator, speed: float, spread: float) -> Floats:
+    """A state about the neutral one."""
+    dx = np.concatenate((spread * rng.normal(size=sim.nv), speed * rng.normal(size=sim.nv)))
+    x = np.array(sim.neutral())
+    x[sim.nq :] = 0.0
+    return sim.integrate(x, dx)
+
+
+def _turn(w: ArrayLike) -> Floats:
+    """Quaternion of the rotation vector w [rad]."""
+    angle = float(np.linalg.norm(w))
+    return np.concatenate([[np.cos(0.5 * angle)], 0.5 * np.sinc(0.5 * angle / np.pi) * np.asarray(w)])
+
+
+def _centre(sim: Simulator, x: Floats, foot: Contact) -> Floats:
+    """Where the centre of a contact on the second body is [m]."""
+    z = sim.maximal(x)[1]
+    return np.asarray(z[:3] + rotated(z[6:10], np.asarray(foot.point)))
+
+
+def _resting(kind: str, height: float, friction: float, speed: float, kappa: float = 1e-4) -> Case:
+    """A body on a joint on a floating base, its contact so high above a tilted ground after a step without contact."""
+    rng = np.random.default_rng(3)
+    normal = (0.2, -0.1, 0.9)
+    mech = _pair(kind, "floating", LEVEL, spring=3.0, damper=0.2)
+    if mech.joints[1].nrot < 3:
+        mech = replace(mech, joints=[mech.joints[0], replace(mech.joints[1], armature=0.1)])
+    foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, normal=normal, height=-1e3, friction=friction)
+    mech = replace(mech, contacts=[foot])
+    far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
+    x, u = _random_state(far, rng, speed, 0.4), 0.1 * rng.normal(size=far.nu)
+    lowest = _centre(far, far.step(x, u, throw=True).x, foot) @ np.asarray(foot.normal) - foot.radius
+    mech = replace(mech, contacts=[replace(foot, height=float(lowest) - height)])
+    return Case(Simulator(mech, time_step=H, kappa=kappa, tolerance=3e-14), x, u)
+
+
+def _pyramid() -> Case:
+    """A box slides on two corners, its friction that of the linear law, pushed by inputs on the body."""
+    corners = [(0.2, 0.1, -0.1), (-0.2, 0.1, -0.1)]
+    contacts = [Contact("box", p, friction=0.3, law="linear") for p in corners]
+    inputs = [
+        Input(body="box", force=(1.0, 0.5, 0.0), torque=(0.2, 0.1, 0.0), frame="body"),
+        Input(body="box", force=(0.0, 1.0, 2.0), torque=(0.0, 0.1, 0.3)),
+    ]
+    mech = Mechanism([Body("box", 1.0, (0.02, 0.03, 0.04))], [Joint("floating", None, "box")], contacts, inputs)
+    x = np.r_[0.0, 0.0, 0.1, _turn(np.array([0.05, 0.02, 0.3])), 1.0, 0.5, -0.2, 0.3, -0.5, 1.0]
+    return Case(Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, np.array([1.0, -2.0]))
+
+
+def _bouncing(terrain: Terrain | None = None) -> Case:
+    """A spinning body on a joint falls on its foot, on a tilted ground or on terrain; with terrain, it slides."""
+    rng = np.random.default_rng(3)
+    mech = _pair("revolute", "floating", LEVEL, spring=3.0, damper=0.2)
+    ground = {"terrain": terrain} if terrain else {"normal": (0.2, -0.1, 0.9)}
+    foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, height=-1e3, restitution=0.5, **ground)
+    mech = replace(mech, contacts=[foot])
+    far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
+    x, u = _random_state(far, rng, 1.0, 0.4), 0.1 * rng.normal(size=far.nu)
+    x[far.nq + 2] -= 3.0
+    centre = _centre(far, far.step(x, u, throw=True).x, foot)
+    level = replace(foot, height=0.0)
+    steep = level.normal_at(centre)[2] if terrain else 1.0
+    foot = replace(foot, height=float(level.gap(centre) / steep) + 0.03)
+    mech = replace(mech, contacts=[foot])
+    return Case(Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, u)
+
+
+def _limited(kind: str) -> Case:
+    """Two joints of a kind, moving towards limits of their plain coordinates, and cones of their quaternions."""
+    ntrans, nrot = JOINTS[kind]
+    plain = ntrans + (nrot if nrot < 3 else 0)
+    limits = [(-0.3, 0.3)] * plain + [None] * (ntrans + nrot - plain)
+    mech = _pair(kind, None, (0.0, 0.0, 0.0), damper=0.1, limits=limits or None, cone=0.6 if nrot == 3 else None)
+    sim = Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14)
+    rng = np.random.default_rng(1)
+    x = _random_state(sim, rng, 1.0, 0.2)
+    return Case(sim, x, rng.normal(size=sim.nu))
+
+
+def _loop(kind: str, tree: str = "spherical") -> Case:
+    """A floating ring of four bodies, moving."""
+    bodies = [Body(f"b{k}", 1.0 + 0.3 * k, (0.02, 0.03, 0.04)) for k in range(4)]
+    corners = np.array([(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.5, 0.0)])
+    centres = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    joints = [Joint("floating", None, "b0")]
+    for k in range(1, 4):
+        at = corners[k]
+        ends = (at - centres[k - 1], at - centres[k])
+        joints.append(Joint(tree if k == 1 else "spherical", f"b{k - 1}", f"b{k}", "", *ends, damper=0.1))
+    ends = (corners[0] - centres[3], corners[0] - centres[0])
+    joints.append(Joint(kind, "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True))
+    sim = Simulator(Mechanism(bodies, joints), time_step=0.01, tolerance=1e-12)
+    x = sim.neutral()
+    x[sim.nq :] = np.random.default_rng(1).normal(size=sim.nv)
+    return Case(sim, sim.close(x), np.zeros(sim.nu))
+
+
+def _colliding(b: Box | Sphere, restitution: float = 0.0) -> Case:
+    """Two spinning bodies run into each other."""
+    bodies = [
+        Body("a", 1.0, (0.02, 0.03, 0.04), shape=Box(0.4, 0.3, 0.5)),
+        Body("b", 2.0, (0.05, 0.06, 0.07), shape=b),
+    ]
+    joints = [Joint("floating", None, name) for name in "ab"]
+    mech = Mechanism(
+        bodies, joints, collisions=[Collision("a", "b", restitution=restitution)], gravity=(0.1, 0.2, -0.3)
+    )
+    sim = Simulator(mech, time_step=0.01, kappa=1e-4, tolerance=1e-12)
+    n = np.array([0.6, 0.0, 0.8])
+    turns = [_turn(np.array(t)) for t in ((0.3, 0.2, 0.1), (-0.2, 0.4, 0.3))]
+    v = np.r_[-2.0 * n + (0.1, 0.2, 0.0), 0.5, -0.3, 1.0, 2.0 * n, 0.2, 0.7, -0.4]
+    x = np.r_[n, turns[0], np.zeros(3), turns[1], v]
+    for _ in range(60):
+        r = sim.step(x)
+        hit = np.abs(r.contacts.impulse).max() > 0.1 if restitution else r.contacts.gap.min() < 0.01
+        if hit:
+            return Case(sim, x, np.zeros(0 if sim.nu == 0 else sim.nu))
+        x = r.x
+    raise AssertionError("they do not meet")
+
+
+CASES: dict[str, Callable[[], Case]] = {
+    "flying": lambda: _resting("planar_axis", 0.3, 0.5, 2.0),
+    "touching": lambda: _resting("prismatic_orbital", 0.0, 0.5, 0.3),
+    "sliding": lambda: _resting("cylindrical_free", -0.01, 0.1, 2.0),
+    "sticking": lambda: _resting("revolute", -0.01, 0.7, 0.02, 1e-3),
+    "sliding, pyramid": _pyramid,
+    "bouncing": _bouncing,
+    "on terrain": lambda: _bouncing(HILLS),
+    "at a limit": lambda: _limited("planar_axis"),
+    "at a cone": lambda: _limited("cylindrical_free"),
+    "in a loop": lambda: _loop("revolute"),
+    "in a loop, orbital": lambda: _loop("spherical", "orbital"),
+    "in a loop, fixed": lambda: _loop("fixed"),
+    "colliding, box and sphere": lambda: _colliding(Sphere(0.2)),
+    "colliding, bouncing": lambda: _colliding(Sphere(0.2), 0.5),
+    "colliding, boxes": lambda: _colliding(Box(0.3, 0.3, 0.4)),
+}

@@ -1,0 +1,118 @@
+"""Two random shapes that can collide, and their distance found without the collision kernels.
+
+From support functions alone: phi = max over directions n of (min n.x over a) - (max n.y over b), negative inside; a
+point is as far from the surface of a shape as that says of a point and the shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.collision.kinds import SIZES, Pair, Shape, count, pair
+from sim.collision.polytope import EDGES
+from sim.polytope import Polytope, hull_table
+from sim.shapes import Box, Capsule, Sphere
+
+Floats = NDArray[np.float64]
+
+POLYTOPES = ("sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope")
+PAIRS = (*(p.name.lower() for p in Pair if p != Pair.POLYTOPE_POLYTOPE), *POLYTOPES)
+
+
+def shapes(kind: Pair) -> tuple[Shape, Shape]:
+    """Shapes a and b of a pair, in its order."""
+    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
+
+
+class Case(NamedTuple):
+    """Two shapes: sizes (8,) of both and tables of polytopes as `collide` takes them, corners of the polytopes."""
+
+    kind: Pair
+    sizes: Floats
+    hull: Floats
+    points: tuple[Floats, Floats]
+
+
+def random_case(name: str, rng: np.random.Generator) -> Case:
+    """A pair of shapes with random sizes."""
+    if name not in POLYTOPES:
+        none = np.zeros((0, 3))
+        return Case(Pair[name.upper()], rng.uniform(0.15, 0.5, 2 * SIZES), np.zeros((1, 4)), (none, none))
+    solids = []
+    for word in name.split("_"):
+        size = rng.uniform(0.2, 0.5, 3)
+        ball = rng.normal(size=(12, 3))
+        ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+        solids.append(
+            {
+                "sphere": Sphere(size[0]),
+                "capsule": Capsule(0.5 * size[0], size[1]),
+                "box": Box(*size),
+                "polytope": Polytope.about_centroid(size * ball),
+            }[word]
+        )
+    (a, ra), (b, rb) = (hull_table(solid) for solid in solids)
+    sizes = np.array([0.0, ra, 0.0, 0.0, len(a), rb, 0.0, 0.0])
+    points = (a[1 : 1 + int(a[0, 0]), :3], b[1 : 1 + int(b[0, 0]), :3])
+    return Case(Pair.POLYTOPE_POLYTOPE, sizes, np.vstack([a, b]), points)
+
+
+def features(case: Case) -> int:
+    """How many contact points there may be."""
+    if case.kind != Pair.POLYTOPE_POLYTOPE:
+        return count(case.kind)
+    return sum(len(p) for p in case.points) + (EDGES if len(case.points[0]) > 1 else 0)
+
+
+def support(case: Case, side: int, n: Floats) -> Floats:
+    """Largest n.x over the points x of shape a or b (side 0, 1) about its own origin, for directions n (m, 3)."""
+    shape, sizes = shapes(case.kind)[side], case.sizes[SIZES * side :]
+    if shape == Shape.POLYTOPE:
+        return (n @ case.points[side].T).max(axis=1) + sizes[1]
+    if shape == Shape.BOX:
+        return np.abs(n) @ sizes[:3]
+    if shape == Shape.CAPSULE:
+        return sizes[0] + sizes[1] * np.abs(n[:, 2])
+    if shape == Shape.CYLINDER:
+        return sizes[0] * np.hypot(n[:, 0], n[:, 1]) + sizes[1] * np.abs(n[:, 2])
+    return np.full(len(n), sizes[0] if shape == Shape.SPHERE else 0.0)
+
+
+def widest(separation: Callable[[Floats], Floats], rng: np.random.Generator) -> float:
+    """Largest value of a function of directions (m, 3): 4000 of them, then ever closer around the best."""
+    n = rng.normal(size=(4000, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n = np.vstack([n, np.eye(3), -np.eye(3)])
+    value = separation(n)
+    best = n[np.argsort(value)[-20:]]
+    width = 0.1
+    while width > 1e-9:
+        n = np.repeat(best, 30, axis=0)
+        n += width * rng.normal(size=n.shape)
+        n = np.vstack([best, n / np.linalg.norm(n, axis=1, keepdims=True)])
+        best = n[np.argsort(separation(n))[-10:]]
+        width *= 0.7
+    return float(separation(best).max())
+
+
+def distance(case: Case, R: Floats, r: Floats, rng: np.random.Generator) -> float:
+    """Signed distance of the shapes of a pair, from their support functions."""
+    if case.kind == Pair.STRING:
+        return float(case.sizes[0] - np.linalg.norm(r))
+    if shapes(case.kind)[1] == Shape.HALFSPACE:
+        return float(r[2] - support(case, 0, -R[2:3])[0])
+    return widest(lambda n: n @ r - support(case, 0, -n @ R) - support(case, 1, n), rng)
+
+
+def off_surface(case: Case, side: int, x: Floats, rng: np.random.Generator) -> float:
+    """Distance of a point from the surface of shape a or b about its own origin."""
+    shape = shapes(case.kind)[side]
+    if shape == Shape.HALFSPACE:
+        return abs(float(x[2]))
+    if shape == Shape.STRING:
+        return 0.0
+    return abs(widest(lambda n: n @ x - support(case, side, n), rng))
