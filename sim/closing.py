@@ -51,6 +51,11 @@ def is_weld(loop: Joint) -> bool:
     return loop.kind == "fixed" and loop.name == loop.child and loop.child.startswith(f"{loop.parent}.")
 
 
+def parts_of(loops: Sequence[Joint], name: str) -> tuple[str, ...]:
+    """The bodies that body `name` was divided into, itself first; all have the same share of its mass and inertia."""
+    return (name, *(j.child for j in loops if is_weld(j) and j.parent == name))
+
+
 def _share(joint: Joint) -> str:
     """Name of the share of the child that the joint carries."""
     return f"{joint.child}.{joint.name}"

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.build import contact_frame, translation_axes
-from sim.closing import is_weld
+from sim.closing import is_weld, parts_of
 from sim.effects import Effect
 from sim.mechanism import Mechanism
 from sim.model import Integers, Vector
-from sim.parts import Contact, Joint
+from sim.parts import Body, Contact, Joint
 
 Floats = NDArray[np.float64]
 Term = tuple[Effect, int, int, float]  # effect, index, component, weight
@@ -74,9 +74,10 @@ class Plan(NamedTuple):
 def all_parameters(mech: Mechanism, time_step: float) -> list[Parameter]:
     """Every parameter of the mechanism, kind by kind in the order of KINDS."""
     found: list[Parameter] = []
-    for index, body in enumerate(mech.bodies):
-        if body.mass > 0.0:
-            found += _body_parameters(mech, index)
+    shares = {joint.child for joint in mech.loops if is_weld(joint)}
+    for body in mech.bodies:
+        if body.mass > 0.0 and body.name not in shares:
+            found += _body_parameters(mech, body)
     first = 0
     limit = 0
     for index, joint in enumerate(mech.joints):
@@ -105,18 +106,22 @@ def _vector(kind: str, part: str, values: ArrayLike, terms: Callable[[int], Sequ
     return [Parameter(kind, part, labels[k], float(x), tuple(terms(k))) for k, x in enumerate(numbers)]
 
 
-def _body_parameters(mech: Mechanism, i: int) -> list[Parameter]:
-    """mass, inertia, com. The centre of mass is the origin of the body: everything else on it moves the other way."""
-    body = mech.bodies[i]
-    J = np.asarray(body.inertia)
+def _body_parameters(mech: Mechanism, body: Body) -> list[Parameter]:
+    """mass, inertia, com. The centre of mass is the origin of the body: everything else on it moves the other way.
+
+    A body that closing joints have divided (closing.py) has those of the whole.
+    """
+    parts = [mech.body_names.index(name) for name in parts_of(mech.loops, body.name)]
+    share = 1.0 / len(parts)
+    J = np.asarray(body.inertia) / share
     entries = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     return [
-        Parameter("mass", body.name, "", body.mass, ((Effect.MASS, i, 0, 1.0),)),
+        Parameter("mass", body.name, "", body.mass / share, tuple((Effect.MASS, i, 0, share) for i in parts)),
         *(
-            Parameter("inertia", body.name, label, float(x), ((Effect.INERTIA, i, k, 1.0),))
+            Parameter("inertia", body.name, label, float(x), tuple((Effect.INERTIA, i, k, share) for i in parts))
             for k, (label, x) in enumerate(zip(INERTIA, entries, strict=True))
         ),
-        *_vector("com", body.name, np.zeros(3), lambda k: [*_on_body(mech, i, k)]),
+        *_vector("com", body.name, np.zeros(3), lambda k: [t for i in parts for t in _on_body(mech, i, k)]),
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.closing import parts_of
 from sim.mechanism import Mechanism
 from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 
@@ -106,7 +107,8 @@ class _Draft:
         if kind == "gravity":
             self.gravity = _entries(self.gravity, entries)
         elif kind == "com":
-            self._move_centre(part, _entries(np.zeros(3), entries))
+            for name in parts_of(self.mech.loops, part):
+                self._move_centre(name, _entries(np.zeros(3), entries))
         elif kind in ("mass", "inertia"):
             self._change_body(kind, part, entries)
         elif kind in ("shape_a", "shape_b"):
@@ -119,15 +121,17 @@ class _Draft:
             self._change_joint(kind, part, entries)
 
     def _change_body(self, kind: str, name: str, entries: Entries) -> None:
-        body = self.bodies[name]
-        if kind == "mass":
-            self.bodies[name] = replace(body, mass=entries[""])
-            return
-        J = np.array(body.inertia)
-        for label, value in entries.items():
-            a, b = ("xyz".index(letter) for letter in label)
-            J[a, b] = J[b, a] = value
-        self.bodies[name] = replace(body, inertia=J)
+        parts = parts_of(self.mech.loops, name)
+        for part in parts:
+            body = self.bodies[part]
+            if kind == "mass":
+                self.bodies[part] = replace(body, mass=entries[""] / len(parts))
+                continue
+            J = np.array(body.inertia)
+            for label, value in entries.items():
+                a, b = ("xyz".index(letter) for letter in label)
+                J[a, b] = J[b, a] = value / len(parts)
+            self.bodies[part] = replace(body, inertia=J)
 
     def _change_joint(self, kind: str, name: str, entries: Entries) -> None:
         joint = self.joints[name]

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 import pytest
+from coupled_scenes import COUPLED, kinds
 from jacobians import check_jacobian
 
 import dojo_opt as dojo
@@ -13,13 +14,14 @@ from dojo_opt.report.mechanics.parameters import error
 from dojo_opt.report.mechanics.situations import CASES, Case
 from sim.parameters import KINDS
 
-case_of = functools.cache(lambda name: CASES[name]())
+ALL = {**CASES, **COUPLED}
+case_of = functools.cache(lambda name: ALL[name]())
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", ALL)
 def test_every_kind_in_every_situation(name: str) -> None:
     case = case_of(name)
-    errors = {kind: error(case, kind) for kind in case.kinds()}
+    errors = {kind: error(case, kind) for kind in kinds(name, case)}
     assert all(e < 1e-6 for e in errors.values()), errors
 
 
@@ -67,7 +69,9 @@ def rollout(case: Case, steps: int = 4) -> tuple[dojo.Trajectory, np.ndarray, np
     return t, rng.normal(size=(steps + 1, case.sim.ndx)), us
 
 
-@pytest.mark.parametrize("name", ["sliding", "in a loop", "colliding, boxes", "at a cone"])
+@pytest.mark.parametrize(
+    "name", ["sliding", "in a loop", "in a loop, acting", "geared", "colliding, boxes", "at a cone"]
+)
 def test_the_sweep_is_the_chain_of_the_steps(name: str) -> None:
     case = case_of(name)
     t, loss, us = rollout(case)
@@ -157,6 +161,22 @@ def test_names_stand_for_their_parameters() -> None:
     np.testing.assert_allclose(heavier.parameters("mass").values, sim.parameters("mass").values + 1.0)
     blocks = sim.linearize(case_of("sliding").x, wrt=("mass", "mass:*"))
     np.testing.assert_allclose(blocks["mass"].sum(axis=1), blocks["mass:*"][:, 0], rtol=1e-9, atol=1e-12)
+
+
+def test_a_body_that_a_closing_joint_divides_is_one_to_its_parameters() -> None:
+    """A closing joint that acts carries half of its child: mass, inertia and com stay those that the user wrote."""
+    sim = case_of("in a loop, acting").sim
+    assert sim.mechanism.body_names[-1] == "b0.last"
+    whole = sim.parameters(("mass", "inertia:b0"))
+    assert whole.names[:4] == ("mass:b0", "mass:b1", "mass:b2", "mass:b3")
+    np.testing.assert_allclose(whole["mass"], [1.0, 1.3, 1.6, 1.9])
+    np.testing.assert_allclose(whole["inertia:b0"], [0.02, 0.03, 0.04, 0.0, 0.0, 0.0])
+    heavier = sim.with_parameters({"mass:b0": 3.0, "inertia:b0[xx]": 0.03, "com:b0[2]": 0.1}).mechanism
+    parts = [b for b in heavier.bodies if b.name.startswith("b0")]
+    assert [b.mass for b in parts] == [1.5, 1.5]
+    assert [np.asarray(b.inertia)[0, 0] for b in parts] == [0.015, 0.015]
+    points = [j.child_point for j in (*heavier.joints, *heavier.loops) if j.child.startswith("b0")]
+    assert [p[2] for p in points] == [-0.1, -0.1, -0.1]  # the floating joint, the closing one and the weld
 
 
 def test_without_wrt_nothing_changes() -> None:
