@@ -246,5 +246,5 @@ class Continuation:
         """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned."""
         if self.now.gaps is not None or self.kappa != stage.kappa_eval:
             self.roll_with_gains(stage.kappa_eval)
-        if not self._fresh and self._descent.linearize(self.now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
-            self._descent.gains(self.now)
+        if self._fresh or self._descent.linearize(self.now, stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
+            self._descent.final_gains(self.now)

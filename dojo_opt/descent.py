@@ -108,6 +108,14 @@ class Descent:
                 return promise
             self.raise_regularization()
 
+    def final_gains(self, now: Iterate) -> Promise:
+        """K and k for use around `now`: with no regularisation, or the least that every Q_uu needs.
+
+        What the last iterations had only shortens their steps; kept, it would leave little feedback.
+        """
+        self.mu, self._growth = 0.0, 1.0
+        return self.gains(now)
+
     def _model(self, now: Iterate) -> Quadratic:
         """The linear-quadratic problem around `now`."""
         lo, hi = self._free_limits

@@ -148,9 +148,15 @@ def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, *
     return _quadruped(gaits.walk, time_step, damping, settings, speed=speed)
 
 
-def bound(*, speed: float = 0.5, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
-    """The quadruped bounds at `speed` [m/s]: hind feet, flight, front feet, flight; settings as for `trot`."""
-    return _quadruped(gaits.bound, time_step, damping, settings, speed=speed)
+def bound(
+    *, speed: float = 0.5, damping: float = 0.5, step_height: float = 0.08, time_step: float = 0.02, **settings: Any
+) -> Problem:
+    """The quadruped bounds at `speed` [m/s]: hind feet, flight, front feet, flight; settings as for `trot`.
+
+    A foot that swings by less than the default `step_height` [m] is so low at the beginning and the end of its swing
+    that plans drag it instead of flying.
+    """
+    return _quadruped(gaits.bound, time_step, damping, settings, speed=speed, step_height=step_height)
 
 
 def jump(
@@ -160,7 +166,6 @@ def jump(
 
     settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction.
     """
-    settings = {"place": 1.0, "attitude": 0.3, **settings}
     return _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
 
 

@@ -20,9 +20,9 @@ def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -
 
         K = -(R + B^T P B)^-1 (S + B^T P A),      P := Q + A^T P A + (S^T + A^T P B) K
 
-    Q, R, S are the Gauss-Newton Hessians of the costs; constraints and control limits are left out. A plan's own gains
-    are those of its last iteration, with whatever regularisation that one had; where it had much, as for motions that
-    fall over by themselves, they hold nothing, and these do. kappa: of the derivatives, by default the simulator's.
+    Q, R, S are the Gauss-Newton Hessians of the costs; constraints and control limits are left out, which a plan's own
+    gains have: stiff where a constraint is, none for an input at its limit. kappa: of the derivatives, by default the
+    simulator's.
 
     ValueError: a step of the plan cannot be linearised.
     """

@@ -256,6 +256,20 @@ def test_no_positive_definite_hessian():
     assert plan.status == Status.MAX_REGULARIZATION and not plan.success
 
 
+def test_gains_of_a_plan_have_no_more_regularization_than_they_need():
+    exact = ilqr(lqr())
+    held_back = ilqr(lqr(), regularization=1e3, max_iterations=1)
+    assert held_back.history[-1]["mu"] == 1e3 and not held_back.success
+    np.testing.assert_allclose(held_back.K, exact.K, rtol=1e-6)
+    problem = lqr()
+    problem.costs[1].weight[:] = -1.0  # needs some, and gets the first of the schedule that is enough
+    solver = Solver(problem, Options(regularization=1e3, max_iterations=1))
+    concave = solver.solve()
+    assert concave.history[-1]["mu"] == 1e3
+    assert 1.0 <= solver.descent.mu <= 4.0
+    assert np.all(np.isfinite(concave.K)) and np.abs(concave.K).max() > 0.0
+
+
 def test_infeasible_constraints():
     problem = lqr(horizon=5, constraints=[Goal([0.0, 0.0]), Goal([1.0, 0.0])])
     plan = ilqr(problem, max_updates=4)
