@@ -17,7 +17,8 @@ table { border-collapse: collapse; margin: 1em 0; font-variant-numeric: tabular-
 th, td { border-bottom: 1px solid #ddd; padding: .2em .8em; text-align: left; vertical-align: top; }
 th { border-bottom: 2px solid #888; }
 .yes { color: #17632b; } .no { color: #a01313; font-weight: bold; }
-img { max-width: 100%; } .small { color: #666; font-size: 13px; } code { background: #f3f3f3; padding: 0 .3em; }
+img { max-width: 100%; } .small { color: #666; font-size: 13px; white-space: pre-line; }
+code { background: #f3f3f3; padding: 0 .3em; }
 """
 
 

@@ -71,12 +71,17 @@ class Mechanics:
             report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
 
     def _parameters(self, report: Report, progress: Progress) -> None:
-        """A line per kind of parameter, a row per situation with the worst of them."""
+        """A line per kind of parameter, loops and collisions apart; a row per situation with the worst of them."""
         names = QUICK_CASES if self.quick else tuple(CASES)
         found = {name: parameters.check(name) for name in progress([(name, name) for name in names], "parameters")}
-        kinds = [kind for kind in PARAMETERS if any(kind in values for values in found.values())]
-        lines = [[kind, *(_short(values.get(kind)) for values in found.values())] for kind in kinds]
-        report.tables.append(Table("Derivatives by parameters", ("", *names), lines, _note(parameters.__doc__)))
+        coupled = [name for name in names if name.startswith(("in a loop", "colliding"))]
+        trees = [name for name in names if name not in coupled]
+        for title, part in (("", trees), (", loops and collisions", coupled)):
+            kinds = [kind for kind in PARAMETERS if any(kind in found[name] for name in part)]
+            lines = [[kind, *(_short(found[name].get(kind)) for name in part)] for kind in kinds]
+            if part:
+                title = f"Derivatives by parameters{title}"
+                report.tables.append(Table(title, ("", *part), lines, _note(parameters.__doc__)))
         report.details["parameters"] = found
         for name, values in found.items():
             report.rows.append(_worst(f"parameters: {name}", values, parameters.BAR, ""))
