@@ -79,6 +79,8 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             if g[0] < before[12]:
                 code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
+                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
+                code = code if g[0] >= before[12] else 0
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
