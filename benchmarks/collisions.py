@@ -14,37 +14,14 @@ from __future__ import annotations
 import argparse
 import time
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 
-SHAPES = {"sphere": dojo.Sphere(0.2), "capsule": dojo.Capsule(0.15, 0.4), "box": dojo.Box(0.4, 0.3, 0.5)}
 BALLS = [f"b{k}" for k in range(20)]
 GAIN = 1e-2  # [J] more than kappa pushes from afar
-
-
-def scene(a: str, b: str, **options: Any) -> dojo.Mechanism:
-    """Two free bodies that collide; options: of the Collision."""
-    bodies = [
-        dojo.Body("a", 1.0, (0.02, 0.03, 0.04), shape=SHAPES[a]),
-        dojo.Body("b", 2.0, (0.05, 0.06, 0.07), shape=SHAPES[b]),
-    ]
-    joints = [dojo.Joint("floating", None, name) for name in ("a", "b")]
-    return dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b", **options)], gravity=(0, 0, 0))
-
-
-def start(seed: int) -> np.ndarray:
-    """State of a motion."""
-    rng = np.random.default_rng(seed)
-    n = rng.normal(size=3)
-    n /= np.linalg.norm(n)
-    turns = [q / np.linalg.norm(q) for q in rng.normal(size=(2, 4))]
-    v = rng.normal(size=12)
-    v[:3] -= 2.0 * n
-    v[6:9] += 2.0 * n
-    return np.concatenate([n, turns[0], np.zeros(3), turns[1], v])
 
 
 def collisions(motions: int) -> None:
@@ -55,8 +32,8 @@ def collisions(motions: int) -> None:
     names = list(SHAPES)
     for k, a in enumerate(names):
         for b in names[k:]:
-            sim = dojo.Simulator(scene(a, b), time_step=0.01)
-            runs = [sim.rollout(start(seed), np.zeros((60, sim.nu))) for seed in range(motions)]
+            sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
+            runs = [sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu))) for seed in range(motions)]
             gains = sum(bool(np.diff(sim.energy(run.x)).max() > GAIN) for run in runs)
             drift = max(float(np.ptp(np.hstack(sim.momentum(run.x)), axis=0).max()) for run in runs)
             touching = [np.abs(run.contacts.impulse).max(axis=(1, 2)) > 1e-2 for run in runs]

@@ -6,9 +6,9 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
-from encounters import SHAPES, approaching, two
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from dojo_opt.report.stability.stacks import tower
 from sim.collisions import Collision
 from sim.mechanism import Mechanism

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from encounters import SHAPES, approaching, two
 from jacobians import check_jacobian
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint

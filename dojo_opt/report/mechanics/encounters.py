@@ -1,30 +1,31 @@
-"""Two free bodies that fly towards each other: the scene of the tests of collisions."""
+"""Two free bodies that fly towards each other: the scene of the tests and the benchmark of collisions."""
 
 from __future__ import annotations
 
 import numpy as np
 
-import dojo_opt as dojo
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
-from sim.shapes import Box, Capsule, Solid, Sphere
+from sim.polytope import Polytope
+from sim.shapes import Box, Capsule, Shape, Sphere
+from sim.simulator import Simulator
 
-SHAPES: dict[str, Solid] = {
+SHAPES: dict[str, Shape] = {
     "sphere": Sphere(0.2),
     "capsule": Capsule(0.15, 0.4),
     "box": Box(0.4, 0.3, 0.5),
 }
 
 
-def two(a: Solid, b: Solid, friction: float = 0.5, law: str = "nonlinear") -> Mechanism:
+def two(a: Shape | Polytope, b: Shape | Polytope, friction: float = 0.5, law: str = "nonlinear") -> Mechanism:
     """Two free bodies without gravity."""
     bodies = [Body("a", 1.0, (0.02, 0.03, 0.04), shape=a), Body("b", 2.0, (0.05, 0.06, 0.07), shape=b)]
     joints = [Joint("floating", None, "a"), Joint("floating", None, "b")]
     return Mechanism(bodies, joints, collisions=[Collision("a", "b", friction=friction, law=law)], gravity=(0, 0, 0))
 
 
-def approaching(sim: dojo.Simulator, seed: int, distance: float) -> np.ndarray:
+def approaching(sim: Simulator, seed: int, distance: float) -> np.ndarray:
     """Random poses about so far apart, moving towards one another and spinning."""
     rng = np.random.default_rng(seed)
     n = rng.normal(size=3)
