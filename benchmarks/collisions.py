@@ -18,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
+from dojo_opt.report.mechanics.encounters import ALL, approaching, two
 
 BALLS = [f"b{k}" for k in range(20)]
 GAIN = 1e-2  # [J] more than kappa pushes from afar
@@ -29,10 +29,10 @@ def collisions(motions: int) -> None:
     print(
         f"{'':<18}{'unsolved':>9}{'gain':>6}{'momentum':>10}{'iterations in contact: median':>31}{'99 %':>6}{'most':>6}"
     )
-    names = list(SHAPES)
+    names = list(ALL)
     for k, a in enumerate(names):
         for b in names[k:]:
-            sim = dojo.Simulator(two(SHAPES[a], SHAPES[b]), time_step=0.01)
+            sim = dojo.Simulator(two(ALL[a], ALL[b]), time_step=0.01)
             runs = [sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu))) for seed in range(motions)]
             gains = sum(bool(np.diff(sim.energy(run.x)).max() > GAIN) for run in runs)
             drift = max(float(np.ptp(np.hstack(sim.momentum(run.x)), axis=0).max()) for run in runs)

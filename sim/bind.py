@@ -15,6 +15,7 @@ from sim import (
     gears,
     loops,
     pair_choice,
+    pair_cylinders,
     pair_far,
     pair_jacobian,
     pair_stiffness,
@@ -25,6 +26,7 @@ from sim import (
     swing,
     terrain_contact,
 )
+from sim.collision.kinds import SWAPPED, Pair
 from sim.contact_report import report_contacts, report_pairs, worst_contact
 from sim.gradients import gradient
 from sim.inequalities import add_stiffness
@@ -57,6 +59,12 @@ _PAIRS = (
     pair_far.enlist_pairs,
     pair_far.far_pair_impulses,
     pair_far.pairs_came_near,
+)
+_CYLINDERS = (
+    pair_cylinders.cylinder_distance,
+    pair_cylinders.collide_cylinders,
+    pair_cylinders.choose_cylinders,
+    pair_cylinders.cylinder_before,
 )
 _PYRAMIDS = (
     pyramid.start_pyramid,
@@ -124,6 +132,8 @@ def bind_step(model: Model) -> None:
         _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)
+    if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
+        _bind(model, _CYLINDERS)
     if np.any(model.contact_terrain):
         _bind(model, _TERRAIN)
     if np.any(model.contact_restitution):

@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, Polytope, HalfSpace; Cylinder against Sphere and HalfSpace; left out, that
-                       of the body. With String on both sides the bodies are tied together instead: their points keep
-                       within its length.
+    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Polytope, HalfSpace; left out, that of the body. With String on
+                       both sides the bodies are tied together instead: their points keep within its length.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law, restitution     as in Contact
 
@@ -123,3 +122,5 @@ def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
             end += len(table)
         if touch.kind % kinds.SWAPPED == kinds.Pair.POLYTOPE_POLYTOPE:
             model.pair_sizes[j, [0, 4]] = rows
+        elif touch.kind % kinds.SWAPPED == kinds.Pair.POLYTOPE_CYLINDER:
+            model.pair_sizes[j, 0] = rows[0]

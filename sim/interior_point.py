@@ -130,13 +130,15 @@ def interior_point(
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
-            apart = not (out.status == _SOLVED and overlapping(model, work))
-            for _ in range(_CHOICES):
-                if apart:
+            misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+            for choice in range(_CHOICES):
+                if misplaced != 1 or work.pair_free[0] == 1:
                     break
+                if choice > 0:
+                    work.pair_free[0] = 2
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
-                apart = not (out.status == _SOLVED and overlapping(model, work))
-            if apart and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
+                misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+            if misplaced == 0 and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
             out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
             work.pair_free[0] = (attempt + 1) // 2 % 2

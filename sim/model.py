@@ -114,6 +114,11 @@ class Late(IntEnum):
     ALL_NEAR = 55
     # gears
     APPLY_GEARS = 56
+    # cylinders against polytopes and cylinders
+    CYLINDER_DISTANCE = 57
+    COLLIDE_CYLINDERS = 58
+    CHOOSE_CYLINDERS = 59
+    CYLINDER_BEFORE = 60
 
 
 class Model(NamedTuple):
@@ -232,9 +237,10 @@ class Work(NamedTuple):
     far_first: Integers  # (nground,) first contacts of the far clusters
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
+    pair_kept: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (1,) 1: elements are chosen anew at every pose
+    pair_free: Integers  # (1,) 1: elements are chosen anew at every pose; 2: those that press are kept beside new ones
     far: Matrix  # (nground, 24) see far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

@@ -17,6 +17,7 @@ from math import sqrt
 from sim.collision.collide import collide_chosen
 from sim.model import Late, Matrix, Model, Work
 from sim.pair_choice import choose_shapes
+from sim.pair_cylinders import collide_cylinders, on_cylinder
 from sim.pair_pose import place_shapes
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from solvers.jit import kernel
@@ -56,9 +57,12 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
     pose = work.pair_relative[first]
     if work.pair_free[0] == 1:
         choose_shapes(model, work, first)
+    elif on_cylinder(kind):
+        collide_cylinders(model, work, first)
+        return
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        if work.pair_free[0] == 0:
+        if work.pair_free[0] != 1:
             collide_chosen(
                 kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
             )

@@ -12,11 +12,13 @@ the way of one step above the ground. It is the usual law, with a floor that imp
 so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. What comes
 slower than max(2 g h, sqrt(kappa / (m h))) is no impact: it would be back within a few steps, or the forces of the
 central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
-example). Where the impulses of a step did work in all,
+example); so does the turning of bodies, of first order in the time step: the impulse acts along the normal at the end
+of the step, the gap changes along those on the way. Where the impulses f of a step did work in all,
 
-    sum of 1/2 (gamma (v_n + v_n') + beta (v_t + v_t')) > 0,     ' before,
+    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before,
 
-its restitutions are halved, all of them, and it is solved again: without restitution they never do.
+its restitutions are lowered, all of them by the same part, and it is solved again, until they do none: without
+restitution they do not.
 
 Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
 of 2, 14 phi1, 15 phi2. Derivatives: restitution_gradient.py.
@@ -31,13 +33,13 @@ from math import sqrt
 from sim.contact import contact_jacobian, contact_kinematics
 from sim.friction import contact_impulse
 from sim.model import Late, Model, Work
-from sim.pairs import is_absent, pair_kinematics
-from sim.rotation import Vec3, cross
+from sim.pairs import is_absent, pair_arm, pair_force, pair_kinematics
+from sim.rotation import Vec3, cross, transposed_times
 from solvers.jit import kernel
 from solvers.late import late
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none
-_LEAST = 0.1  # of the restitution; below, there is none
+_FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are
 _NEVER = 1e9  # [m]
 
 
@@ -120,57 +122,67 @@ def subtract_floors(model: Model, work: Work) -> None:
 
 
 @kernel
-def earlier_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
-    """Velocity over the interval 1-2 of the point of body i at (x, y, z) from its centre of mass; 0 for the world."""
+def velocity_sum(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity of the point (x, y, z) of body i at configuration 2 over the interval 1-2, plus that over 2-3; 0 for the
+    world.
+    """
     if i < 0:
         return 0.0, 0.0, 0.0
-    w = work.turn_in[i]
-    q = 2.0 / h
-    vx, vy, vz = cross(q * w[1], q * w[2], q * w[3], x, y, z)
-    a = work.pos1[i]
-    b = work.pos2[i]
-    return (b[0] - a[0]) / h + vx, (b[1] - a[1]) / h + vy, (b[2] - a[2]) / h + vz
+    before, after = work.turn_in[i], work.turn[i]
+    a, b, c = work.pos1[i], work.pos2[i], work.pos3[i]
+    wx, wy, wz = before[1] + after[1], before[2] + after[2], before[3] + after[3]
+    vx, vy, vz = cross(wx, wy, wz, x - b[0], y - b[1], z - b[2])
+    return (c[0] - a[0] + 2.0 * vx) / h, (c[1] - a[1] + 2.0 * vy) / h, (c[2] - a[2] + 2.0 * vz) / h
 
 
 @kernel
-def tangential_work(model: Model, work: Work, h: float, c: int, f1: float, f2: float) -> float:
-    """1/2 beta (v_t + v_t')"""
+def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
+    """1/2 f.(u + u') of contact c at the point P where its impulse f acts, at configuration 2."""
     ground = model.contact_height.shape[0]
-    k = work.contact_kin[c]
     a = model.contact_body[c]
-    F = work.contact_frame[c] if c < ground else work.pair_frame[c - ground]
-    x, y, z = earlier_velocity(work, h, a, k[3], k[4], k[5])
-    if c >= ground:
-        b = model.coupling_body[model.pair_coupling[c - ground], 1]
-        if b >= 0:
-            p = work.pos3
-            r0, r1, r2 = k[3] + p[a, 0] - p[b, 0], k[4] + p[a, 1] - p[b, 1], k[5] + p[a, 2] - p[b, 2]
-            u, v, w = earlier_velocity(work, h, b, r0, r1, r2)
-            x, y, z = x - u, y - v, z - w
-    t1 = k[1] + F[3] * x + F[4] * y + F[5] * z
-    t2 = k[2] + F[6] * x + F[7] * y + F[8] * z
-    return 0.5 * (f1 * t1 + f2 * t2)
+    fn, f1, f2 = contact_impulse(model, work, c)
+    if c < ground:
+        k = work.contact_kin[c]
+        p = work.pos2[a]
+        x, y, z = velocity_sum(work, h, a, p[0] + k[3], p[1] + k[4], p[2] + k[5])
+        fx, fy, fz = transposed_times(work.contact_frame[c], fn, f1, f2)
+        return 0.5 * (fx * x + fy * y + fz * z)
+    if is_absent(work, c - ground):
+        return 0.0
+    o = work.origin
+    rx, ry, rz = pair_arm(model, work, c - ground)
+    x, y, z = velocity_sum(work, h, a, o[0] + rx, o[1] + ry, o[2] + rz)
+    b = model.coupling_body[model.pair_coupling[c - ground], 1]
+    u, v, w = velocity_sum(work, h, b, o[0] + rx, o[1] + ry, o[2] + rz)
+    fx, fy, fz = pair_force(work, c - ground, fn, f1, f2)
+    return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
 
 
 @late(Late.GAINED_ENERGY, False)
 def gained_energy(model: Model, work: Work, h: float) -> bool:
-    """Whether there were impacts, and the impulses of the solved step did work; floors are lower then."""
+    """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
+
+    Lowering all rebounds by a part r takes some r/2 sum of gamma e |v_n'|. Parts are powers of 1/2: between them the
+    step stays a smooth function of its start, with the derivatives of restitution_gradient.py.
+    """
     gain = 0.0
     size = 0.0
-    impacts = False
+    rebound = 0.0
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]
-            impacts = impacts or b[1] > 0.0
-            fn, f1, f2 = contact_impulse(model, work, c)
+            fn, _, _ = contact_impulse(model, work, c)
+            gain += impulse_work(model, work, h, c)
             gap = work.contact_kin[c, 0] + b[0]
-            gain += 0.5 * fn * (gap - b[14]) / h + tangential_work(model, work, h, c, f1, f2)
             size += 0.5 * fn * (abs(gap - b[15]) + abs(b[15] - b[14])) / h
-    if not impacts or not gain > _NOISE * size:
+            rebound += 0.5 * fn * b[1] * abs(b[15] - b[14]) / h
+    if not rebound > 0.0 or not gain > _NOISE * size:
         return False
-    share = 0.5 * work.bounce_share[0]
-    if share < _LEAST:
-        share = 0.0
+    least = max(gain / rebound, 2.0 * (1.0 - work.bounce_share[0]))
+    lost = _FINEST
+    while lost < least:
+        lost *= 2.0
+    share = max(1.0 - lost, 0.0)
     work.bounce_share[0] = share
     raise_floors(model, work, h, share)
     return True

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sim.collision import kinds
 from sim.collision.broad import bounding_radius
-from sim.collision.polytope import EDGES
+from sim.collision.polytope import EDGES, SPARE
+from sim.collision.polytope_cylinder import CROSSINGS, RIM_POINTS
 from sim.parts import WORLD
 from sim.polytope import Polytope, hull_table
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
@@ -63,6 +64,9 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
         return _corners(collision, (a, first), (b, second))
     if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
         return _corners(collision, (b, second), (a, first))
+    for one, other in ((solids, second), (solids[::-1], first)):
+        if isinstance(other, Cylinder) and type(one[0][1]) in (Capsule, Box, Polytope):
+            return _on_cylinder(collision, one)
     if Polytope in (type(first), type(second)) and {type(first), type(second)} <= _CONVEX:
         return _polytopes(collision, solids if isinstance(second, Polytope) else solids[::-1])
     codes = [_CODES.get(type(first)), _CODES.get(type(second))]
@@ -104,10 +108,7 @@ def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[T
     ]
 
 
-_REASON = (
-    "a cylinder touches spheres and half-spaces, where its distance is known with its derivatives; "
-    "give one of the two another shape, such as a capsule, a box or a polytope"
-)
+_REASON = "half-spaces do not end, so one of the two has to be another shape; the ends of a string are both strings"
 
 
 def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> list[Touch]:
@@ -134,8 +135,32 @@ def _polytopes(collision: Collision, ends: list[End]) -> list[Touch]:
     around = [float(np.linalg.norm(c, axis=1).max()) + r for c, r in zip(corners, radii, strict=True)]
     thick = [r if len(c) < 4 else float(np.ptp(c, axis=0).min()) for c, r in zip(corners, radii, strict=True)]
     sizes = np.array([0.0, radii[0], thick[0], 0.0, 0.0, radii[1], thick[1], 0.0])
-    code, number = int(kinds.Pair.POLYTOPE_POLYTOPE), len(corners[0]) + len(corners[1])
-    number += EDGES if tables[0][0, 1] > 0 else 0
+    number = len(corners[0]) + len(corners[1]) + (EDGES if tables[0][0, 1] > 0 else SPARE)
+    return _points(collision, ends, kinds.Pair.POLYTOPE_POLYTOPE, number, sizes, around, tables)
+
+
+def _on_cylinder(collision: Collision, ends: list[End]) -> list[Touch]:
+    """The contact points of a capsule, box or polytope and a cylinder: corners, points of rims, crossings."""
+    table, radius = hull_table(ends[0][1])
+    corners = table[1 : 1 + int(table[0, 0]), :3]
+    cylinder = _sizes(ends[1][1])
+    sizes = np.array([0.0, radius, radius or float(np.ptp(corners, axis=0).min()), 0.0, *cylinder, 0.0, 0.0])
+    around = [float(np.linalg.norm(corners, axis=1).max()) + radius, bounding_radius(kinds.Shape.CYLINDER, cylinder)]
+    number = len(corners) + CROSSINGS + (RIM_POINTS if table[0, 2] > 0 else 0)
+    return _points(collision, ends, kinds.Pair.POLYTOPE_CYLINDER, number, sizes, around, (table,))
+
+
+def _points(
+    collision: Collision,
+    ends: list[End],
+    kind: kinds.Pair,
+    number: int,
+    sizes: Floats,
+    around: list[float],
+    tables: tuple[Floats, ...],
+) -> list[Touch]:
+    """The contact points of two shapes of which at least one has a table."""
+    code = int(kind)
     if ends[0][0] < 0:  # the world is always b
         ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
     places = np.array([_place(shape) for _, shape in ends])

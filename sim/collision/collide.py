@@ -36,7 +36,7 @@ def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: 
                      dr = v + w x r, dR = [w] R
     d phi = n.(v + w x p).
     """
-    choose(kind, feature, arrange(kind, sizes, R, r, OPEN), sizes, hull, R, r, out)
+    choose(kind, feature, arrange(kind, sizes, hull, R, r, OPEN), sizes, hull, R, r, out)
 
 
 @kernel
@@ -57,8 +57,8 @@ def open_sides(kind: int, sizes: Vector, R: Vector, r: Vector) -> int:
 
 
 @kernel
-def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arrangement:
-    """The discrete part of a collision of boxes: which face or edges of the two decide, for all features.
+def arrange(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, sides: int) -> Arrangement:
+    """The discrete part of a collision: which face or edges of two boxes or polytopes decide, for all features.
 
     Once per pair and pose, where it saves most of the time of `collide`. sides: of the axes, those to choose from
     (`open_sides`); OPEN for all.
@@ -69,6 +69,8 @@ def arrange(kind: int, sizes: Vector, R: Vector, r: Vector, sides: int) -> Arran
     if kind == Pair.CAPSULE_BOX:
         h = (sizes[4], sizes[5], sizes[6])
         return capsule_box.separation((r[0], r[1], r[2]), (R[2], R[5], R[8]), sizes[1], h, sides)
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return polytope.separation(sizes, hull, R, r)
     return 0, -1, 0.0, 1.0, 1.0
 
 
@@ -94,7 +96,7 @@ def _choose(
         h = (sizes[4], sizes[5], sizes[6])
         return capsule_box.choose_elements(feature, arrangement, sizes[0], sizes[1], h, R, r, out)
     if kind == Pair.POLYTOPE_POLYTOPE:
-        return polytope.choose_elements(feature, sizes, hull, R, r, out)
+        return polytope.choose_elements(feature, arrangement, sizes, hull, R, r, out)
     code = choose_points(feature, sizes, R, r) if kind == Pair.CAPSULE_CAPSULE else 1
     _put(kind, feature, code, sizes, hull, R, r, out)
     return code if out[0] < ABSENT else 0

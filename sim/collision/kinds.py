@@ -17,7 +17,7 @@ class Shape(IntEnum):
     BOX = 2  # half extents along x, y, z
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
-    POLYTOPE = 6  # row of its table (hull.py), radius around it; as other shapes are against a POLYTOPE
+    POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
@@ -37,6 +37,8 @@ class Pair(IntEnum):
     CYLINDER_HALFSPACE = 10
     STRING = 11
     POLYTOPE_POLYTOPE = 12
+    POLYTOPE_CYLINDER = 13
+    CYLINDER_CYLINDER = 14
 
 
 _PAIRS = {
@@ -53,6 +55,8 @@ _PAIRS = {
     (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
     (Shape.STRING, Shape.STRING): Pair.STRING,
     (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
+    (Shape.POLYTOPE, Shape.CYLINDER): Pair.POLYTOPE_CYLINDER,
+    (Shape.CYLINDER, Shape.CYLINDER): Pair.CYLINDER_CYLINDER,
 }
 
 _COUNT = {
@@ -62,6 +66,7 @@ _COUNT = {
     Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
     Pair.BOX_HALFSPACE: 8,  # corners
     Pair.CYLINDER_HALFSPACE: 8,  # lowest points of two rims, three fixed points on each
+    Pair.CYLINDER_CYLINDER: 25,  # eight points on the rims of each, nine places where axes and rims cross
 }
 
 
@@ -75,5 +80,5 @@ def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
 
 
 def count(kind: Pair) -> int:
-    """How many contact points the pair may have: features 0 to count - 1 of `collide`; of polytopes see polytope.py."""
+    """How many contact points the pair may have: features 0 to count - 1 of `collide`; of polytopes see touch.py."""
     return _COUNT.get(kind, 1)

@@ -1,9 +1,10 @@
 """Polytope against polytope: corners of one against the other, edges against edges. Sphere, capsule, box are polytopes.
 
     feature k < na      corner k of a against the corner, edge or face of b that is nearest to it; inside b against the
-                        face that it is least deep below
+                        face that it is least deep below. Where the shapes overlap least along the normal of a face of
+                        b: below that face against it
     k - na < nb         corner k - na of b against a
-    the rest            EDGES pairs of edges that cross, with a normal that points out of b and into a
+    the rest            EDGES pairs of edges that cross, with a normal that points out of b and into a; or SPARE
 
 Codes: 2 + the row of the element of the other polytope (hull.py), from its row o; for two edges 2 + edge of a +
 edge of b times _MANY, negative where the normal is along ua x ub. The shapes may have a radius around them.
@@ -11,9 +12,11 @@ edge of b times _MANY, negative where the normal is along ua x ub. The shapes ma
 
 from __future__ import annotations
 
+from sim.collision.axes import Arrangement
 from sim.collision.box import to_a, to_b
 from sim.collision.clip import edge_normal, on_edges
 from sim.collision.hull import above, edge, edge_faces, highest_face, nearest_edge, row
+from sim.collision.kept import original
 from sim.collision.witness import (
     FACE,
     LINE,
@@ -34,6 +37,7 @@ from sim.rotation import Vec3, cross
 from solvers.jit import inner_kernel
 
 EDGES = 8
+SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
 _MANY = 4096
 _CROSSING = 1e-2  # sine of the angle from which on two edges cross
 _LEANING = 0.05  # part of a face normal by which the normal of two edges may lie outside of the arc of their faces
@@ -57,6 +61,12 @@ def nearest_element(hull: Matrix, o: int, x: Vec3) -> int:
 
 
 @inner_kernel
+def below(hull: Matrix, o: int, face: int, x: Vec3) -> bool:
+    """Whether a point is below a face (its row), seen along its normal."""
+    return dot(row(hull, face), x) < hull[face, 3] and above(hull, o, face, x)
+
+
+@inner_kernel
 def element(hull: Matrix, o: int, k: int, x: Vec3) -> tuple[Vec3, Vec3, float, Vec3, Vec3]:
     """Normal n, direction u, distance d, bend and slip (witness.py) of the element in row o + k at a point."""
     corners, lines = int(hull[o, 0]), int(hull[o, 1])
@@ -72,7 +82,7 @@ def element(hull: Matrix, o: int, k: int, x: Vec3) -> tuple[Vec3, Vec3, float, V
 
 
 @inner_kernel
-def _points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3, leaning: float) -> bool:
+def points_out(hull: Matrix, o: int, e: int, u: Vec3, n: Vec3, leaning: float) -> bool:
     """Whether n, across edge e along u, lies between the normals of its two faces, or `leaning` beyond them."""
     f, g = edge_faces(hull, o, e)
     if f < 0:
@@ -102,62 +112,62 @@ def _edge_axis(
     x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
     n = edge_normal(ub, ua, 1.0)
     over = 1
-    if not _points_out(hull, ob, j, ub, n, leaning):
+    if not points_out(hull, ob, j, ub, n, leaning):
         over, n = -1, (-n[0], -n[1], -n[2])
-        if not _points_out(hull, ob, j, ub, n, leaning):
+        if not points_out(hull, ob, j, ub, n, leaning):
             return 0, 0.0, False
     w = to_a(R, n)
-    if not _points_out(hull, oa, i, u, (-w[0], -w[1], -w[2]), leaning):
+    if not points_out(hull, oa, i, u, (-w[0], -w[1], -w[2]), leaning):
         return 0, 0.0, False
     d = dot(n, x) - dot(n, y)
     return over * (2 + i + _MANY * j), d, on_edges(x, ua, 0.5 * la, y, ub, 0.5 * lb, 0.0)
 
 
 @inner_kernel
-def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
-    """Of the normals of faces and of pairs of edges, the largest distance along one; negative where the two overlap."""
+def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement:
+    """Of the normals of faces and of pairs of edges, the one along which the two are farthest apart, or overlap least:
+    (row of the face, or -1 for edges; -1; distance along it; 1; 1).
+    """
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
-    best = -1e300
+    best, face = -1e300, -1
     for f in range(ob + 1 + nb + int(hull[ob, 1]), ob + 1 + nb + int(hull[ob, 1]) + int(hull[ob, 2])):
         least = 1e300
         for k in range(na):
             x = to_b(R, row(hull, oa + 1 + k))
             least = min(least, dot(row(hull, f), (x[0] + r[0], x[1] + r[1], x[2] + r[2])) - hull[f, 3])
-        best = max(best, least)
+        if least > best:
+            best, face = least, f
     for f in range(oa + 1 + na + int(hull[oa, 1]), oa + 1 + na + int(hull[oa, 1]) + int(hull[oa, 2])):
         least = 1e300
         for k in range(nb):
             y = row(hull, ob + 1 + k)
             least = min(least, dot(row(hull, f), to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))) - hull[f, 3])
-        best = max(best, least)
+        if least > best:
+            best, face = least, f
     for i in range(int(hull[oa, 1])):
         for j in range(int(hull[ob, 1])):
             code, d, _ = _edge_axis(i, j, 0.0, sizes, hull, R, r)
-            if code != 0:
-                best = max(best, d)
-    return best
+            if code != 0 and d > best + TIE * abs(best):
+                best, face = d, -1
+    return face, -1, best, 1.0, 1.0
 
 
 @inner_kernel
-def two_edges(m: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+def two_edges(m: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     """The m-th pair of edges that cross with a normal out of b; 0 where there are fewer.
 
     Edges on the far sides of the two cross as well, with a negative distance. Such pairs count only where the shapes
-    overlap, and least along that normal.
+    overlap, and least along that normal: by `deepest`.
     """
     oa, ob = int(sizes[0]), int(sizes[4])
-    deepest = 1.0  # not known yet
     for i in range(int(hull[oa, 1])):
         for j in range(int(hull[ob, 1])):
             code, d, crosses = _edge_axis(i, j, _LEANING, sizes, hull, R, r)
             if code == 0 or not crosses:
                 continue
-            if d < 0.0:
-                if deepest == 1.0:
-                    deepest = min(separation(sizes, hull, R, r), 0.5)
-                if deepest > 0.0 or d < (1.0 + TIE) * deepest:
-                    continue
+            if d < 0.0 and (deepest > 0.0 or d < (1.0 + TIE) * deepest):
+                continue
             if m == 0:
                 return code
             m -= 1
@@ -166,35 +176,44 @@ def two_edges(m: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
 
 @inner_kernel
 def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
-    """The elements of feature `feature` where it is a corner and the face of the other shape that it is highest above;
-    0 where there is none.
+    """The elements of feature `feature` where it is a corner: the face of the other shape that it is highest above, if
+    it is not below that one, else the nearest element. 0 for what is no corner.
     """
+    radius = sizes[1] + sizes[5]
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
-        face, _ = highest_face(hull, ob, (x[0] + r[0], x[1] + r[1], x[2] + r[2]))
-        return 2 + face - ob if face > 0 else 0
+        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+        face, height = highest_face(hull, ob, x)
+        return 2 + (face - ob if face > 0 and height >= radius else nearest_element(hull, ob, x))
     if feature < na + nb:
         y = row(hull, ob + 1 + feature - na)
-        face, _ = highest_face(hull, oa, to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])))
-        return 2 + face - oa if face > 0 else 0
+        y = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
+        face, height = highest_face(hull, oa, y)
+        return 2 + (face - oa if face > 0 and height >= radius else nearest_element(hull, oa, y))
     return 0
 
 
 @inner_kernel
-def choose_elements(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> int:
+def choose_elements(
+    feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
+) -> int:
     """The elements that are contact point `feature` at this pose; writes the contact, too."""
+    face, _, s, _, _ = arrangement
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     if feature < na:
         x = to_b(R, row(hull, oa + 1 + feature))
-        code = 2 + nearest_element(hull, ob, (x[0] + r[0], x[1] + r[1], x[2] + r[2]))
+        x = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+        code = 2 + (face - ob if s < 0.0 and face > ob and below(hull, ob, face, x) else nearest_element(hull, ob, x))
     elif feature < na + nb:
         y = row(hull, ob + 1 + feature - na)
-        code = 2 + nearest_element(hull, oa, to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2])))
+        y = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
+        own = s < 0.0 and 0 <= face < ob and below(hull, oa, face, y)
+        code = 2 + (face - oa if own else nearest_element(hull, oa, y))
     else:
-        code = two_edges(feature - na - nb, sizes, hull, R, r)
+        code = two_edges(feature - na - nb, s, sizes, hull, R, r)
     put_elements(feature, code, sizes, hull, R, r, out)
     return code
 
@@ -202,6 +221,7 @@ def choose_elements(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vec
 @inner_kernel
 def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
     """Contact of the elements `code`."""
+    feature, code = original(feature, code)
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
     radii = (sizes[1], sizes[5])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sim.collision.box import vertex_on_box
-from sim.collision.witness import FACE, LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
+from sim.collision.cylinder import nearest, vertex_on_cylinder
+from sim.collision.witness import LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
 from sim.model import Vector
 from solvers.jit import inner_kernel
 
@@ -37,28 +38,9 @@ def sphere_box(sizes: Vector, r: Vector, out: Vector) -> None:
 
 @inner_kernel
 def sphere_cylinder(sizes: Vector, r: Vector, out: Vector) -> None:
-    """Distance to the side, an end face or a rim; a centre inside is pushed out of the nearest of side and ends.
-
-    Around a rim of radius rho: dy = (rho/|r_xy|) t t^T delta, K = (I - n n^T - t t^T)/d + (n.e/|r_xy|) t t^T, with e
-    the radial and t the tangential direction.
-    """
-    x, radius, rho, half = (r[0], r[1], r[2]), sizes[0], sizes[4], sizes[5]
-    top = 1.0 if x[2] >= 0.0 else -1.0
-    e, a = direction((x[0], x[1], 0.0), NOWHERE, Z)
-    high = abs(x[2]) - half
-    u, bend, slip, rb = NOWHERE, NOWHERE, FACE, 0.0
-    if a - rho <= rho * TIE and (high > half * TIE or high >= a - rho):
-        n, d = (0.0, 0.0, top), high
-    elif high <= half * TIE:
-        n, d, rb = e, a, rho
-        u, bend, slip = Z, bend_line(d), LINE
-    else:
-        y = (rho * e[0], rho * e[1], top * half)
-        n, d = direction(x, y, NOWHERE)
-        k = bend_point(d)[0]
-        u = (-e[1], e[0], 0.0)
-        bend, slip = (k, -k, (n[0] * e[0] + n[1] * e[1]) / a - k), (0.0, 0.0, rho / a)
-    vertex_a(x, n, u, d, (radius, rb), bend, slip, out)
+    """Distance to the side, an end face or a rim; a centre inside is pushed out of the nearest of side and ends."""
+    x, rho, half = (r[0], r[1], r[2]), sizes[4], sizes[5]
+    vertex_on_cylinder(nearest(x, rho, half), x, sizes[0], rho, half, out)
 
 
 @inner_kernel

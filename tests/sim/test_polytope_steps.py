@@ -9,16 +9,13 @@ import pytest
 from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
+from dojo_opt.report.mechanics.encounters import ROCK, SHAPES, approaching, two
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
 from sim.polytope import Polytope
 from sim.shapes import Box
 
-ROCK = Polytope.about_centroid(
-    [[0.3, 0, 0], [-0.2, 0.2, -0.1], [-0.2, -0.25, -0.1], [0, 0.05, 0.3], [0.1, 0.2, 0.1], [0.05, -0.2, -0.2]]
-)
 OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
 
 

@@ -4,7 +4,8 @@ distance    of the nearest points, against the largest separation of the two alo
 frame       how far the points that the contact names, p + phi/2 n and p - phi/2 n, are from the surfaces of a and b [m]
 derivative  of distance, normal and point of every contact point, against central differences; relative
 
-Of six pairs of random sizes and poses each; the lowest point of a cylinder's rim is rounded, by 1e-4 of its radius.
+Of six pairs of random sizes and poses each; the point of a cylinder's rim that is nearest to a face is rounded, by 1e-4
+of its radius.
 """
 
 from __future__ import annotations
@@ -14,14 +15,18 @@ from numpy.typing import NDArray
 
 from dojo_opt.report.mechanics.solids import PAIRS, Case, distance, features, off_surface, random_case, shapes
 from sim.collision.axes import OPEN
-from sim.collision.collide import arrange, choose, collide, collide_chosen
+from sim.collision.collide import arrange, choose, collide_chosen
+from sim.collision.cylinders import choose_on_cylinder, collide_with_cylinder
 from sim.collision.kinds import OUT, Pair, Shape
 
 Floats = NDArray[np.float64]
 
 DEPTHS = {"near": -0.1, "touching": -1e-9, "deep": 0.05}  # [m]
 BARS = {"distance": 1e-5, "frame": 1e-5, "derivative": 1e-6}
-ROUNDED = {"cylinder_halfspace": 1e-4}  # bars of distance and frame [m]
+CYLINDERS = (Pair.POLYTOPE_CYLINDER, Pair.CYLINDER_CYLINDER)
+ROUNDED = dict.fromkeys(  # bars of distance and frame [m]
+    ("cylinder_halfspace", "box_cylinder", "polytope_cylinder", "cylinder_cylinder"), 1e-4
+)
 TRIALS = 6
 
 
@@ -31,20 +36,34 @@ def bar(name: str, measure: str) -> float:
     return BARS[what] if what == "derivative" else ROUNDED.get(name, BARS[what])
 
 
-def contacts(case: Case, R: Floats, r: Floats) -> list[Floats]:
-    """What `collide` says of every contact point; NaN for those that do not exist."""
-    outs = []
-    for feature in range(features(case)):
-        out = np.empty(OUT)
-        pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
-        collide(int(case.kind), feature, case.sizes, case.hull, *pose, out)
-        outs.append(out if out[0] < 1e8 else np.full(OUT, np.nan))
-    return outs
+def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
+    """The contact points that there are at a pose, and the elements of the shapes that make each."""
+    pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
+    number, out = features(case), np.empty(OUT)
+    if case.kind in CYLINDERS:
+        codes = np.zeros(number, dtype=np.int64)
+        choose_on_cylinder(int(case.kind), case.sizes, case.hull, *pose, np.empty(12), codes, 0, out)
+        return [(feature, int(code)) for feature, code in enumerate(codes) if code != 0]
+    faces = arrange(int(case.kind), case.sizes, case.hull, *pose, OPEN)
+    found = [choose(int(case.kind), k, faces, case.sizes, case.hull, *pose, out) for k in range(number)]
+    return [(feature, int(code)) for feature, code in enumerate(found) if code != 0]
+
+
+def contact(case: Case, feature: int, code: int, R: Floats, r: Floats) -> Floats:
+    """What the kernels say of a contact point of these elements, (43,)."""
+    pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
+    out = np.empty(OUT)
+    if case.kind in CYLINDERS:
+        collide_with_cylinder(int(case.kind), feature, code, case.sizes, case.hull, *pose, np.empty(12), out)
+    else:
+        collide_chosen(int(case.kind), feature, code, case.sizes, case.hull, *pose, out)
+    return out
 
 
 def nearest(case: Case, R: Floats, r: Floats) -> Floats:
     """The contact point of least distance."""
-    return min((out for out in contacts(case, R, r) if out[0] < 1e8), key=lambda out: out[0])
+    outs = (contact(case, feature, code, R, r) for feature, code in chosen(case, R, r))
+    return min(outs, key=lambda out: float(out[0]))
 
 
 def turn(w: Floats) -> Floats:
@@ -79,22 +98,12 @@ def derivative_error(case: Case, R: Floats, r: Floats) -> float:
 
     Of the elements of the shapes that are in contact at this pose, which a step keeps while it is solved.
     """
-    flat = np.ascontiguousarray(R).ravel()
-    faces = arrange(int(case.kind), case.sizes, flat, r, OPEN)
-    found = []
-    for feature in range(features(case)):
-        out = np.empty(OUT)
-        code = choose(int(case.kind), feature, faces, case.sizes, case.hull, flat, r, out)
-        if code != 0:
-            found.append((feature, code, out))
+    found = [(feature, code, contact(case, feature, code, R, r)) for feature, code in chosen(case, R, r)]
 
     def moved(twist: Floats) -> Floats:
         T = turn(twist[3:])
-        outs = np.empty((len(found), OUT))
-        pose = (T @ R).ravel(), T @ r + twist[:3]
-        for out, (feature, code, _) in zip(outs, found, strict=True):
-            collide_chosen(int(case.kind), feature, code, case.sizes, case.hull, *pose, out)
-        return outs[:, :7]
+        pose = T @ R, T @ r + twist[:3]
+        return np.stack([contact(case, feature, code, *pose)[:7] for feature, code, _ in found])
 
     worst = 0.0
     estimates = []

@@ -8,13 +8,22 @@ from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
 from sim.polytope import Polytope
-from sim.shapes import Box, Capsule, Shape, Sphere
+from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere
 from sim.simulator import Simulator
 
 SHAPES: dict[str, Shape] = {
     "sphere": Sphere(0.2),
     "capsule": Capsule(0.15, 0.4),
     "box": Box(0.4, 0.3, 0.5),
+}
+ROCK = Polytope.about_centroid(
+    [[0.3, 0, 0], [-0.2, 0.2, -0.1], [-0.2, -0.25, -0.1], [0, 0.05, 0.3], [0.1, 0.2, 0.1], [0.05, -0.2, -0.2]]
+)
+ALL: dict[str, Shape | Polytope] = {
+    **SHAPES,
+    "cylinder": Cylinder(0.2, 0.4),
+    "wheel": Cylinder(0.3, 0.2),
+    "polytope": ROCK,
 }
 
 

@@ -13,14 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.collision.kinds import SIZES, Pair, Shape, count, pair
-from sim.collision.polytope import EDGES
+from sim.collision.polytope import EDGES, SPARE
+from sim.collision.polytope_cylinder import CROSSINGS, RIM_POINTS
 from sim.polytope import Polytope, hull_table
-from sim.shapes import Box, Capsule, Sphere
+from sim.shapes import Box, Capsule, Cylinder, Sphere
 
 Floats = NDArray[np.float64]
 
 POLYTOPES = ("sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope")
-PAIRS = (*(p.name.lower() for p in Pair if p != Pair.POLYTOPE_POLYTOPE), *POLYTOPES)
+ON_CYLINDERS = ("capsule_cylinder", "box_cylinder", "polytope_cylinder")
+_OF_POLYTOPES = (Pair.POLYTOPE_POLYTOPE, Pair.POLYTOPE_CYLINDER)
+PAIRS = (*(p.name.lower() for p in Pair if p not in _OF_POLYTOPES), *POLYTOPES, *ON_CYLINDERS)
 
 
 def shapes(kind: Pair) -> tuple[Shape, Shape]:
@@ -39,7 +42,7 @@ class Case(NamedTuple):
 
 def random_case(name: str, rng: np.random.Generator) -> Case:
     """A pair of shapes with random sizes."""
-    if name not in POLYTOPES:
+    if name not in (*POLYTOPES, *ON_CYLINDERS):
         none = np.zeros((0, 3))
         return Case(Pair[name.upper()], rng.uniform(0.15, 0.5, 2 * SIZES), np.zeros((1, 4)), (none, none))
     solids = []
@@ -53,8 +56,13 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
                 "capsule": Capsule(0.5 * size[0], size[1]),
                 "box": Box(*size),
                 "polytope": Polytope.about_centroid(size * ball),
+                "cylinder": Cylinder(size[0], 2.0 * size[1]),
             }[word]
         )
+    if isinstance(solids[1], Cylinder):
+        table, radius = hull_table(solids[0])
+        sizes = np.array([0.0, radius, 0.0, 0.0, solids[1].radius, 0.5 * solids[1].length, 0.0, 0.0])
+        return Case(Pair.POLYTOPE_CYLINDER, sizes, table, (table[1 : 1 + int(table[0, 0]), :3], np.zeros((0, 3))))
     (a, ra), (b, rb) = (hull_table(solid) for solid in solids)
     sizes = np.array([0.0, ra, 0.0, 0.0, len(a), rb, 0.0, 0.0])
     points = (a[1 : 1 + int(a[0, 0]), :3], b[1 : 1 + int(b[0, 0]), :3])
@@ -63,9 +71,11 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
 
 def features(case: Case) -> int:
     """How many contact points there may be."""
+    if case.kind == Pair.POLYTOPE_CYLINDER:
+        return len(case.points[0]) + CROSSINGS + (RIM_POINTS if case.hull[0, 2] > 0 else 0)
     if case.kind != Pair.POLYTOPE_POLYTOPE:
         return count(case.kind)
-    return sum(len(p) for p in case.points) + (EDGES if len(case.points[0]) > 1 else 0)
+    return sum(len(p) for p in case.points) + (EDGES if len(case.points[0]) > 1 else SPARE)
 
 
 def support(case: Case, side: int, n: Floats) -> Floats:

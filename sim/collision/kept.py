@@ -1,0 +1,25 @@
+"""Elements of one contact point in the place of another: those of a choice before that still press.
+
+The number of a point that has taken over others says which: KEPT + feature 2^24 + code.
+"""
+
+from __future__ import annotations
+
+from solvers.jit import inner_kernel
+
+KEPT = 1 << 40
+_CODES = 1 << 24
+
+
+@inner_kernel
+def elsewhere(feature: int, code: int) -> int:
+    """Elements `code` of contact point `feature`, as those of another one."""
+    return KEPT + feature * _CODES + code
+
+
+@inner_kernel
+def original(feature: int, code: int) -> tuple[int, int]:
+    """The contact point and its elements that a code stands for."""
+    if code < KEPT:
+        return feature, code
+    return (code - KEPT) // _CODES, (code - KEPT) % _CODES

@@ -1,0 +1,105 @@
+"""Elements that pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those
+of the other in the first. Collisions of polytopes and of cylinders have room for them (sim/collision/kept.py).
+"""
+
+from __future__ import annotations
+
+from sim.collision.box import to_a, to_b
+from sim.collision.cylinder_cylinder import RIM_POINTS
+from sim.collision.kept import elsewhere
+from sim.collision.kinds import SWAPPED, Pair
+from sim.collision.witness import dot
+from sim.model import Matrix, Model, Vector, Work
+from solvers.jit import inner_kernel, kernel
+
+NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses
+
+
+@inner_kernel
+def last_point(model: Model, first: int) -> int:
+    """End of the points of the collision whose first pair this is."""
+    end = first + 1
+    while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
+        end += 1
+    return end
+
+
+@kernel
+def least_size(model: Model, j: int) -> float:
+    """The smallest of the sizes of the shapes of pair j."""
+    least = 1e300
+    for k in range(8):
+        if model.pair_sizes[j, k] > 0.0:
+            least = min(least, model.pair_sizes[j, k])
+    return least
+
+
+@inner_kernel
+def has_no_room(kind: int) -> bool:
+    """Whether a kind of pair is none of polytopes or cylinders: points of the others have sides that stay open."""
+    return kind % SWAPPED < Pair.POLYTOPE_POLYTOPE
+
+
+@inner_kernel
+def room(kind: int, sizes: Vector, hull: Matrix) -> int:
+    """First of the points of a collision that may be made of any elements; very many where there is none."""
+    kind %= SWAPPED
+    if kind == Pair.CYLINDER_CYLINDER:
+        return 2 * RIM_POINTS
+    if kind == Pair.POLYTOPE_CYLINDER:
+        a = int(sizes[0])
+        return int(hull[a, 0]) + (RIM_POINTS if hull[a, 2] > 0.0 else 0)
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return int(hull[int(sizes[0]), 0] + hull[int(sizes[4]), 0])
+    return 1 << 40
+
+
+@inner_kernel
+def gap_before(kind: int, out: Vector, pose: Vector, before: Vector) -> float:
+    """Gap at the pose `before`, along the normal that a contact has at `pose`, of the two points that it is between:
+    how far they have come towards each other since then, whatever the normal was on the way.
+
+    p' = R' R^T (p - r) + r' of a point p of shape a, in the frame of b; of one of b in the frame of a, where the two
+    have changed places, p' = R'^T (R p + r - r').
+    """
+    R, r = pose[:9], (pose[9], pose[10], pose[11])
+    p = (out[4], out[5], out[6])
+    if kind < SWAPPED:
+        q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
+        moved = (p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11])
+    else:
+        q = to_b(R, p)
+        q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
+        moved = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
+    return out[0] - dot((out[1], out[2], out[3]), moved)
+
+
+@kernel
+def remember(model: Model, work: Work, first: int) -> None:
+    """pair_kept: the elements of the points of a collision that press; 0 for the others."""
+    close = NEAR * least_size(model, first)
+    ground = model.contact_height.shape[0]
+    for j in range(first, last_point(model, first)):
+        pressing = work.pair_code[j] != 0 and work.cone[ground + j, 0] < close
+        work.pair_kept[j] = work.pair_code[j] if pressing else 0
+
+
+@kernel
+def keep(model: Model, work: Work, first: int) -> None:
+    """Elements of pair_kept that were not chosen again take the places of points that there are not now."""
+    end = last_point(model, first)
+    begin = first + room(model.pair_kind[first], model.pair_sizes[first], model.hull)
+    free = begin
+    for j in range(first, end):
+        kept = work.pair_kept[j]
+        if kept == 0 or kept == work.pair_code[j]:
+            continue
+        if j < begin:
+            kept = elsewhere(j - first, kept)
+        for k in range(begin, end):
+            if work.pair_code[k] == kept:
+                kept = 0
+        while free < end and work.pair_code[free] != 0:
+            free += 1
+        if kept != 0 and free < end:
+            work.pair_code[free] = kept

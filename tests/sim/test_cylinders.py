@@ -1,0 +1,155 @@
+"""Cylinders against capsules, boxes, polytopes and cylinders: exact far inside, standing, lying, rolling, in motion."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from jacobians import check_jacobian
+
+import dojo_opt as dojo
+from dojo_opt.report.mechanics.collisions import chosen, contact, derivative_error, nearest, turn
+from dojo_opt.report.mechanics.encounters import ROCK, SHAPES, approaching, two
+from dojo_opt.report.mechanics.solids import distance, random_case
+from sim.collisions import Collision
+from sim.mechanism import Mechanism
+from sim.parts import Body, Joint
+from sim.shapes import Box, Capsule, Cylinder
+
+OTHERS = {"capsule": SHAPES["capsule"], "box": SHAPES["box"], "rock": ROCK, "cylinder": Cylinder(0.25, 0.3)}
+PAIRS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder", "cylinder_cylinder"]
+LYING = (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # axis along -y
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_distance_at_any_pose(name: str, rng: np.random.Generator) -> None:
+    """Apart, across one another, deep inside; also with axes and faces that are almost parallel."""
+    for trial in range(60):
+        case = random_case(name, rng)
+        R, r = turn(2.0 * rng.normal(size=3)), 0.4 * rng.normal(size=3)
+        if trial % 3 == 0:
+            R = turn(rng.normal(size=3) * 10.0 ** rng.uniform(-8, -1))
+        # points of a rim towards a plane are rounded by 1e-4 of a radius of at most .5 m; almost parallel lines, which
+        # touch at their ends instead, by 1e-2 of their angle
+        assert nearest(case, R, r)[0] == pytest.approx(distance(case, R, r, rng), abs=1e-4), trial
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_derivatives_at_any_pose(name: str, rng: np.random.Generator) -> None:
+    for _ in range(12):
+        case = random_case(name, rng)
+        R, r = turn(2.0 * rng.normal(size=3)), rng.normal(size=3)
+        assert derivative_error(case, R, 0.5 * r / np.linalg.norm(r)) < 1e-6
+
+
+def test_a_face_on_an_end_is_touched_all_around() -> None:
+    """Box on cylinder, cylinder on cylinder, almost level: no contact is off the level of the lowest by more than a tilt."""
+    for name in ("box_cylinder", "cylinder_cylinder"):
+        case = random_case(name, np.random.default_rng(0))
+        for tilt in (0.0, 1e-9, 1e-5, 1e-3):
+            up = (0.5 * np.ptp(case.points[0][:, 2]) if name == "box_cylinder" else case.sizes[1]) + case.sizes[5]
+            pose = turn(np.array([tilt, 0.3 * tilt, 0.0])), np.array([0.02, -0.01, up])
+            outs = [contact(case, *which, *pose) for which in chosen(case, *pose)]
+            near = np.array([out for out in outs if out[0] < 0.05])
+            assert np.abs(near[:, 0]).max() < tilt + 1e-4
+            np.testing.assert_allclose(near[:, 1:3], 0.0, atol=2.0 * tilt + 1e-12)
+            angles = np.sort(np.arctan2(near[:, 5], near[:, 4]))
+            assert np.diff(np.append(angles, angles[0] + 2.0 * np.pi)).max() < 2.2  # no half of the end is free
+
+
+def drop(shape, obstacle, pose, force=(0.0, 0.0), seconds=1.0):
+    """A body of 1 kg, let go at pose (7,) over an obstacle, and pushed sideways [N]; friction 0.5."""
+    body = Body("a", 1.0, shape=shape)
+    on = Collision("a", shape_b=obstacle, friction=0.5)
+    mech = Mechanism([body], [Joint("floating", None, "a")], collisions=[on], gravity=(*force, -9.81))
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-10)
+    return sim.rollout(np.r_[pose, np.zeros(6)], np.zeros((round(seconds / 0.01), sim.nu)), throw=True)
+
+
+@pytest.mark.parametrize(
+    ("shape", "orientation", "height"),
+    [
+        (Cylinder(0.1, 0.3), (1.0, 0.0, 0.0, 0.0), 0.15),
+        (Cylinder(0.1, 0.3), LYING, 0.1),
+        (Box(0.2, 0.3, 0.2), (1.0, 0.0, 0.0, 0.0), 0.1),
+        (Capsule(0.05, 0.3), LYING, 0.05),
+    ],
+    ids=["cylinder stands", "cylinder lies", "box", "capsule"],
+)
+@pytest.mark.parametrize("obstacle", ["box", "cylinder"])
+def test_what_is_put_on_a_level_top_stays(shape, orientation, height, obstacle) -> None:
+    """Pushed with .3 of its weight along its axis, below its friction; the forces of all points carry it."""
+    if isinstance(shape, Box | Capsule) and obstacle == "box":
+        pytest.skip("no cylinder")
+    table = Box(1.0, 1.0, 0.2) if obstacle == "box" else Cylinder(0.5, 0.2)
+    t = drop(shape, table, (0.05, 0.02, 0.1 + height + 0.002, *orientation), force=(0.0, 1.0))
+    np.testing.assert_allclose(t.x[-1, :3], [0.05, 0.02, 0.1 + height], atol=1e-4)
+    np.testing.assert_allclose(t.x[-1, 7:], 0.0, atol=1e-4)
+    np.testing.assert_allclose(t.contacts.force[-1].sum(axis=0), [0.0, -1.0, 9.81], atol=1e-3)
+
+
+def test_a_cylinder_at_the_border_of_a_table_stays_as_long_as_its_weight_is_above_it() -> None:
+    for inside, stays in ((0.01, True), (-0.01, False)):
+        t = drop(Cylinder(0.1, 0.2), Box(1.0, 1.0, 0.2), (0.5 - inside, 0.0, 0.2, 1.0, 0.0, 0.0, 0.0))
+        assert (t.x[-1, 2] > 0.199) == stays
+
+
+def test_a_cylinder_lies_across_two_others() -> None:
+    """Crossed sides: one point on each."""
+    t = drop(
+        Cylinder(0.05, 0.6), Cylinder(0.1, 1.0, orientation=LYING), (0.0, 0.0, 0.151, 0.5**0.5, 0.0, 0.5**0.5, 0.0)
+    )
+    np.testing.assert_allclose(t.x[-1, :3], [0.0, 0.0, 0.15], atol=1e-4)
+
+
+def test_a_wheel_rolls_over_a_box_without_loss() -> None:
+    """On a level box: speed and radius times spin stay equal."""
+    body = Body("wheel", 1.0, shape=Cylinder(0.1, 0.05))
+    mech = Mechanism(
+        [body], [Joint("floating", None, "wheel")], collisions=[Collision("wheel", shape_b=Box(4.0, 1.0, 0.2))]
+    )
+    sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-10)
+    x = np.r_[-1.0, 0.0, 0.2, LYING, 1.0, 0.0, 0.0, 0.0, 0.0, -10.0]  # the axis of spin is the wheel's z, along -y
+    t = sim.rollout(x, np.zeros((150, sim.nu)), throw=True)
+    assert t.x[-1, 0] == pytest.approx(0.5, abs=5e-3)
+    assert t.x[-1, 7] == pytest.approx(1.0, abs=2e-3)
+    assert t.x[-1, 12] == pytest.approx(-10.0, abs=2e-2)
+
+
+@pytest.mark.parametrize("first", [True, False], ids=["cylinder first", "cylinder second"])
+@pytest.mark.parametrize("name", OTHERS)
+def test_motions_keep_momentum_and_gain_no_energy(name: str, first: bool) -> None:
+    shapes = (Cylinder(0.2, 0.4), OTHERS[name])
+    sim = dojo.Simulator(two(*(shapes if first else shapes[::-1])), time_step=0.01, kappa=1e-8, tolerance=1e-12)
+    hit = 0
+    for seed in range(8):
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
+        assert t.success, (seed, t.message)
+        for total in sim.momentum(t.x):
+            assert np.ptp(total, axis=0).max() < 1e-9, seed
+        assert np.diff(sim.energy(t.x)).max() < 1e-3, seed  # kappa pushes from afar
+        assert t.contacts.gap.min() > 0.0
+        hit += bool(np.abs(t.contacts.impulse).max() > 0.1)
+    assert hit > 3
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_derivatives_of_a_step(name: str) -> None:
+    """In the step that hits, and in the one before."""
+    sim = dojo.Simulator(two(Cylinder(0.2, 0.4), OTHERS[name]), time_step=0.01, kappa=1e-4, tolerance=1e-12)
+
+    def moved(after: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return sim.difference(sim.step(x, throw=True).x, after)
+
+    checked = 0
+    for seed in range(5):
+        t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)), throw=True)
+        push = np.abs(t.contacts.impulse).max(axis=(1, 2))
+        if push.max() < 0.1:
+            continue
+        for k in (int(push.argmax()) - 1, int(push.argmax())):
+            A, _ = sim.linearize(t.x[k])
+            check_jacobian(partial(moved, t.x[k + 1]), A, t.x[k], sim.integrate)
+            checked += 1
+    assert checked >= 4
