@@ -44,6 +44,7 @@ _LED = 2  # first attempt whose friction smoothing is led down step by step; bef
 _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
+_REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -134,7 +135,7 @@ def interior_point(
             for choice in range(_CHOICES):
                 if misplaced != 1 or work.pair_free[0] == 1:
                     break
-                if choice > 0:
+                if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = 2
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
                 misplaced = overlapping(model, work) if out.status == _SOLVED else 0

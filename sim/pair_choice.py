@@ -110,8 +110,9 @@ def choose_pairs(model: Model, work: Work) -> None:
 
 @kernel
 def passed_through(model: Model, work: Work, first: int) -> bool:
-    """Whether a point of a collision presses at configuration 3 on the other side of an element than where it was when
-    the step began: the distance of a line or a corner has no sign.
+    """Whether a point of a collision presses at configuration 3 though its elements, as they are there, have moved
+    apart since the step began: beyond a line or a corner, whose distance has no sign, or far from where they were
+    chosen.
     """
     kind = model.pair_kind[first]
     before = work.pair_before[first]
@@ -129,7 +130,8 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             now = work.pair_out[j]
             turned = now[1] * g[1] + now[2] * g[2] + now[3] * g[3] < 0.0
-            if turned and gap_before(kind, now, work.pair_relative[first], before) < before[12]:
+            doubtful = turned or g[0] < before[12]
+            if doubtful and gap_before(kind, now, work.pair_relative[first], before) < before[12]:
                 return True
         j += 1
     return False
