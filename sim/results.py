@@ -151,3 +151,9 @@ def error_of(
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)
+
+
+def fastest(mech: Mechanism, z: Floats) -> str:
+    """The body that turns fastest in a maximal state (nbody, 13), as a sentence."""
+    spin = np.linalg.norm(z[:, 10:], axis=1)
+    return f"The fastest is {mech.body_names[int(spin.argmax())]!r}, with {spin.max():.3g} rad/s before the step."
