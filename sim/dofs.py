@@ -45,7 +45,7 @@ def components(call: str, joints: Sequence[Joint], names: str | Iterable[str]) -
     for joint in joints:
         spans[joint.name] = list(range(stop, stop := stop + joint.nv))
     rates = {"v" if name == "q" else _RATE + name: [len(parts) + i for i in span] for name, span in spans.items()}
-    known = rates | spans
+    known = spans | rates
     chosen = [names] if isinstance(names, str) else list(names)
     return np.array([i for name in chosen for i in known[_known(call, name, known)]], dtype=np.int64)
 

@@ -22,7 +22,10 @@ __all__ = ["Feedback", "roll"]
 
 
 def roll(sim: Simulator, x: Floats, policy: Feedback, steps: int | None) -> tuple[Floats, Rolled]:
-    """Inputs (T, nu) and what came of them; T is `steps`, or fewer when one cannot be solved."""
+    """Inputs (T, nu) and what came of them; T is `steps`, or fewer when one cannot be solved.
+
+    Every step is solved afresh: states differ within the tolerance from those of one rollout of the same inputs.
+    """
     count = whole("Simulator.rollout(steps=...)", steps)
     us, rolled = [], []
     for k in range(count):

@@ -154,6 +154,6 @@ def error_of(
 
 
 def fastest(mech: Mechanism, z: Floats) -> str:
-    """The body that turns fastest in a maximal state (nbody, 13), as a sentence."""
+    """The body that turns fastest in a maximal state (nbody, 13), as a sentence; for short steps, else turns wrap."""
     spin = np.linalg.norm(z[:, 10:], axis=1)
     return f"The fastest is {mech.body_names[int(spin.argmax())]!r}, with {spin.max():.3g} rad/s before the step."

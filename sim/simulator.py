@@ -177,7 +177,7 @@ class Simulator(Derivatives):
         gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
         error = error_of(mech, where, report, self.tolerance, max(gaps, default=None))
         if error.status == Status.ANGULAR_STEP and x is not None:
-            return SimulationError(f"{error} {fastest(mech, self.maximal(x))}", error.status)
+            return SimulationError(f"{error} {fastest(mech, self.replace(time_step=1e-6).maximal(x))}", error.status)
         return error
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:

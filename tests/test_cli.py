@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from programs import HOME
+from urdf_files import branched
 
 import dojo_opt as dojo
 from dojo_opt import cli
 from dojo_opt.report.result import Report, Row
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["report"], ["models"], ["warmup"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["report"], ["models"], ["show"], ["warmup"]])
 def test_help_is_no_error(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         cli.main([*command, "--help"])
@@ -90,3 +91,38 @@ def test_the_module_runs_as_a_program() -> None:
         text=True,
     )
     assert (done.returncode, done.stdout.split()[0]) == (0, "dojo-opt")
+
+
+@pytest.mark.parametrize("flag", [["--perturb", "payload=1"], ["--seconds", "2"]])
+def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "hop", *flag]) == 2
+    assert "are for closed loops (hopper_mpc, quadruped_mpc), and hop is a plan" in capsys.readouterr().err
+
+
+def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    figure, page = tmp_path / "fall.png", tmp_path / "fall.html"
+    command = ["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--out", str(figure), "--html", str(page)]
+    assert cli.main(command) == 0
+    text = capsys.readouterr().out
+    assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "let go for 0.1 s" in text
+    assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
+
+
+def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = branched(tmp_path)
+    assert cli.main(["show", str(path), "--seconds", "0.05", "--drop", "0.2"]) == 0
+    text = capsys.readouterr().out
+    assert "shoulder" in text and "robot.urdf: 7 links" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["quadrupet"], "'quadrupet' is neither a .urdf nor an .xml file, nor a model; did you mean 'quadruped'?"),
+        (["nowhere.urdf"], "nowhere.urdf"),
+        (["pendulum", "--drop", "1"], "--drop is for a floating base, and 'joint_0' is revolute"),
+    ],
+)
+def test_show_refuses_by_name(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", *arguments]) == 2
+    assert message in capsys.readouterr().err

@@ -82,7 +82,7 @@ def test_commands_of_the_readme_exist() -> None:
     text = (ROOT / "README.md").read_text()
     for script in re.findall(r"python (examples/\w+\.py)", text):
         assert (ROOT / script).is_file(), script
-    commands = re.findall(r"(?:python -m dojo_opt|dojo-opt) (run|report|models|warmup) ?(\w+)?", text)
+    commands = re.findall(r"(?:python -m dojo_opt|dojo-opt) (run|report|models|show|warmup) ?(\w+)?", text)
     assert commands
     for command, name in commands:
         if command == "report":

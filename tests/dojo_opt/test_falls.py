@@ -50,7 +50,7 @@ def test_the_figure_of_a_planar_robot_shows_height_and_path_from_the_side(walker
 def test_coordinates_have_the_names_of_their_directions(walker):
     figure = dojo.plots.trajectory(walker)
     names = labels(figure.axes[0])
-    assert {"torso x", "torso z", "torso angle"} <= set(names) and "torso y" not in names
+    assert {"base x", "base z", "base angle"} <= set(names) and "base y" not in names
     assert figure.axes[0].get_ylabel() == "coordinates [m, rad]"
     assert figure.axes[1].get_ylabel() == "inputs [N m]"
 
@@ -62,14 +62,14 @@ def test_the_error_of_a_loop_goes_by_name(walker):
         0.05,
         reference=lambda t: np.tile(walker.x[0], (len(t), 1)),
     )
-    np.testing.assert_allclose(loop.rms("torso angle"), np.sqrt(np.mean(loop.error()[:, 2] ** 2)))
-    assert labels(dojo.plots.closed_loop(loop).axes[1]) == ["torso x", "torso z"]
+    np.testing.assert_allclose(loop.rms("base angle"), np.sqrt(np.mean(loop.error()[:, 2] ** 2)))
+    assert labels(dojo.plots.closed_loop(loop).axes[1]) == ["base x", "base z"]
 
 
 def test_time_goes_on_in_a_controller():
     mpc = dojo.MPC(dojo.problems.swingup("pendulum"))
     mpc(1.0, np.zeros(2))
-    with pytest.raises(ValueError, match=r"MPC\(time\): 0 s is before 1 s; see reset\(\)"):
+    with pytest.raises(ValueError, match=r"MPC\(time\): time goes on, 0 s is before 1 s; see reset\(\)"):
         mpc(0.0, np.zeros(2))
     mpc.reset()
     mpc(0.0, np.zeros(2))

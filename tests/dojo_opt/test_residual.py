@@ -16,11 +16,11 @@ X = SIM.neutral()
 def problem(*costs, constraints=()):
     goal = X.copy()
     goal[0] = 1.0
-    return dojo.Problem(SIM, X, 20, cost=[Effort(0.01), *costs], constraints=[Goal(goal), *constraints])
+    return dojo.Problem(SIM, X, 30, cost=[Effort(0.01), *costs], constraints=[Goal(goal), *constraints])
 
 
 def too_fast(x, u, out):
-    out[0] = x[2] ** 2 - 1.2**2
+    out[0] = x[2] ** 2 - 0.9**2
 
 
 @dojo.kernel
@@ -37,13 +37,13 @@ def test_a_plain_function_is_a_constraint_that_holds():
     free = dojo.ilqr(problem())
     held = dojo.ilqr(problem(constraints=[ResidualConstraint(too_fast, 1, equality=False)]))
     assert free.success and held.success
-    assert np.abs(free.x[:, 2]).max() > 1.25
-    assert np.abs(held.x[:, 2]).max() < 1.2 + 1e-3
+    assert np.abs(free.x[:, 2]).max() > 0.95
+    assert np.abs(held.x[:, 2]).max() < 0.901
 
 
 def test_a_kernel_may_allocate_and_call_another_one():
     term = problem(ResidualCost(high, 2)).costs[1]
-    xs, us = np.random.default_rng(0).normal(size=(21, 4)), np.zeros((20, 1))
+    xs, us = np.random.default_rng(0).normal(size=(31, 4)), np.zeros((30, 1))
     expected = sum(0.01 * np.sum((tip.py_func(x) - [1.0, -0.5]) ** 2) for x in xs)
     np.testing.assert_allclose(term.value(xs, us), expected, rtol=1e-12)
 

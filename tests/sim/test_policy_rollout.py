@@ -22,9 +22,8 @@ def test_it_is_the_rollout_of_the_inputs_that_the_function_gave(wrenches: dict |
     closed = SIM.rollout(x0, gains, steps=30, wrenches=wrenches)
     again = SIM.rollout(x0, closed.u, wrenches=wrenches, throw=True)
     assert closed.success and closed.x.shape == (31, SIM.nx) and closed.u.shape == (30, 3)
-    np.testing.assert_array_equal(closed.x, again.x)
-    np.testing.assert_array_equal(closed.contacts.impulse, again.contacts.impulse)
-    np.testing.assert_array_equal(closed.iterations, again.iterations)
+    np.testing.assert_allclose(closed.x, again.x, atol=1e-6)  # each step is solved afresh, to the same tolerance
+    np.testing.assert_allclose(closed.contacts.impulse, again.contacts.impulse, atol=1e-6)
     for k in (0, 7, 29):
         np.testing.assert_allclose(closed.u[k], gains(k * 0.02, closed.x[k]), atol=1e-12)
 
@@ -38,16 +37,21 @@ def test_the_function_may_keep_the_state_it_was_given() -> None:
         return np.zeros(3)
 
     found = SIM.rollout(SIM.neutral(), policy, steps=3)
-    np.testing.assert_array_equal(found.x, SIM.rollout(SIM.neutral(), np.zeros((3, 3))).x)
+    np.testing.assert_allclose(found.x, SIM.rollout(SIM.neutral(), np.zeros((3, 3))).x, atol=1e-6)
     assert len(seen) == 3
 
 
 def test_it_stops_at_the_step_that_cannot_be_solved() -> None:
-    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.1)
-    found = sim.rollout(sim.neutral(), lambda t, x: [1e4 if t > 0.25 else 0.0], steps=10)
-    assert (found.knot, found.x.shape, found.u.shape) == (3, (4, 2), (3, 1))
+    x = SIM.neutral()
+    x[2] = 3.0
+
+    def spun(time: float, state: np.ndarray) -> list[float]:
+        return [0.0, 0.0, np.inf] if time > 0.05 else [0.0, 0.0, 1e200 if time > 0.03 else 0.0]
+
+    found = SIM.rollout(x, spun, steps=10)
+    assert (found.knot, found.x.shape, found.u.shape) == (2, (3, SIM.nx), (2, 3))
     assert found.status != Status.SOLVED
-    assert "step 3" in found.message
+    assert "step 2" in found.message
 
 
 @pytest.mark.parametrize(
