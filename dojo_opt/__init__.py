@@ -27,6 +27,7 @@ __all__ = [
     "Contact",
     "Cylinder",
     "Disturbances",
+    "Environment",
     "Gear",
     "HalfSpace",
     "Input",
@@ -85,6 +86,7 @@ _HOME: dict[str, str | None] = {
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
     "Disturbances": "dojo_opt.plant.disturbances",
+    "Environment": "dojo_opt.environment",
     "Gear": "sim.gear",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
@@ -135,6 +137,7 @@ _HOME: dict[str, str | None] = {
 
 if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, report, tasks, viewer
+    from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
     from dojo_opt.plan import Plan

@@ -25,7 +25,7 @@ Controller = Callable[[float, Vector], ArrayLike]
 __all__ = ["ClosedLoop", "closed_loop"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ClosedLoop:
     """What happened, up to the end, a fall, or the first step of the plant that could not be solved."""
 
@@ -40,6 +40,11 @@ class ClosedLoop:
     softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
     log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
     reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
+
+    def __repr__(self) -> str:
+        return (
+            f"ClosedLoop({self.duration:g} s, {self.message} x {self.x.shape}, u {self.u.shape}, {len(self.log)} ticks)"
+        )
 
     @property
     def duration(self) -> float:

@@ -13,6 +13,7 @@ from sim.simulator import Simulator
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_DECADES = 300.0  # ratio of the ends of an axis
 _FEW, _MANY = 5, 14  # entries of a legend that fit into the axes, and beside them
 
 
@@ -46,14 +47,16 @@ def finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
     return ax
 
 
-def plain_log(ax: Axes) -> None:
-    """A logarithmic y axis with plain numbers at 1, 2, 5, 10, ..."""
+def plain_ticks(ax: Axes) -> None:
+    """Plain numbers at 1, 2, 5, 10, ... on logarithmic axes that span few decades; powers crowd there."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    ax.set_yscale("log")
-    ax.yaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(NullFormatter())
+    for axis in (ax.xaxis, ax.yaxis):
+        low, high = axis.get_view_interval()
+        if axis.get_scale() == "log" and high < _DECADES * low:
+            axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
 
 
 def units(mechanism: Mechanism, slide: str, turn: str, dofs: Sequence[int] | None = None) -> str:

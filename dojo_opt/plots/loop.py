@@ -16,7 +16,7 @@ from dojo_opt.mpc.tick import Tick, milliseconds
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.plant.plant import stands_free
 from dojo_opt.plant.study import Study
-from dojo_opt.plots.axes import finish, plain_log, units
+from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities
 
 if TYPE_CHECKING:
@@ -124,7 +124,8 @@ def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None
         ax.axhline(float(np.percentile(ms, 99)), color="C1", ls="--", label=f"99 %: {np.percentile(ms, 99):.2f} ms")
     if period is not None:
         ax.axhline(1e3 * period, color="0.4", label=f"period {1e3 * period:g} ms")
-    plain_log(ax)
+    ax.set_yscale("log")
+    plain_ticks(ax)
     return finish(ax, "tick [ms]", "time [s]")
 
 
@@ -139,6 +140,7 @@ def study(result: Study) -> Figure:
     right.plot(ms, np.arange(1, ms.size + 1) / max(1, ms.size))
     right.axhline(0.99, color="0.4", ls="--", label="99 %")
     right.set_xscale("log")
+    plain_ticks(right)
     finish(right, "share of ticks", "tick [ms]")
     return figure
 

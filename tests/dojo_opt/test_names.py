@@ -88,3 +88,12 @@ def test_one_term_need_not_be_a_list_and_names_of_settings_are_suggested():
 def test_a_misspelt_model_or_problem(module, name, near):
     with pytest.raises(AttributeError, match=f"dojo_opt.{module} has no '{name}'; .*did you mean '{near}'"):
         getattr(getattr(dojo, module), name)
+
+
+def test_results_print_on_one_line():
+    plan = dojo.ilqr(dojo.Problem(SIM, X, 10, cost=Effort(1.0)))
+    assert repr(plan) == "Plan(SOLVED, 0 iterations, cost 0, x (11, 4), u (10, 1))"
+    loop = dojo.closed_loop(lambda t, x: [0.0], dojo.Plant(SIM), 0.1)
+    assert repr(loop) == "ClosedLoop(0.1 s, Ran to the end. x (3, 4), u (2, 1), 0 ticks)"
+    t = SIM.rollout(X, np.zeros((3, 1)))
+    assert repr(t) == "Trajectory(cartpole, 3 steps of 0.05 s, SOLVED, x (4, 4), u (3, 1))"
