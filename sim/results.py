@@ -77,7 +77,7 @@ class StepResult:
         return MESSAGES[self.status]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows."""
 
@@ -91,6 +91,11 @@ class Trajectory:
     iterations: Integers  # (T,)
     contacts: Contacts
     message: str
+
+    def __repr__(self) -> str:
+        sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
+        steps = f"{self.knot} steps of {sim.time_step:g} s"
+        return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
 
     @property
     def success(self) -> bool:
