@@ -10,6 +10,7 @@ import dojo_opt as dojo
 pytest.importorskip("gymnasium")
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")  # that states and inputs have no bounds; faults are assertions
 def test_it_is_an_environment_as_gymnasium_has_them():
     from gymnasium.utils.env_checker import check_env
 
