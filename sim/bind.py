@@ -19,6 +19,7 @@ from sim import (
     pair_jacobian,
     pair_stiffness,
     pairs,
+    parameter_terrain,
     pyramid,
     restitution,
     restitution_gradient,
@@ -151,3 +152,8 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (restitution_gradient.add_bounce_composites,))
         if len(model.pair_kind):
             _bind(model, (restitution_gradient.add_bounce_derivatives,))
+
+
+def bind_heights(model: Model) -> None:
+    """What gradients by the heights of a terrain need beyond that."""
+    _bind(model, (parameter_terrain.add_height_gradient,))

@@ -114,6 +114,8 @@ class Late(IntEnum):
     ALL_NEAR = 55
     # gears
     APPLY_GEARS = 56
+    # derivatives by the heights of a terrain
+    HEIGHT_GRADIENT = 57
 
 
 class Model(NamedTuple):
@@ -244,7 +246,7 @@ class Work(NamedTuple):
     contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 16) see restitution.py
+    bounce: Matrix  # (ncontact, 22) see restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same

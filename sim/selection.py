@@ -11,8 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.closing import parts_of
+from sim.effects import Effect
 from sim.mechanism import Mechanism
 from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
+from sim.polytope import Polytope
+from sim.terrain_heights import terrains
+from sim.touch_parameters import shape_of
 
 Floats = NDArray[np.float64]
 COMMON = "*"
@@ -54,8 +58,11 @@ def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple
         rows[name] = slice(len(found), len(found) + len(some))
         found += some
     terms = [(int(e), i, k, column) for column, p in enumerate(found) for e, i, k, _ in p.terms]
-    weights = [term[3] for p in found for term in p.terms]
-    plan = Plan(np.array(terms, dtype=np.int64).reshape(-1, 4), np.array(weights, dtype=np.float64), len(found))
+    table = np.array(terms, dtype=np.int64).reshape(-1, 4)
+    weights = np.array([term[3] for p in found for term in p.terms], dtype=np.float64)
+    of_terrain = table[:, 0] == Effect.TERRAIN
+    heights = np.ascontiguousarray(table[of_terrain][:, [1, 3]])
+    plan = Plan(table[~of_terrain], weights[~of_terrain], len(found), heights, weights[of_terrain])
     values = np.array([p.value for p in found])
     values.flags.writeable = False  # kept by the simulator
     return Parameters(tuple(p.name for p in found), values, rows), plan
@@ -100,6 +107,8 @@ class _Draft:
         self.joints = {j.name: j for j in (*mech.joints, *mech.loops)}
         self.contacts = {c.name: c for c in mech.contacts}
         self.collisions = {c.name: c for c in mech.collisions}
+        self.gears = {g.name: g for g in mech.gears}
+        self.inputs = {i.name: i for i in mech.inputs or ()}
         self.gravity = np.array(mech.gravity, dtype=np.float64)
 
     def change(self, kind: str, part: str, entries: Entries) -> None:
@@ -111,8 +120,14 @@ class _Draft:
                 self._move_centre(name, _entries(np.zeros(3), entries))
         elif kind in ("mass", "inertia"):
             self._change_body(kind, part, entries)
-        elif kind in ("shape_a", "shape_b"):
-            self._move_shape(part, kind, entries)
+        elif kind in ("shape_a", "shape_b", "size_a", "size_b"):
+            self._change_shape(part, kind, entries)
+        elif kind == "terrain":
+            self._raise_terrain(part, entries)
+        elif kind.startswith(("gear_", "input_")):
+            owner, field = kind.split("_")
+            owners: dict[str, Any] = self.gears if owner == "gear" else self.inputs
+            owners[part] = replace(owners[part], **{field: _entries(getattr(owners[part], field), entries)})
         elif kind in ("friction", "restitution") or kind.startswith("contact_"):
             field = kind.removeprefix("contact_")
             parts: dict[str, Any] = self.contacts if part in self.contacts else self.collisions
@@ -168,13 +183,29 @@ class _Draft:
                 if side == name and shape is not None:
                     self.collisions[label] = replace(self.collisions[label], **{field: _moved(shape, -d)})
 
-    def _move_shape(self, name: str, field: str, entries: Entries) -> None:
-        """The shape of a collision sits elsewhere in its body; other collisions keep theirs."""
-        collision = self.collisions[name]
-        body = self.bodies.get((collision.a if field == "shape_a" else collision.b) or "")
-        shape: Any = getattr(collision, field) or (body.shape if body else None)
-        moved: Any = replace(shape, center=_entries(shape.center, entries))
-        self.collisions[name] = replace(collision, **{field: moved})
+    def _change_shape(self, name: str, kind: str, entries: Entries) -> None:
+        """The shape of a collision sits elsewhere in its body, or has another size; other collisions keep theirs."""
+        what, letter = kind.split("_")
+        shape: Any = shape_of(self.mech, self.collisions[name], letter)
+        if what == "shape":
+            changed: Any = replace(shape, center=_entries(shape.center, entries))
+        elif isinstance(shape, Polytope):
+            changed = replace(shape, vertices=entries["scale"] * np.asarray(shape.vertices))
+        else:
+            changed = replace(shape, **entries)
+        self.collisions[name] = replace(self.collisions[name], **{f"shape_{letter}": changed})
+
+    def _raise_terrain(self, name: str, entries: Entries) -> None:
+        """The ground has other heights, for all contacts that stand on it."""
+        terrain = terrains(self.mech)[name]
+        heights = np.array(terrain.heights)
+        for component, value in entries.items():
+            i, _, j = component.partition(",")
+            heights[int(i), int(j or 0)] = value
+        raised = replace(terrain, heights=heights)
+        for label, contact in self.contacts.items():
+            if contact.terrain is terrain:
+                self.contacts[label] = replace(contact, terrain=raised)
 
     def finish(self) -> Mechanism:
         """The changed mechanism."""
@@ -186,6 +217,8 @@ class _Draft:
             loops=tuple(self.joints[j.name] for j in mech.loops),
             contacts=tuple(self.contacts.values()),
             collisions=tuple(self.collisions.values()),
+            gears=tuple(self.gears.values()),
+            inputs=tuple(self.inputs.values()),
             gravity=self.gravity,
         )
 
