@@ -35,6 +35,7 @@ __all__ = [
     "Mechanism",
     "MjcfMechanism",
     "MjcfWarning",
+    "ParameterSpace",
     "Parameters",
     "Perturbation",
     "Plan",
@@ -92,6 +93,7 @@ _HOME: dict[str, str | None] = {
     "Mechanism": "sim.mechanism",
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
+    "ParameterSpace": "dojo_opt.parameter_space",
     "Parameters": "sim.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
@@ -134,6 +136,7 @@ if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, report, tasks, viewer
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
+    from dojo_opt.parameter_space import ParameterSpace
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
     from dojo_opt.plant.disturbances import Disturbances

@@ -19,6 +19,7 @@ from sim import (
     pair_jacobian,
     pair_stiffness,
     pairs,
+    parameter_surface,
     parameter_terrain,
     pyramid,
     restitution,
@@ -152,6 +153,12 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (restitution_gradient.add_bounce_composites,))
         if len(model.pair_kind):
             _bind(model, (restitution_gradient.add_bounce_derivatives,))
+
+
+def bind_parameters(model: Model) -> None:
+    """What derivatives by parameters need beyond that."""
+    if np.any(model.contact_terrain):
+        _bind(model, (parameter_surface.add_surface_radius,))
 
 
 def bind_heights(model: Model) -> None:

@@ -31,6 +31,7 @@ from sim.parameter_geometry import add_geometry
 from sim.parameter_loops import add_gear_offset, add_gear_ratio, add_loop_geometry, add_loop_turn
 from sim.parameter_pairs import add_shapes_shift
 from sim.parameter_sizes import add_shapes_size
+from sim.parameter_surface import add_surface_radius
 from solvers.jit import kernel
 
 _MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
@@ -87,6 +88,7 @@ def add_contact_term(model: Model, work: Work, h: float, effect: int, i: int, k:
         add_point(model, work, h, i, k, w, col)
     elif effect == _RADIUS:
         add_radius(model, work, h, i, w, col)
+        add_surface_radius(model, work, h, i, w, col)
     elif effect == _HEIGHT:
         add_height(model, work, i, w, col)
     elif effect == _NORMAL:

@@ -181,13 +181,13 @@ def add_point(model: Model, work: Work, h: float, c: int, k: int, w: float, col:
 
 @kernel
 def add_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -> None:
-    """dr = -n    gap n.dr = -1    slip T (omega x dr)"""
+    """dr = -n    gap n.dr = -1    slip T (omega x dr);  on terrain the gap is left to parameter_surface.py"""
     if not is_near(work, c):
         return
     F = work.contact_frame[c]
     dr = (-F[0], -F[1], -F[2])
     v = turning(work, h, model.contact_body[c], dr)
-    gap = -1.0 - floor_change(work, c, -1.0, -1.0)
+    gap = 0.0 if model.contact_terrain[c] > 0 else -1.0 - floor_change(work, c, -1.0, -1.0)
     p = impulse_change(work, c, gap, _along(F, 3, v), _along(F, 6, v))
     add_ground(model, work, c, ground_force(work, c, p), dr, w, col)
 

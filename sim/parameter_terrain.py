@@ -20,33 +20,13 @@ from sim.height_field import cell, height_field, weight
 from sim.layout import model_view, work_view
 from sim.model import Late, Matrix, Model, Vector, Work
 from sim.parameter_columns import clear_columns
-from sim.parameter_contacts import add_impulse, add_turn, impulse_change, is_near
 from sim.parameter_gradients import coordinate_rows
+from sim.parameter_surface import add_ground_place, is_on_terrain
 from sim.rotation import Vec3
-from sim.terrain_contact import centre, frame_turn
+from sim.terrain_contact import centre
 from solvers.jit import kernel
 from solvers.late import late
 from solvers.record import Table
-
-
-@kernel
-def is_on_terrain(model: Model, work: Work, c: int) -> bool:
-    """Whether a height field has a part in the contact, and the contact in the step."""
-    return model.contact_terrain[c] > 0 and is_near(work, c)
-
-
-@kernel
-def add_ground_place(model: Model, work: Work, h: float, c: int, k: int, col: int) -> None:
-    """columns[:, col] -= dR/d(F, F_x or F_y), k = 0, 1, 2, where contact c is."""
-    if not is_on_terrain(model, work, c):
-        return
-    n = work.contact_frame[c]
-    if k == 0:
-        add_impulse(model, work, c, impulse_change(work, c, -n[2], 0.0, 0.0), 1.0, col)
-        return
-    phi = work.contact_kin[c, 0] + work.bounce[c, 0]  # contact_kin has the gap above the floor of an impact
-    turn = frame_turn(n, -1.0 if k == 1 else 0.0, -1.0 if k == 2 else 0.0)
-    add_turn(model, work, h, c, turn, phi * n[2] * n[k - 1], 1.0, col)
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.adjoint import Sweep, sweep
-from sim.bind import bind_heights
+from sim.bind import bind_heights, bind_parameters
 from sim.calls import REPORT, Calls
 from sim.effects import At
 from sim.mechanism import Mechanism
@@ -27,7 +27,7 @@ def parameter_columns(calls: Calls, mech: Mechanism, step: tuple[Vector, Vector]
     out = np.zeros((calls.ndx, plan.size))
     nq = calls.sizes.nq
     at = At(calls.settings.time_step, x[:nq], x[nq:], u, np.zeros((_TWISTS, 6)), np.zeros(calls.sizes.nbody))
-    model, work = calls.tables()
+    model, work = calls.tables(bind_parameters)
     if len(plan.weights):
         parameter_jacobian(model, work, at, A, plan.terms, plan.weights, out)
     if len(plan.heights):
@@ -86,7 +86,8 @@ def adjoint_sweep(
         places=np.zeros((1, 3 * (sizes.ncontact - sizes.npair))),
         heights=np.zeros((1, sizes.nheight if len(plan.heights) else 0)),
     )
-    model, work = calls.tables(*([bind_heights] if len(plan.heights) else []))
+    needs = (bind_parameters, bind_heights) if len(plan.heights) else (bind_parameters,)
+    model, work = calls.tables(*needs[: 2 if plan.size else 0])
     settings = calls.settings.array(kappa)
     knot = int(sweep(model, work, settings, line, plan.terms, plan.weights))
     if len(plan.heights):

@@ -37,17 +37,17 @@ def normal_turns(normal: ArrayLike) -> Floats:
 
 
 def contact_parameters(contact: Contact, c: int) -> list[Parameter]:
-    """Radius and normal of half-spaces only: a terrain is made for a radius, and has its own normals."""
+    """friction, restitution, contact_point, contact_height, contact_radius; contact_normal of half-spaces."""
     turns = normal_turns(contact.normal)
     found = [
         Parameter("friction", contact.name, "", contact.friction, ((Effect.FRICTION, c, 0, 1.0),)),
         Parameter("restitution", contact.name, "", contact.restitution, ((Effect.RESTITUTION, c, 0, 1.0),)),
         *vector("contact_point", contact.name, contact.point, lambda k: [(Effect.POINT, c, k, 1.0)]),
         Parameter("contact_height", contact.name, "", contact.height, ((Effect.HEIGHT, c, 0, 1.0),)),
+        Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)),
     ]
     if contact.terrain is not None:
         return found
-    found.append(Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)))
     return found + vector(
         "contact_normal",
         contact.name,

@@ -32,7 +32,7 @@ hills_case = functools.cache(lambda name: falling(HILLS, *ON_HILLS[name]))
 @pytest.mark.parametrize("name", ON_HILLS)
 def test_heights_of_hills(name: str) -> None:
     case = hills_case(name)
-    errors = {kind: error(case, kind) for kind in ("terrain", "contact_height", "contact_point")}
+    errors = {kind: error(case, kind) for kind in ("terrain", "contact_height", "contact_point", "contact_radius")}
     assert all(e < 1e-6 for e in errors.values()), errors
 
 
@@ -50,7 +50,7 @@ def test_each_height_of_stairs() -> None:
     assert found.names[:2] == ("terrain:ground[0]", "terrain:ground[1]") and len(found.names) == n
     here = sim.step(x).x
     J = sim.linearize(x, wrt=("terrain",))["terrain"]
-    some = np.argsort(-np.abs(J).max(axis=0))[:4]
+    some = np.argsort(-np.abs(J).max(axis=0))[:2]
 
     def moved(dp: np.ndarray) -> np.ndarray:
         values = found.values + dp @ np.eye(n)[some]
@@ -161,7 +161,7 @@ def test_a_shape_on_a_plane_is_its_collision_with_a_half_space(name: str) -> Non
     assert 0.0 < sims[0].step(x).contacts.gap.min() < 1e-3  # it stands there as high as it touches
     x[7:] = 0.5, 0.2, -0.5, 1.0, -2.0, 0.5
     first, second = (run(sim, x, 60) for sim in sims)
-    np.testing.assert_allclose(first, second, atol=2e-6)
+    np.testing.assert_allclose(first, second, atol=2e-5)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
