@@ -69,6 +69,10 @@ class ParameterSpace:
             raise ValueError(f"{call}: expected names, or bodies=..., got none")
         asked = sim.parameters(tuple(name for group in self._groups for name in group.names)).names
         checks.distinct(f"{call}(names, bodies=...)", asked)
+        for common in (name for name in asked if ":*" in name):
+            clash = [name for name in asked if _kind(name) == _kind(common) and ":*" not in name]
+            if clash:
+                raise ValueError(f"{call}(names, bodies=...): {common!r} is of all parts, and so of {clash[0]!r}")
         self.labels = tuple(self._rows)
         self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
         self._narrow(f"{call}(bounds=...)", bounds or {})
@@ -114,14 +118,23 @@ class ParameterSpace:
 
     def _add(self, call: str, name: str, entries: list[str], values: list[float]) -> None:
         """A parameter, or the three of a direction or a rotation."""
-        kind = name.partition(":")[0].partition("[")[0]
+        kind = _kind(name)
         chart = _CHARTS.get("scale" if name.endswith("[scale]") else kind, _plain)
         if kind in _VECTORS and (len(entries) != 3 or ":*" in name):
             raise ValueError(f"{call}: {kind} is a vector, give it whole and part by part; got {', '.join(entries)}")
         if name.endswith("[scale]") and ":*" in name:
             raise ValueError(f"{call}: give scales part by part; got {name}")
-        rows = {entry: (value, *_limits(kind, value)) for entry, value in zip(entries, values, strict=True)}
+        rows = {entry: (value, *self._limits(entry, kind, value)) for entry, value in zip(entries, values, strict=True)}
         self._append([name], chart, rows)
+
+    def _limits(self, name: str, kind: str, value: float) -> tuple[float, float]:
+        """What mechanisms can have; of `kind:*`, which moves all parts by as much, what the last of them can have."""
+        if ":*" not in name:
+            return _limits(kind, value)
+        found = self._sim.parameters((kind,))
+        component = name.partition("[")[2]
+        same = [x for n, x in zip(found.names, found.values, strict=True) if n.partition("[")[2] == component]
+        return value + _limits(kind, min(same))[0] - min(same), value + _limits(kind, max(same))[1] - max(same)
 
     def _add_body(self, call: str, body: str) -> None:
         """The ten coordinates of the mass, centre and inertia of a body."""
@@ -140,6 +153,10 @@ class ParameterSpace:
             if not low <= self.values[k] <= high or not low < high:
                 raise ValueError(f"{call}: {label!r} is {self.values[k]:g}, outside of {low:g} to {high:g}")
             self.low[k], self.high[k] = low, high
+
+
+def _kind(name: str) -> str:
+    return name.partition(":")[0].partition("[")[0]
 
 
 def _unit(name: str) -> str:

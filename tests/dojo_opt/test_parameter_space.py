@@ -55,13 +55,14 @@ def charts() -> tuple[dojo.ParameterSpace, np.ndarray]:
     """All that is not its own coordinate, and some that are; and a point away from the start."""
     sim = block()
     arm = dojo.Body("arm", 0.5, (0.01, 0.012, 0.013))
-    joint = dojo.Joint("revolute", "block", "arm", parent_point=(0.1, 0, 0.1), child_point=(0, 0, -0.2), axis=(0, 1, 0))
+    ends = {"parent_point": (0.1, 0, 0.1), "child_point": (0, 0, -0.2)}
+    joint = dojo.Joint("revolute", "block", "arm", axis=(0, 1, 0), damper=0.5, **ends)
     stone = dojo.Polytope.about_centroid([(0.1, 0, 0), (-0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1), (0, -0.05, -0.1)])
     ground = dojo.Collision("arm", shape_a=stone, shape_b=dojo.HalfSpace())
     mech = dojo.Mechanism(
         [*sim.mechanism.bodies, arm], [*sim.mechanism.joints, joint], sim.mechanism.contacts, collisions=[ground]
     )
-    names = ("friction:*", "damper", "axis:arm", "orientation:arm", "contact_normal:block_0", "size_a", "com:arm")
+    names = ("friction:*", "damper:arm", "axis:arm", "orientation:arm", "contact_normal:block_0", "size_a", "com:arm")
     sim = dojo.Simulator(mech, time_step=0.02, kappa=1e-3, tolerance=1e-13)
     space = dojo.ParameterSpace(sim, names, bodies=["block"])
     moved = space.values + 0.1 * np.random.default_rng(3).uniform(0.1, 1.0, size=len(space.values))
@@ -94,6 +95,15 @@ def test_the_space_starts_where_the_simulator_is() -> None:
     assert space.labels[:2] == ("friction:*", "damper:arm")
     assert (space.low[:2] >= 0.0).all() and (space.low[:2] < 1e-5).all()
     assert space.labels[-10:] == tuple(f"block.{label}" for label in inertia_coordinates.LABELS)
+
+
+def test_what_is_common_to_all_ends_with_the_least_of_them() -> None:
+    mech = dojo.models.npendulum(3)
+    sim = dojo.Simulator(mech).with_parameters({"damper": [0.1, 0.2, 0.6]})
+    space = dojo.ParameterSpace(sim, ("damper:*", "mass:*"))
+    np.testing.assert_allclose(space.values[0], 0.3)
+    np.testing.assert_allclose(space.low[0], 0.2)
+    np.testing.assert_allclose(space.simulator(space.low).parameters(("damper:*",)).values, 0.2)
 
 
 def flight(sim: dojo.Simulator) -> tuple[np.ndarray, np.ndarray]:
@@ -137,6 +147,8 @@ def test_a_fit_of_a_body_stays_among_bodies() -> None:
         ((), (), None, "expected names, or bodies"),
         (("mass:block",), ("block",), None, "'mass:block' is used twice"),
         (("friction", "friction:block_0"), (), None, "'friction:block_0' is used twice"),
+        (("friction:*", "friction:block_0"), (), None, r"'friction:\*' is of all parts, and so of 'friction:block_0'"),
+        (("mass:*",), ("block",), None, r"'mass:\*' is of all parts, and so of 'mass:block'"),
         (("contact_normal:block_0[1]",), (), None, "contact_normal is a vector, give it whole"),
         (("contact_normal:*",), (), None, "contact_normal is a vector"),
         (("friction:*",), (), {"friction:*": (0.6, 1.0)}, "'friction:\\*' is 0.5, outside of 0.6 to 1"),

@@ -151,7 +151,7 @@ def test_a_shape_on_a_plane_is_its_collision_with_a_half_space(name: str) -> Non
     level = dojo.Terrain.from_function(lambda X, Y: 0.0 * X, GRID, GRID)
     wall = dojo.Collision("it", shape_b=dojo.HalfSpace(), friction=0.4)
     sims = [
-        dojo.Simulator(mech, time_step=0.01, kappa=1e-8, tolerance=1e-10)
+        dojo.Simulator(mech, time_step=0.01, kappa=1e-8, tolerance=1e-12)
         for mech in (
             alone(SOLIDS[name]).on(level, bodies=["it"], friction=0.4),
             alone(SOLIDS[name], collisions=[wall]),
@@ -161,16 +161,19 @@ def test_a_shape_on_a_plane_is_its_collision_with_a_half_space(name: str) -> Non
     assert 0.0 < sims[0].step(x).contacts.gap.min() < 1e-3  # it stands there as high as it touches
     x[7:] = 0.5, 0.2, -0.5, 1.0, -2.0, 0.5
     first, second = (run(sim, x, 60) for sim in sims)
-    np.testing.assert_allclose(first, second, atol=2e-5)
+    np.testing.assert_allclose(first[:, :7], second[:, :7], atol=1e-5)  # far points press at another place
 
 
 @pytest.mark.parametrize("name", SOLIDS)
-def test_a_shape_comes_to_rest_on_hills(name: str) -> None:
-    mech = alone(SOLIDS[name]).on(WAVES, bodies=["it"], friction=1.0)
+def test_a_shape_tumbles_on_hills(name: str, rng: np.random.Generator) -> None:
+    """Let fall from a random pose; no corner goes below the ground, and it never has more energy than at first."""
+    mech = alone(SOLIDS[name]).on(WAVES, bodies=["it"], friction=0.5)
     sim = dojo.Simulator(mech, time_step=0.01, kappa=1e-9)
-    t = sim.rollout(sim.neutral(), np.zeros((150, 0)), throw=True)
-    assert t.contacts.gap.min() > -1e-7
-    assert sim.energy(t.x[-1]) < sim.energy(t.x[0]) + 1e-6
+    x = sim.neutral()
+    x[2] += 0.2
+    t = sim.rollout(sim.integrate(x, np.r_[0.0, 0.0, 0.0, rng.normal(size=9)]), np.zeros((100, 0)), throw=True)
+    assert t.contacts.gap.min() > -1e-7 and (t.contacts.gap.min(axis=1)[-20:] < 1e-3).any()
+    assert sim.energy(t.x).max() < sim.energy(t.x[0]) + 1e-6
 
 
 def test_bodies_that_cannot_stand_are_refused() -> None:
