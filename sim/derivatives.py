@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.parameters import Parameter, Parameters, Plan, all_parameters
+from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
 from sim.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
@@ -93,11 +93,10 @@ class Derivatives(States):
         (T, ndx, n) are then in `Linearization.parameters`, by name. An unsolved step raises SimulationError.
         """
         call = "linearize_rollout"
-        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, (None, self.nu))
+        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, ("T", self.nu))
         level = self._border.kappa(call, kappa)
-        names = _parameters(_names(f"Simulator.{call}(wrt=...)", wrt))
         blocks: Blocks = {}
-        if names:
+        if names := _parameters(_names(f"Simulator.{call}(wrt=...)", wrt)):
             self._check_order(f"Simulator.{call}(wrt=...)")
             found, plan = self._select(f"Simulator.{call}(wrt=...)", names)
             knot, xs, A, B, J, reports = roll_parameters(self._calls, self.mechanism, state, inputs, plan, level)
@@ -123,8 +122,8 @@ class Derivatives(States):
         if wrenches is not None:
             return pushed.linearize_trajectory(cast(Any, self), xs, us, wrenches, substeps, kappa)
         call = "Simulator.linearize_trajectory"
-        inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
-        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
+        inputs = self._border.inputs("linearize_trajectory", "us", us, ("T", self.nu))
+        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, ("T", self.nx)))
         if len(states) - len(inputs) not in (0, 1):
             raise ValueError(
                 f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
@@ -169,7 +168,7 @@ class Derivatives(States):
         call = "Simulator.vjp"
         self._check_order(call)
         xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
-        inputs = self._border.inputs("vjp", "trajectory", us, (None, self.nu))
+        inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
         asked = _names(f"{call}(wrt=...)", wrt)
@@ -202,8 +201,8 @@ class Derivatives(States):
             size_a, size_b              their [radius], [length], [x], [y], [z]; of a polytope its [scale], 1 as it is;
                                         a body's inertia is that of its own shape, and stays
         """
-        names = [p.name for p in self._known] if wrt is None else _names("Simulator.parameters(wrt)", wrt)
-        return self._select("Simulator.parameters(wrt)", tuple(names))[0]
+        call = "Simulator.parameters(wrt)"
+        return self._select(call, tuple(p.name for p in self._known) if wrt is None else _names(call, wrt))[0]
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
         """The same with other values of parameters; a ValueError names what no body, joint or shape can have."""
@@ -242,6 +241,7 @@ def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if not isinstance(name, str):
             raise ValueError(f"{call}: expected names, got {name!r}")
+        checks.one_of(f"{call}: kind", name.split(":")[0].split("[")[0], (*_VARIABLES, *KINDS))
     checks.distinct(call, names)
     return names
 

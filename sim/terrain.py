@@ -177,12 +177,15 @@ class Terrain:
 
     def radius_rate(self, radius: float) -> Floats:
         """d(coefficients of `surface`)/d(radius), whose values are sqrt(1 + |grad|^2) of the ground that is touched."""
-        touched = self._kept(radius)[1]
-        if touched is None:
-            touched = np.stack(np.meshgrid(*(np.arange(n, dtype=np.float64) for n in self.shape), indexing="ij"), -1)
-        _, fs, ft = spline(self.coefficients, touched[..., 0], touched[..., 1])
-        dx, dy = np.asarray(self.spacing)
-        return spline_coefficients(np.sqrt(1.0 + (fs / dx) ** 2 + (ft / dy) ** 2))
+        kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
+        if radius not in kept:
+            touched = self._kept(radius)[1]
+            if touched is None:
+                touched = np.stack(np.meshgrid(*(np.arange(float(n)) for n in self.shape), indexing="ij"), axis=-1)
+            _, fs, ft = spline(self.coefficients, touched[..., 0], touched[..., 1])
+            dx, dy = np.asarray(self.spacing)
+            kept[radius] = spline_coefficients(np.sqrt(1.0 + (fs / dx) ** 2 + (ft / dy) ** 2))
+        return kept[radius]
 
     def _kept(self, radius: float) -> tuple[Terrain, Floats | None]:
         kept = self.__dict__.setdefault("_surfaces", {})
