@@ -56,6 +56,8 @@ class Problem:
 
     free_start: tangent components of the start that the planner may change, or True for all; `start` is then a guess.
     Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
+
+    The attribute `refinement` is 1; set to more, `ilqr` ends by planning `refined(refinement)` from what it has found.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class Problem:
         self.sim = sim
         self.horizon = int(horizon)
         self.substeps = int(substeps)
+        self.refinement = 1
         start = np.asarray(start, dtype=float)
         if start.shape != (sim.nx,):
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
@@ -106,6 +109,7 @@ class Problem:
         finer = copy.copy(self)
         finer.sim = self.sim.replace(time_step=self.sim.time_step / int(count))
         finer.substeps = self.substeps * int(count)
+        finer.refinement = 1
         finer.bind()
         return finer
 

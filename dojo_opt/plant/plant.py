@@ -19,6 +19,7 @@ __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
 _LOW = 0.5  # fallen: below this share of the first height,
+_LEVEL = 0.1  # a plane with a normal that points up by more than this can be the floor
 _TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
 
 
@@ -48,6 +49,8 @@ class Plant:
         self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation
         self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
         self.normal = p.normal
+        contacts = self.simulator.mechanism.contacts
+        self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _LEVEL), None)
         self._noise = np.array(np.broadcast_to(np.asarray(p.noise, dtype=float), (sim.ndx,)))
         lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
         self._limits = tuple(np.broadcast_to(np.asarray(b, dtype=float), (sim.nu,)) for b in (lo, hi))
@@ -120,6 +123,14 @@ class Plant:
             return False
         w, i, j, k = x[3:7]
         up = np.array([2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)])
-        floor = self.perturbation.ground_height
-        height = self.normal @ x[:3] - floor
-        return bool(height < _LOW * (self.normal @ self._x0[:3] - floor) or up @ self.normal < _TILTED)
+        return bool(self._above(x) < _LOW * self._above(self._x0) or up @ self.normal < _TILTED)
+
+    def _above(self, x: Vector) -> float:
+        """Height of the base above the ground below it [m]."""
+        contact = self._floor
+        if contact is None:
+            return float(x[2])
+        if contact.terrain is not None:
+            return float(x[2] - contact.terrain.height(x[0], x[1]) - contact.height)
+        normal = np.asarray(contact.normal)
+        return float((normal @ x[:3] - contact.height) / normal[2])
