@@ -56,9 +56,9 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
 
 def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
     """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the normals' share of those (k,)."""
-    at, J = feet.positions(state), feet.jacobian(state)
-    normal = np.stack([contact.normal_at(p) for contact, p in zip(feet.contacts, at, strict=True)])
-    return np.einsum("kc,kcv->kv", normal, J), J[:, 2], normal[:, 2]
+    normal = feet.normals(state)
+    gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
+    return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
 
 
 def _check_friction(name: str, feet: Feet, share: Array, force: Array) -> None:

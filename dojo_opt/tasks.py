@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
+from dojo_opt.feet import Feet
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Sampled
 from dojo_opt.mpc.tick import OPTIONS
@@ -25,7 +26,7 @@ Matrix = NDArray[np.float64]
 __all__ = ["Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
-_BOLD = replace(OPTIONS, ascent=10.0)  # a push is better followed at some price than kept as a gap from tick to tick
+_HOPPER = replace(OPTIONS, shooting=1.0)  # after a push most rollouts are lost, and gaps would stay open for ticks
 
 
 class Hopping:
@@ -69,16 +70,16 @@ def hopper_mpc(
 ) -> MPC:
     """Raibert's hopper hops `height` [m] at a velocity [m/s]: 20 knots of 50 ms, each of `substeps` steps of the model.
 
-    Squares of the place along x and y weigh 30, of height 10, attitude 1 (yaw .1), leg 3, velocities along x and y 3,
-    the others .01, impulses .01 per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
+    Squares of position weigh 10, attitude 1 (yaw .1), leg 1, velocities along x and y 1, the others .01, impulses .01
+    per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
 
-    A push in flight is paid for until the foot is down. A light leg weight lets it reach down early; the weight on the
-    velocity keeps the body from leaning further than friction holds on the way back.
+    What a push in flight costs grows until the foot is down: a light leg weight lets it reach down early. The weight on
+    the velocity keeps the body from leaning further than friction holds on the way back.
     """
     knot, horizon = 0.05, 20
     sim = Simulator(models.raiberthopper(), time_step=knot / substeps)
     start = sim.neutral()
-    weight = np.array([30.0, 30.0, 10.0, 1.0, 1.0, 0.1, 3.0, 3.0, 3.0] + [0.01] * 5)
+    weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0] + [0.01] * 5)
     limits = np.array([50.0, 50.0, 500.0])
     problem = Problem(
         sim,
@@ -89,7 +90,7 @@ def hopper_mpc(
         substeps=substeps,
         controls0=np.array([0.0, 0.0, 9.81 * sim.mechanism.bodies[0].mass]),
     )
-    return MPC(problem, reference=Hopping(start, velocity, height, stance), **{"options": _BOLD, **settings})
+    return MPC(problem, reference=Hopping(start, velocity, height, stance), **{"options": _HOPPER, **settings})
 
 
 def quadruped_mpc(
@@ -123,9 +124,10 @@ def quadruped_mpc(
     held = Sampled(sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu))
     weight = np.array([10.0] * 6 + [1.0] * 12 + [0.1] * 6 + [0.01] * 12)
     times = knot * np.arange(horizon + 1)
+    start = reference([0.0])[0]
     problem = Problem(
         sim,
-        reference([0.0])[0],
+        start if terrain is None else Feet(sim).put_down(start),
         horizon,
         cost=[Tracking(reference(times), weight), Effort(1e-4)],
         control_limits=(-limit, limit),

@@ -129,14 +129,7 @@ class Perturbation:
         return out.ravel()
 
     def on_ground(self, mechanism: Mechanism, x: Vector) -> Vector:
-        """The state x of a robot on level ground, moved and turned with the ground: the same feet touch it.
-
-        On terrain it is moved up by the height under its base.
-        """
-        if self.terrain is not None:
-            out = x.copy()
-            out[2] += float(self.terrain.height(x[0], x[1]))
-            return out
+        """The state x of a robot on level ground, moved and turned with the ground: the same feet touch it."""
         if not (self.slope or self.ground_height):
             return x
         first = mechanism.joints[0]

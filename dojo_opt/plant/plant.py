@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
 from sim import checks
 from sim.results import StepResult
@@ -61,6 +62,8 @@ class Plant:
             )
         x = self.start if len(np.atleast_1d(p.offset)) == 0 else sim.integrate(self.start, p.offset)
         self._x0 = p.on_ground(sim.mechanism, x)
+        if p.terrain is not None:
+            self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
         self.reset()
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
