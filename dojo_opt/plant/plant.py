@@ -11,7 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
 from sim import checks
+from sim.mechanism import Mechanism
+from sim.parts import Joint
 from sim.results import StepResult
+from sim.shapes import rotation_matrix
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -20,8 +23,9 @@ __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
 _LOW = 0.5  # fallen: below this share of the first height,
-_LEVEL = 0.1  # a plane with a normal that points up by more than this can be the floor
 _TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
+_FLOOR = 0.1  # a plane with a normal that points up by more than this can be the floor
+_LEVEL = 1e-6  # vertical part of a level axis
 
 
 class Plant:
@@ -43,6 +47,9 @@ class Plant:
         perturbation: Perturbation | None = None,
         **fields: Any,
     ) -> None:
+        if not isinstance(sim, Simulator):
+            raise TypeError(f"Plant(sim): expected a Simulator, got {sim!r}")
+        checks.keywords("Plant(...)", fields, Perturbation.__dataclass_fields__)
         if perturbation is not None and fields:
             raise ValueError(f"Plant(perturbation=...): give either it or its fields, got also {', '.join(fields)}")
         self.sim = sim
@@ -51,7 +58,7 @@ class Plant:
         self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
         self.normal = p.normal
         contacts = self.simulator.mechanism.contacts
-        self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _LEVEL), None)
+        self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
         self._noise = np.array(np.broadcast_to(np.asarray(p.noise, dtype=float), (sim.ndx,)))
         lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
         self._limits = tuple(np.broadcast_to(np.asarray(b, dtype=float), (sim.nu,)) for b in (lo, hi))
@@ -118,22 +125,38 @@ class Plant:
         return result
 
     def fallen(self, x: Vector) -> bool:
-        """Whether a robot on a floating base lies: below half its first height, or tilted by more than 60 degrees.
+        """Whether a robot lies: its base below half its first height, or tilted by more than 60 degrees from the start.
 
-        A robot without a floating base never does.
+        A robot whose base neither floats nor moves in a vertical plane never does.
         """
-        if self.sim.mechanism.joints[0].kind != "floating":
+        if not stands_free(self.sim.mechanism):
             return False
-        w, i, j, k = x[3:7]
-        up = np.array([2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)])
-        return bool(self._above(x) < _LOW * self._above(self._x0) or up @ self.normal < _TILTED)
+        now, first = self._base(x), self._base(self._x0)
+        low = self._above(now[:3]) < _LOW * self._above(first[:3])
+        up = rotation_matrix(now[6:10]) @ rotation_matrix(first[6:10]).T @ self.normal
+        return bool(low or up @ self.normal < _TILTED)
 
-    def _above(self, x: Vector) -> float:
-        """Height of the base above the ground below it [m]."""
-        contact = self._floor
+    def _above(self, place: Vector) -> float:
+        """Height of a place (3,) above the ground below it [m]."""
+        contact, z = self._floor, float(place[2])
         if contact is None:
-            return float(x[2])
+            return z
         if contact.terrain is not None:
-            return float(x[2] - contact.terrain.height(x[0], x[1]) - contact.height)
+            return z - contact.height - float(contact.terrain.height(place[0], place[1]))
         normal = np.asarray(contact.normal)
-        return float((normal @ x[:3] - contact.height) / normal[2])
+        return float((normal @ place - contact.height) / normal[2])
+
+    def _base(self, x: Vector) -> Vector:
+        """Maximal state (13,) of the first body."""
+        return np.asarray(self.sim.maximal(x)[0])
+
+
+def stands_free(mechanism: Mechanism) -> bool:
+    """Whether the first joint lets its body move up and down and tip over: no pendulum and no arm."""
+    base = mechanism.joints[0]
+    return base.kind == "floating" or (base.kind == "planar_axis" and abs(_world_axis(base)[2]) < _LEVEL)
+
+
+def _world_axis(joint: Joint) -> Vector:
+    """Axis of a joint on the world, world axes."""
+    return np.asarray(rotation_matrix(joint.orientation) @ np.asarray(joint.axis))
