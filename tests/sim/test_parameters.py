@@ -10,8 +10,9 @@ from coupled_scenes import COUPLED, kinds
 from jacobians import check_jacobian
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.case import Case
 from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import CASES, Case
+from dojo_opt.report.mechanics.situations import CASES
 from sim.parameters import KINDS
 
 ALL = {**CASES, **COUPLED}
@@ -202,7 +203,7 @@ def test_every_value_can_be_put_in_its_place() -> None:
 @pytest.mark.parametrize(
     ("wrt", "message"),
     [
-        (("weight",), r"wrt=.*parameter.*'weight'"),
+        (("weight",), r"wrt=.*kind.*'weight'"),
         (("friction:hand",), r"no parameter 'friction:hand'.*friction:body1"),
         (("cone",), r"no parameter 'cone'.*none"),
         (("mass", "mass"), "mass"),
