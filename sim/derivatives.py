@@ -194,9 +194,12 @@ class Derivatives(States):
         return self._select("Simulator.parameters(wrt)", tuple(names))[0]
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
-        """The same simulator with other values of the named parameters, as in `parameters`; compiled code is shared."""
+        """The same simulator with other values of the named parameters, as in `parameters`, at the same kappa.
+
+        Compiled code is shared.
+        """
         mech, time_step = with_values("Simulator.with_parameters(...)", self.mechanism, self.time_step, values)
-        return self.replace(mechanism=mech, time_step=time_step)
+        return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
 
     def replace(self, **settings: Any) -> Any:
         """See Simulator."""
