@@ -15,7 +15,7 @@ from sim.border import whole
 from sim.parameters import Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
-from sim.sensitivity import adjoint_sweep, parameter_columns
+from sim.sensitivity import adjoint_products, adjoint_sweep, parameter_columns
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
@@ -157,20 +157,25 @@ class Derivatives(States):
         the trajectory. An unsolved step raises SimulationError.
         """
         call = "Simulator.vjp"
-        self._check_order(call)
         xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
         inputs = self._border.inputs("vjp", "trajectory", us, (None, self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
         asked = _names(f"{call}(wrt=...)", wrt)
+        if _parameters(asked):
+            self._check_order(f"{call}(wrt=...)")
         found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
         level = self._border.kappa("vjp", kappa)
-        knot, line = adjoint_sweep(self._calls, path, loss, plan, level)
+        if self.order == 2:
+            knot, line = adjoint_sweep(self._calls, path, loss, plan, level)
+            report, state, inputs, values = line.report[0], line.costate[0], line.inputs, line.parameters
+        else:
+            (knot, report, state, inputs), values = adjoint_products(self._calls, path, loss, level), np.zeros(0)
         if knot >= 0:
-            raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
-        blocks = {"state": line.costate[0], "input": line.inputs}
-        return {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
+            raise error_of(self.mechanism, f"{call}: step {knot}", report, self.tolerance)
+        blocks = {"state": state, "input": inputs}
+        return {name: blocks[name] if name in blocks else values[found.rows[name]] for name in asked}
 
     def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
         """Names and values of parameters: of all, or of the given names, in their order.
@@ -206,7 +211,7 @@ class Derivatives(States):
         raise NotImplementedError
 
     def _check_order(self, call: str) -> None:
-        """Steps of a higher order are another scheme, with derivatives by state and input only."""
+        """Derivatives by parameters are those of steps of order 2."""
         if self.order != 2:
             raise ValueError(f"{call}: expected a simulator of order 2, got order {self.order}")
 

@@ -106,7 +106,10 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if mech.contacts or nlimit else "Newton's method; interior point left out"
     if order > 2:
-        solver = f"none: {len(tableau(order)[1])} evaluations of the equations of motion"
+        far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
+        solver = (
+            f"{solver}; while contacts and limits are far none: {far}" if mech.contacts or nlimit else f"none: {far}"
+        )
     counts = (
         ("contacts", len(mech.contacts), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
         ("joint limits", nlimit, f"{nlimit} bounds"),

@@ -11,9 +11,11 @@ from sim.effects import At
 from sim.model import Vector
 from sim.parameter_gradients import parameter_jacobian
 from sim.parameters import Plan
+from solvers.status import Status
 
 Floats = NDArray[np.float64]
 _TWISTS = 12  # rows of scratch for twists at three configurations
+_PIECE = 64  # steps whose (A, B) are kept at once
 
 
 def parameter_columns(calls: Calls, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
@@ -26,6 +28,26 @@ def parameter_columns(calls: Calls, step: tuple[Vector, Vector], A: Floats, plan
         model, work = calls.tables()
         parameter_jacobian(model, work, at, A, plan.terms, plan.weights, out)
     return out
+
+
+def adjoint_products(
+    calls: Calls, path: tuple[Floats, Floats], loss: Floats, kappa: float | None
+) -> tuple[int, Floats, Floats, Floats]:
+    """(the step that was not solved or -1, its report, dL/dx_0 (ndx,), dL/du (T, nu)) from the (A, B) of every step.
+
+    l_T = dL/dx_T,    l_t = A_t^T l_t+1 + dL/dx_t,    dL/du_t = B_t^T l_t+1;  a piece of the trajectory at a time.
+    """
+    xs, us = path
+    costate, inputs = loss[-1].copy(), np.zeros((len(us), calls.nu))
+    for last in range(len(us), 0, -_PIECE):
+        first = max(last - _PIECE, 0)
+        A, B, _, reports = calls.linearize(xs[first : last + 1], us[first:last], 1, kappa)
+        for t in range(last - 1, first - 1, -1):
+            if reports[t - first, 0] != Status.SOLVED:
+                return t, reports[t - first], costate, inputs
+            inputs[t] = B[t - first].T @ costate
+            costate = A[t - first].T @ costate + loss[t]
+    return -1, np.zeros(REPORT), costate, inputs
 
 
 def adjoint_sweep(

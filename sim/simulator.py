@@ -39,12 +39,14 @@ class Simulator(Derivatives):
                     given to `linearize` makes them smooth
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
-    order           of a step; 4, 6, 8 for mechanisms without contacts and limits: explicit, with 4, 7, 12 evaluations
-                    of the equations of motion. Momentum is exact with all; order 2 bounds the energy over any time,
-                    the others keep it to a much smaller error that grows with time
+    order           of a step; 4, 6, 8 while all contacts and limits are far: explicit, with 4, 7, 12 evaluations of
+                    the equations of motion. Momentum is exact with all; order 2 bounds the energy over any time, the
+                    others keep it to a much smaller error that grows with time. Steps that might leave out impulses
+                    kappa / gap of more than the tolerance are of order 2; not for loops, gears and collisions
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
-    With order 2, v is the mean velocity over the interval that led to q; with a higher order the velocity at the node.
+    With order 2, v is the mean velocity over the interval that led to q; with a higher order the velocity M(q)^-1 p of
+    the node, before what the ground does in the step to come: standing still, it is g h/2.
     """
 
     def __init__(
