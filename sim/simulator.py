@@ -36,7 +36,7 @@ class Simulator(Derivatives):
                     kappa / impulse; smaller is harder. Left out, 1e-9 m/s * m |g| h of the lightest part that no
                     joint holds to another, |g| = 9.81 m/s^2 where there is no gravity, and within 1e-13 and 1e-6:
                     nothing at rest creeps by 1e-6 m in 10 s, and derivatives are those of hard contact. A larger one
-                    given to `linearize` makes them smooth
+                    given to `linearize` makes them smooth. Mechanisms with collisions: 1e-6
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
     order           of a step; 4, 6, 8 while all contacts and limits are far: explicit, with 4, 7, 12 evaluations of

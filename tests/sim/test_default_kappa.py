@@ -23,6 +23,8 @@ def test_it_follows_weight_and_time_step() -> None:
 def test_it_stays_between_rounding_and_what_is_hard() -> None:
     assert dojo.Simulator(dojo.models.block(mass=1e-3), time_step=1e-4).kappa == 1e-13
     assert dojo.Simulator(dojo.models.block(mass=1e5), time_step=0.1).kappa == 1e-6
+    on_a_box = dojo.models.sphere().with_obstacle(dojo.Box(1.0, 1.0, 1.0))
+    assert dojo.Simulator(on_a_box, time_step=0.01).kappa == 1e-6
 
 
 def test_the_lightest_part_counts_with_all_that_hangs_on_it() -> None:
