@@ -56,8 +56,8 @@ def default_kappa(mechanism: Mechanism, time_step: float) -> float:
     gravity, 9.81 m/s^2 where there is none. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
     above the ground whatever it weighs and at every time step, and creeps down a slope a with
     n * 1e-9 m/s * tan a / (cos a (mu^2 - tan^2 a)): less than 1e-6 m in 10 s, but for slopes close to the cone.
-    Collisions of edges and corners, one of 240 of boxes, can be without a solution below 1e-8, and gaps under loads that
-    are 1e4 times heavier than what carries them would be below rounding.
+    From 1e-8 down, steps of one of 240 collisions of boxes find no solution, and under loads 1e4 times heavier than
+    what carries them gaps are below rounding.
     """
     if mechanism.collisions:
         return _LARGEST
