@@ -33,21 +33,18 @@ _ORDERS = (2, 4, 6, 8)
 class Simulator(Derivatives):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
-    kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
-                    kappa / impulse; smaller is harder. Left out, 1e-9 m/s * m |g| h of the lightest part that no
-                    joint holds to another, |g| = 9.81 m/s^2 where there is no gravity, and within 1e-13 and 1e-6:
-                    nothing at rest creeps by 1e-6 m in 10 s, and derivatives are those of hard contact. A larger one
-                    given to `linearize` makes them smooth. Mechanisms with collisions: 1e-6
+    kappa           central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa over
+                    its impulse. By default 1e-9 m/s * m |g| h, m the lightest part that no joint holds to another,
+                    |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions 1e-6. See `default_kappa`
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
-    order           of a step; 4, 6, 8 while all contacts and limits are far: explicit, with 4, 7, 12 evaluations of
-                    the equations of motion. Momentum is exact with all; order 2 bounds the energy over any time, the
-                    others keep it to a much smaller error that grows with time. Steps that might leave out impulses
-                    kappa / gap of more than the tolerance are of order 2; not for loops, gears and collisions
+    order           of a step; 4, 6, 8 explicit, with 4, 7, 12 evaluations of the equations of motion, for trees. Momentum
+                    is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
+                    grows. Steps that might leave out impulses kappa / gap beyond the tolerance are of order 2
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
-    With order 2, v is the mean velocity over the interval that led to q; with a higher order the velocity M(q)^-1 p of
-    the node, before what the ground does in the step to come: standing still, it is g h/2.
+    With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
+    before what the ground does in the step to come: standing still, g h/2.
     """
 
     def __init__(
@@ -67,16 +64,9 @@ class Simulator(Derivatives):
             raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
         h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
-        super().__init__(
-            mechanism,
-            Settings(
-                h,
-                default_kappa(mechanism, h) if self._kappa is None else self._kappa,
-                checks.number("Simulator(tolerance=...)", tolerance, above=0.0),
-                int(max_iterations),
-                int(order),
-            ),
-        )
+        level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
+        accuracy = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
+        super().__init__(mechanism, Settings(h, level, accuracy, int(max_iterations), int(order)))
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._given().values())
@@ -92,8 +82,7 @@ class Simulator(Derivatives):
     def replace(self, **settings: Any) -> Simulator:
         """The same with other settings: those of Simulator(...), and `friction`, `law`, `gravity`, `mechanism`.
 
-        friction, law: for all contacts, or {contact name: value}. A kappa that was not given follows its rule again.
-        Compiled code is shared.
+        friction, law: for all contacts, or {contact name: value}. A default kappa stays one. Compiled code is shared.
         """
         known = ("mechanism", *_SETTINGS, "friction", "law", "gravity")
         for key in settings:
