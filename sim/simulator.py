@@ -38,7 +38,7 @@ class Simulator(Derivatives):
                     |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions 1e-6. See `default_kappa`
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
-    order           of a step; 4, 6, 8 explicit, with 4, 7, 12 evaluations of the equations of motion, for trees. Momentum
+    order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum
                     is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
                     grows. Steps that might leave out impulses kappa / gap beyond the tolerance are of order 2
 
