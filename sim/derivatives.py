@@ -175,8 +175,7 @@ class Derivatives(States):
             self._check_order(f"{call}(wrt=...)")
         found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
-        level = self._border.kappa("vjp", kappa)
-        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, level)
+        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, self._border.kappa("vjp", kappa))
         if knot >= 0:
             raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
         blocks = {"state": line.costate[0], "input": line.inputs}
