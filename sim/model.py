@@ -114,6 +114,13 @@ class Late(IntEnum):
     ALL_NEAR = 55
     # gears
     APPLY_GEARS = 56
+    # loops that pass singular configurations
+    CLOSE_VELOCITY = 57
+    PREDICT_LOOPS = 58
+    LOOPS_GAINED = 59
+    LEAD_AGAIN = 60
+    MEET_AHEAD = 61
+    FARTHER = 62
 
 
 class Model(NamedTuple):
@@ -232,6 +239,8 @@ class Work(NamedTuple):
     far_first: Integers  # (nground,) first contacts of the far clusters
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
+    loop_led: Integers  # (2,) rows of loop_lead in use; 1: in place of constraints too
+    loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     pair_free: Integers  # (1,) 1: elements are chosen anew at every pose
@@ -277,7 +286,7 @@ class Work(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
-    couple_rank: Vector  # (2,) rank and size of the dense system,
+    couple_rank: Vector  # (3,) rank and size of the dense system, and its least pivot that counts
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops
@@ -288,6 +297,13 @@ class Work(NamedTuple):
     couple_wrench: Vector  # (6,) scratch
     loop_frame: Matrix  # (nloop, 12)
     loop_turn: Matrix  # (nloop, 9)
+    loop_velocity: Vector  # (nv,) where a step begins to look for its velocity
+    loop_start: Vector  # (nv,) where it looks for another one
+    loop_kept: Vector  # (nv,) the first of them
+    loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
+    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loop_lead.py
+    loop_scale: Vector  # (nrow,) scratch
+    loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
     bound: Matrix  # (nlimit, 2) slack, impulse
