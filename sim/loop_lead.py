@@ -103,7 +103,7 @@ def lead_loops(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None
     """
     work.loop_led[0] = 0
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
-    first, last = model.coupling_row[pairs], model.coupling_row[model.coupling_body.shape[0]]
+    first, last = int(model.coupling_row[pairs]), int(model.coupling_row[model.coupling_body.shape[0]])
     _set_rows(model, work, h, q, v)
     size = 0.0
     for row in range(first, last):
