@@ -161,7 +161,7 @@ class Closure:
     def rank(self, x: Floats) -> LoopRank:
         """Which constraints are redundant at the configuration of x, loops in their order.
 
-        And which of them are so at this configuration only: next to it, some way along what the loops allow, they count.
+        And which of them are so at this configuration only: next to it, along what the loops allow, they count.
         """
         here, free = self._rank_at(x)
         near = [self._rank_at(y)[0] for y in self._next_to(x, free)]
