@@ -114,13 +114,16 @@ class Late(IntEnum):
     ALL_NEAR = 55
     # gears
     APPLY_GEARS = 56
+    # derivatives by the heights of a terrain, and by radii on it
+    HEIGHT_GRADIENT = 57
+    RADIUS_ON_TERRAIN = 58
     # loops that pass singular configurations
-    CLOSE_VELOCITY = 57
-    PREDICT_LOOPS = 58
-    LOOPS_GAINED = 59
-    LEAD_AGAIN = 60
-    MEET_AHEAD = 61
-    FARTHER = 62
+    CLOSE_VELOCITY = 59
+    PREDICT_LOOPS = 60
+    LOOPS_GAINED = 61
+    LEAD_AGAIN = 62
+    MEET_AHEAD = 63
+    FARTHER = 64
 
 
 class Model(NamedTuple):
@@ -174,6 +177,7 @@ class Model(NamedTuple):
     contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
     terrain_place: Matrix  # (nterrain, 8) see height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
+    terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_far: Matrix  # (npair, 7) what says that a collision is far (pair_far.py), at its first pair
@@ -253,7 +257,7 @@ class Work(NamedTuple):
     contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 16) see restitution.py
+    bounce: Matrix  # (ncontact, 22) see restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same
