@@ -8,7 +8,7 @@ import numpy as np
 
 from sim import bodies, coordinates, runge_kutta
 from sim.bind import bind_smooth
-from sim.calls import BOUND, CONE, REPORT, Calls, Floats
+from sim.calls import REPORT, Calls, Floats
 from sim.hamilton_gradient import Slopes
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
@@ -156,9 +156,7 @@ class HighOrder(Calls):
         keep: bool = False,
     ) -> tuple[int, Path]:
         """As Calls.closed_loop."""
-        knots = len(policy.us)
-        kept = np.zeros((knots if keep else 0, 0, CONE)), np.zeros((knots if keep else 0, 0, BOUND))
-        path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
+        path = self._path(len(policy.us), keep=keep)
         h = self.settings.time_step
         knot = runge_kutta.closed_loop(
             self._table(bind_smooth), self._scratch.table(), h, self._scheme(), x, policy, alpha, limits, substeps, path

@@ -203,7 +203,7 @@ def test_every_value_can_be_put_in_its_place() -> None:
 @pytest.mark.parametrize(
     ("wrt", "message"),
     [
-        (("weight",), r"wrt=.*parameter.*'weight'"),
+        (("weight",), r"wrt=.*kind.*'weight'"),
         (("friction:hand",), r"no parameter 'friction:hand'.*friction:body1"),
         (("cone",), r"no parameter 'cone'.*none"),
         (("mass", "mass"), "mass"),
