@@ -11,7 +11,6 @@ loads a plotting library.
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -200,6 +199,8 @@ except PackageNotFoundError:  # run from a source tree that is not installed
 def __getattr__(name: str) -> Any:
     """Import a public name on first use (PEP 562)."""
     if name not in _HOME:
+        from difflib import get_close_matches
+
         close = get_close_matches(name, __all__, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(__all__)}"
         raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}; {hint}")

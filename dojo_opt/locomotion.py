@@ -13,7 +13,7 @@ from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
 from dojo_opt.gaits.gait import Gait
-from dojo_opt.options import CONTINUATION
+from dojo_opt.options import CONTINUATION, PLANNED
 from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
@@ -188,7 +188,7 @@ def leap(
     Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, because their gains know it at one
     instant only. `ilqr` therefore ends with every step cut into `refinement`, and such plans land at 1 ms, too.
     """
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step, kappa=PLANNED)
     horizon = max(2, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
     start, torques = equilibrium(sim)
     goal = start.copy()
@@ -229,5 +229,6 @@ def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, 
     follows |= {key: settings[key] for key in _FOLLOW if key in settings}
     rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / follows.get("substeps", 1))
+    h = time_step / follows.get("substeps", 1)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
     return follow(gait(sim, **keywords, **rest), **follows)

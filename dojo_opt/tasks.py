@@ -14,6 +14,7 @@ from dojo_opt.feet import Feet
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Sampled
 from dojo_opt.mpc.tick import OPTIONS
+from dojo_opt.options import PLANNED
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim import checks
@@ -78,7 +79,7 @@ def hopper_mpc(
     the velocity keeps the body from leaning further than friction holds on the way back.
     """
     knot, horizon = 0.05, 20
-    sim = Simulator(models.raiberthopper(), time_step=knot / substeps)
+    sim = Simulator(models.raiberthopper(), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0] + [0.01] * 5)
     limits = np.array([50.0, 50.0, 500.0])
@@ -114,7 +115,7 @@ def quadruped_mpc(
     settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it.
     """
     knot, horizon, limit = 0.04, 20, 33.5
-    sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps)
+    sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps, kappa=PLANNED)
     fine = gaits.trot(level.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
     advance = sim.difference(fine.x[-1], fine.x[0])
     advance[6:] = 0.0  # joints and velocities come round
