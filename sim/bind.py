@@ -13,6 +13,9 @@ from sim import (
     coupling,
     coupling_gradient,
     gears,
+    loop_motion,
+    loop_velocity,
+    loop_work,
     loops,
     pair_choice,
     pair_cylinders,
@@ -47,6 +50,13 @@ _LOOPS = (
     loops.apply_loops,
     loops.keep_loops,
     loops.move_loops,
+)
+_MOTION_OF_LOOPS = (
+    loop_motion.predict_loops,
+    loop_motion.meet_ahead,
+    loop_motion.is_farther,
+    loop_motion.lead_again,
+    loop_work.loops_gained,
 )
 _PAIRS = (
     pairs.pair_kinematics,
@@ -112,6 +122,12 @@ def bind_poses(model: Model) -> None:
         _bind(model, (ball_spring.add_spring_block,))
 
 
+def bind_nodes(model: Model) -> None:
+    """What velocities and energies at the nodes of a motion need: those of loops follow from their constraints."""
+    if len(model.loop_ntrans) + len(model.gear_dof):
+        _bind(model, (coupling.factor_coupling, coupling.solve_coupling, loop_velocity.close_velocity))
+
+
 def bind_smooth(model: Model) -> None:
     """What steps of higher order need."""
     if np.any(model.joint_nrot == 2):
@@ -130,7 +146,10 @@ def bind_step(model: Model) -> None:
         _bind(model, _PYRAMIDS)
     if len(model.coupling_body) + len(model.gear_dof):
         _bind(model, _LOOPS)
-    if len(model.gear_dof):
+        bind_nodes(model)
+    if len(model.loop_ntrans):
+        _bind(model, _MOTION_OF_LOOPS)
+    if len(model.loop_ntrans) + len(model.gear_dof):
         _bind(model, (gears.apply_gears,))
     if len(model.pair_kind):
         _bind(model, _PAIRS)

@@ -32,7 +32,6 @@ class Calls(StateCalls):
 
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings)
-        self._bound: set[Callable[[Model], None]] = set()
         # what a policy need not know: derivatives and cone variables of its steps
         self.unknown = tuple(
             np.empty((0, *shape))
@@ -50,14 +49,6 @@ class Calls(StateCalls):
 
     def __setstate__(self, state: tuple[Model, Settings]) -> None:
         self.__init__(*state)  # type: ignore[misc]
-
-    def _table(self, *needs: Callable[[Model], None]) -> NDArray[np.int64]:
-        """Table of the Model, with the kernels bound that a call needs."""
-        for bind in needs:
-            if bind not in self._bound:
-                bind(self.model)
-                self._bound.add(bind)
-        return self._model
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Tables of the Model, bound for derivatives and what else a call needs, and of this thread's first Work."""

@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 _STEP = 1e-6  # of central differences [m, rad]
 _CLOSED = 1e-11  # [m], and as much of an angle
 _APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
+_ASIDE = 0.03  # [m, rad]
+_NEAR = 0.1  # `weakest` of configurations close to a singular one, over that next to them
+_STARTS = 30  # repetitions, each of which halves the error at least
 _DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
 
 
@@ -31,6 +34,8 @@ class LoopRank(NamedTuple):
     mobility: int  # degrees of freedom that the loops leave
     weakest: float  # least singular value of the independent constraints, over the largest
     leftover: float  # largest one of the redundant constraints, over the largest
+    singular: int = 0  # redundant ones that count next to this configuration: branches of the motion may meet here
+    nearby: float = 0.0  # `weakest` next to this configuration
 
     def __str__(self) -> str:
         total, idle = sum(self.constraints.values()), sum(self.redundant.values())
@@ -39,7 +44,18 @@ class LoopRank(NamedTuple):
             f"{self.mobility} degrees of freedom left by {total} constraints, {idle} redundant"
             + (f" ({which}) to {self.leftover:.0e}" if idle else "")
             + f"; the weakest has {self.weakest:.1e} of the strongest"
+            + self._place()
         )
+
+    def _place(self) -> str:
+        """How the configuration differs from those next to it."""
+        if self.singular:
+            return (
+                f"; singular: {self.singular} of the redundant ones count nearby, branches of the motion may meet here"
+            )
+        if self.weakest < _NEAR * self.nearby:
+            return f", nearby {self.nearby:.1e}: close to a singular configuration"
+        return ""
 
 
 def _angle(sine: Floats, cosine: float) -> Floats:
@@ -108,6 +124,22 @@ class Closure:
         x[self._nq :] += self._solve(before, nv)
         return x
 
+    def start(self, q: Floats, v: Floats) -> Floats:
+        """The closed state near q whose velocity at the node is the part of v along the loops.
+
+        Closing the interval before the node changes the velocity by O(h), which is made up for by repetition.
+        """
+        wanted = self._calls.node_velocities(self._calls.started(q, v)[None])[0]
+        given, best, x = wanted.copy(), np.inf, q
+        for _ in range(_STARTS):
+            state = self.close(self._calls.started(q, given))
+            off = wanted - self._calls.node_velocities(state[None])[0]
+            if not np.abs(off).max() < 0.5 * best:
+                break
+            x, best = state, np.abs(off).max()
+            given = given + off
+        return x
+
     def _with_shares(self, x: Floats) -> Floats:
         """A copy of x where shares of bodies (sim/closing.py) that are far from the rest of it are brought there."""
         gaps = self.gaps(x)
@@ -127,7 +159,33 @@ class Closure:
         return slice(self._nq + at.start, self._nq + at.stop)
 
     def rank(self, x: Floats) -> LoopRank:
-        """Which constraints are redundant at the configuration of x, loops in their order."""
+        """Which constraints are redundant at the configuration of x, loops in their order.
+
+        And which of them are so at this configuration only: next to it, along what the loops allow, they count.
+        """
+        here, free = self._rank_at(x)
+        near = [self._rank_at(y)[0] for y in self._next_to(x, free)]
+        count = sum(here.constraints.values()) - sum(here.redundant.values())
+        more = [sum(r.constraints.values()) - sum(r.redundant.values()) - count for r in near]
+        return here._replace(singular=max(0, *more, 0), nearby=max((r.weakest for r in near), default=here.weakest))
+
+    def _next_to(self, x: Floats, free: Floats) -> list[Floats]:
+        """Closed states at rest, _ASIDE away from x along some of its free directions (n, nv)."""
+        rng = np.random.default_rng(0)
+        states = []
+        for _ in range(2 if len(free) else 0):
+            d = rng.normal(size=len(free)) @ free
+            d *= _ASIDE / np.abs(d).max()
+            moved = self._calls.integrate(x[None], np.concatenate([d, np.zeros(len(d))])[None])[0]
+            moved[self._nq :] = 0.0
+            try:
+                states.append(self.close(moved))
+            except ValueError:  # an isolated configuration
+                continue
+        return states
+
+    def _rank_at(self, x: Floats) -> tuple[LoopRank, Floats]:
+        """The rank at one configuration, and the directions (n, nv) that its constraints leave."""
         nv = self._mechanism.nv
 
         def gaps(d: Floats) -> dict[str, Floats]:
@@ -144,7 +202,8 @@ class Closure:
             redundant[name] = size[name] - (independent - found)
             found = independent
         rest = values[found:].max() if found < len(values) else 0.0
-        return LoopRank(size, redundant, nv - found, float(values[found - 1] / values[0]), float(rest / values[0]))
+        rank = LoopRank(size, redundant, nv - found, float(values[found - 1] / values[0]), float(rest / values[0]))
+        return rank, np.linalg.svd(rows)[2][found:]
 
     def _solve(self, place: Callable[[Floats], Floats], nv: int) -> Floats:
         """The small d with closed loops at the state place(d): Newton's method, least norm."""

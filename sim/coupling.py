@@ -68,6 +68,9 @@ def factor_coupling(model: Model, work: Work) -> bool:
     rank = full_lu_factor(T, work.couple_pivots, least)
     work.couple_rank[0] = rank
     work.couple_rank[1] = n
+    work.couple_rank[2] = 1.0
+    for p in range(rank):
+        work.couple_rank[2] = min(work.couple_rank[2], abs(T[p, p]))
     return rank >= pairs
 
 

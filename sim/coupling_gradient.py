@@ -11,11 +11,12 @@ from __future__ import annotations
 from sim.coupling_rows import is_loop
 from sim.friction import contact_impulse
 from sim.gears import gear_derivatives
-from sim.loops import loop_stiffness
+from sim.loop_stiffness import loop_stiffness
 from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pair_stiffness import add_earlier_slip, centre_shift
 from sim.pairs import is_absent, pair_force
 from sim.rotation import Vec3, cross
+from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.late import late
 
@@ -110,11 +111,14 @@ def cross_block(model: Model, work: Work, rows: int, cols: int, sign: float, K: 
                 for c in range(6):
                     t += K[6 * r + c] * S[e, c]
                 w[r] = t
-            j = rows
-            while j >= 0:
-                for d in range(model.body_vadr[j], model.body_vadr[j + 1]):
-                    s = work.S2[d]
-                    t = s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5]
-                    work.dR_dq[d, e] += sign * t
-                j = model.body_parent[j]
+            add_column(model, work, rows, sign, e, work.dR_dq)
         k = model.body_parent[k]
+
+
+@kernel
+def add_column(model: Model, work: Work, i: int, sign: float, e: int, out: Matrix) -> None:
+    """out[j, e] += sign S2[j].w, w in couple_wrench; j from body i up to the root."""
+    while i >= 0:
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            out[d, e] += sign * dot(work.S2[d], work.couple_wrench)
+        i = model.body_parent[i]

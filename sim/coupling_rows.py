@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sim.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
-from sim.model import Model, Vector, Work
+from sim.model import Matrix, Model, Vector, Work
+from solvers.dense import dot
 from solvers.jit import kernel
 
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
@@ -58,11 +59,11 @@ def take_apart(work: Work, k: int, row: int) -> None:
 
 
 @kernel
-def add_along_path(model: Model, work: Work, i: int, sign: float, w: Vector, out: Vector) -> None:
-    """out[d] += sign S2[d].w for the joints between body i and the root."""
+def add_along_path(model: Model, S: Matrix, i: int, sign: float, w: Vector, out: Vector) -> None:
+    """out[d] += sign S[d].w for the joints between body i and the root."""
     while i >= 0:
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            s = work.S2[d]
+            s = S[d]
             out[d] += sign * (s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5])
         i = model.body_parent[i]
 
@@ -130,8 +131,11 @@ def unit_impulse(model: Model, work: Work, p: int, out: Vector) -> None:
         return
     for d in range(out.shape[0]):
         out[d] = 0.0
-    add_along_path(model, work, model.coupling_body[k, 0], 1.0, work.couple_B[row], out)
-    add_along_path(model, work, model.coupling_body[k, 1], -1.0, work.couple_B[row], out)
+    add_along_path(model, work.S2, model.coupling_body[k, 0], 1.0, work.couple_B[row], out)
+    add_along_path(model, work.S2, model.coupling_body[k, 1], -1.0, work.couple_B[row], out)
+    if work.loop_led[0] > 0:
+        for d in range(out.shape[0]):
+            out[d] += work.loop_lead[row, d]
 
 
 @kernel
@@ -140,7 +144,8 @@ def row_response(model: Model, work: Work, p: int, y: Vector) -> float:
     row, k = work.couple_live[p, 0], work.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
         return gear_response(model, work, k - model.coupling_body.shape[0], y)
-    return response(model, work, k, row)
+    led = dot(work.loop_lead[row], y) if work.loop_led[1] > 0 else 0.0
+    return response(model, work, k, row) + led
 
 
 @kernel

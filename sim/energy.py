@@ -14,6 +14,7 @@ from sim.coordinates import node_poses
 from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.layout import model_view, work_view
+from sim.loop_velocity import close_velocity
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import cross, quat_exp, quat_mul, quat_turn
 from solvers.jit import kernel
@@ -113,17 +114,23 @@ def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
 
 
 @kernel
-def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
-    """out = M^-1 p with M = S2^T (inertia) S2 + armature at configuration 2 in `work`.
-
-    Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
-    """
+def factor_mass_matrix(model: Model, work: Work) -> bool:
+    """M = S2^T (inertia) S2 + armature at configuration 2 in `work`, factored for `solve`; False when singular."""
     spatial_inertia(model, work, work.A)
     for d in range(work.S2.shape[0]):
         for k in range(6):
             work.S3nu[d, k] = work.S2[d, k]
     armature_blocks(model, 1.0, work.joint_block)
-    if not factor(model, work):
+    return factor(model, work) != 0
+
+
+@kernel
+def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
+    """out = M^-1 p at configuration 2 in `work`.
+
+    Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
+    """
+    if not factor_mass_matrix(model, work):
         return False
     solve(model, work, p, out)
     return True
@@ -131,12 +138,15 @@ def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
 
 @kernel
 def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
-    """work.dnu = M^-1 p, with p = S2^T (momenta of the bodies) + springs left in work.residual."""
+    """work.dnu = P M^-1 p, P of loop_velocity.py; p = S2^T (momenta of the bodies) + springs left in work.residual."""
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)
     add_spring_momentum(model, h, x, work.residual)
-    return solve_mass_matrix(model, work, work.residual, work.dnu)
+    solved = solve_mass_matrix(model, work, work.residual, work.dnu)
+    nq = work.theta1.shape[0]
+    close_velocity(model, work, h, x[:nq], x[nq:], work.dnu)
+    return solved
 
 
 @kernel

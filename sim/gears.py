@@ -20,7 +20,10 @@ def gear_row(model: Model, k: int) -> int:
 
 @late(Late.APPLY_GEARS, 0.0)
 def apply_gears(model: Model, work: Work, h: float) -> float:
-    """residual -= gear impulses; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap."""
+    """residual -= impulses of gears; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap.
+
+    Impulses of loops along directions in joint space (loop_lead.py) are taken off too.
+    """
     error = 0.0
     for k in range(model.gear_dof.shape[0]):
         a = model.gear_dof[k, 0]
@@ -33,6 +36,10 @@ def apply_gears(model: Model, work: Work, h: float) -> float:
         work.residual[a] -= work.couple_force[row]
         work.residual[b] += model.gear_ratio[k] * work.couple_force[row]
         error = max(error, abs(work.couple_gap[row]))
+    if work.loop_led[0] > 0:
+        for row in range(gear_row(model, 0)):
+            for d in range(work.residual.shape[0]):
+                work.residual[d] -= work.couple_force[row] * work.loop_lead[row, d]
     return error
 
 

@@ -50,7 +50,7 @@ MODEL_FLOATS = _shapes(
 WORK_INTS = _shapes(
     """
     counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 1,
-    coupling_live ncoupling, couple_live nrow 2
+    loop_led 2, loop_used nrow, coupling_live ncoupling, couple_live nrow 2
     """
 )
 
@@ -70,9 +70,11 @@ WORK_FLOATS = _shapes(
     pair_before npair 13, pair_apart npair, pair_far_state 3, far_pose nbody 7, far_wrench nbody 6,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 2,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 3,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
-    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9, gear_rate ngear 2,
+    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
+    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
+    loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 24, far_law 2

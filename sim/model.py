@@ -117,11 +117,18 @@ class Late(IntEnum):
     # derivatives by the heights of a terrain, and by radii on it
     HEIGHT_GRADIENT = 57
     RADIUS_ON_TERRAIN = 58
+    # loops that pass singular configurations
+    CLOSE_VELOCITY = 59
+    PREDICT_LOOPS = 60
+    LOOPS_GAINED = 61
+    LEAD_AGAIN = 62
+    MEET_AHEAD = 63
+    FARTHER = 64
     # cylinders against polytopes and cylinders
-    CYLINDER_DISTANCE = 59
-    COLLIDE_CYLINDERS = 60
-    CHOOSE_CYLINDERS = 61
-    CYLINDER_BEFORE = 62
+    CYLINDER_DISTANCE = 65
+    COLLIDE_CYLINDERS = 66
+    CHOOSE_CYLINDERS = 67
+    CYLINDER_BEFORE = 68
 
 
 class Model(NamedTuple):
@@ -242,6 +249,8 @@ class Work(NamedTuple):
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
     pair_kept: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
+    loop_led: Integers  # (2,) rows of loop_lead in use; 1: in place of constraints too
+    loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     pair_free: Integers  # (1,) 1: elements are chosen anew at every pose; 2: those that press are kept beside new ones
@@ -287,7 +296,7 @@ class Work(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
-    couple_rank: Vector  # (2,) rank and size of the dense system,
+    couple_rank: Vector  # (3,) rank and size of the dense system, and its least pivot that counts
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops
@@ -298,6 +307,13 @@ class Work(NamedTuple):
     couple_wrench: Vector  # (6,) scratch
     loop_frame: Matrix  # (nloop, 12)
     loop_turn: Matrix  # (nloop, 9)
+    loop_velocity: Vector  # (nv,) where a step begins to look for its velocity
+    loop_start: Vector  # (nv,) where it looks for another one
+    loop_kept: Vector  # (nv,) the first of them
+    loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
+    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loop_lead.py
+    loop_scale: Vector  # (nrow,) scratch
+    loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
     bound: Matrix  # (nlimit, 2) slack, impulse

@@ -18,6 +18,7 @@ _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
+_ROUNDED = 1e-10
 
 
 @kernel
@@ -51,6 +52,15 @@ def norm(x: Vector) -> float:
         if not a <= r:
             r = a
     return r
+
+
+@kernel
+def closed_to(work: Work, options: Options) -> float:
+    """How far loops may be open: near where two branches of their motion meet, gaps grow slowly away from either.
+
+    Least pivot: the product of the distances of configurations 2 and 3 from there.
+    """
+    return options.tolerance * max(work.couple_rank[2], _ROUNDED) ** 0.5 if work.couple_rank[1] > 0.0 else 1e300
 
 
 @late(Late.SOLVE, FAILED)
@@ -99,7 +109,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
                     work.nu_trial[d] *= 0.7
             alpha *= 0.5
             continue
-        if r < options.tolerance:
+        if r < options.tolerance and (gap < closed_to(work, options) or r >= last):
             status = _SOLVED
             break
         if iterations == options.max_iterations:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sim.collision.kinds import SWAPPED
+from sim.frame import place_frame
 from sim.model import Matrix, Model, Work
-from sim.rotation import rotate
 from solvers.jit import kernel
 
 
@@ -12,23 +12,7 @@ from solvers.jit import kernel
 def place_shape(model: Model, work: Work, row: int, i: int, pos: Matrix, rot: Matrix) -> None:
     """World pose of shape `row` on body i, -1 for the world, at the poses pos (nbody, 3), rot (nbody, 9) of bodies."""
     c = model.pair_place[row]
-    p = work.shape_pos[row]
-    R = work.shape_rot[row]
-    if i < 0:
-        for k in range(3):
-            p[k] = c[k]
-        for k in range(9):
-            R[k] = c[3 + k]
-        return
-    x, y, z = rotate(rot, i, c[0], c[1], c[2])
-    p[0] = pos[i, 0] + x
-    p[1] = pos[i, 1] + y
-    p[2] = pos[i, 2] + z
-    for k in range(3):
-        x, y, z = rotate(rot, i, c[3 + k], c[6 + k], c[9 + k])
-        R[k] = x
-        R[3 + k] = y
-        R[6 + k] = z
+    place_frame(c[:3], c[3:], i, pos, rot, work.shape_pos[row], work.shape_rot[row])
 
 
 @kernel

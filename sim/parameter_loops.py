@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from sim.effects import Effect
 from sim.gears import gear_row
-from sim.loops import child_point, loop_frame, turned
+from sim.loops import child_point, loop_frame
 from sim.model import Model, Work
 from sim.pair_stiffness import unit_vector
 from sim.parameter_effects import add_wrench
-from sim.rotation import cross, rotate
+from sim.rotation import cross, rotate, times
 from solvers.jit import kernel
 
 _LOOP_PARENT, _LOOP_CHILD = int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
@@ -35,14 +35,14 @@ def add_loop_geometry(model: Model, work: Work, effect: int, m: int, k: int, w: 
     first = model.coupling_row[c]
     for r in range(3 - model.loop_ntrans[m]):
         u = model.loop_axes[m, 3 * r : 3 * r + 3]
-        t = turned(work.loop_frame[m], u[0], u[1], u[2])
+        t = times(work.loop_frame[m], u[0], u[1], u[2])
         work.couple_panel[first + r, col] += w * sign * (t[0] * d3[0] + t[1] * d3[1] + t[2] * d3[2])
     if effect == _LOOP_PARENT:
         return
     loop_frame(model, work, m, b, work.pos2, work.rot2)
     for r in range(3 - model.loop_ntrans[m]):
         u = model.loop_axes[m, 3 * r : 3 * r + 3]
-        t = turned(work.loop_frame[m], u[0], u[1], u[2])
+        t = times(work.loop_frame[m], u[0], u[1], u[2])
         x = cross(d2[0], d2[1], d2[2], t[0], t[1], t[2])
         f = w * work.couple_force[first + r]
         add_wrench(model, work, a, (0.0, 0.0, 0.0), x, -f, col)
@@ -68,7 +68,7 @@ def add_loop_turn(model: Model, work: Work, m: int, k: int, w: float, col: int) 
         for r in range(n + (2 if model.loop_nrot[m] == 1 else 0)):
             row = model.coupling_row[c] + r
             u = model.loop_axes[m, 3 * r : 3 * r + 3] if r < n else s[3 * (r - n) : 3 * (r - n) + 3]
-            t = turned(Q, u[0], u[1], u[2])
+            t = times(Q, u[0], u[1], u[2])
             t = cross(e[0], e[1], e[2], t[0], t[1], t[2])
             if configuration == 3:
                 g = (A[0] - Q[9], A[1] - Q[10], A[2] - Q[11]) if r < n else axis

@@ -7,9 +7,10 @@ of the branch that was taken. Scenes without restitution do not compile these ke
 
 from __future__ import annotations
 
+from sim.coupling_gradient import add_column
 from sim.model import Late, Matrix, Model, Vector, Work
 from sim.pairs import pair_arm, pair_force
-from sim.rotation import Vec3, cross, transposed_times
+from sim.rotation import Vec3, cross, join, transposed_times
 from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.late import late
@@ -75,18 +76,10 @@ def add_bounce_derivatives(model: Model, work: Work) -> None:
         for side in range(2):
             i = one if side == 0 else two
             k = two if side == 0 else one
-            _fill(work.couple_wrench, f, t)
+            join(work.couple_wrench, f, t)
             _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dq)
             _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dv)
             _across(model, work, (i, k), b[1] - 1.0, b[8:14], work.S2, work.dR_dq)
-
-
-@kernel
-def _fill(out: Vector, f: Vec3, t: Vec3) -> None:
-    """out = (f, t)"""
-    for r in range(3):
-        out[r] = f[r]
-        out[3 + r] = t[r]
 
 
 @kernel
@@ -98,9 +91,5 @@ def _across(
     while k >= 0:
         for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
             x = scale * dot(row, S[e])
-            j = bodies[0]
-            while j >= 0:
-                for d in range(model.body_vadr[j], model.body_vadr[j + 1]):
-                    out[d, e] += x * dot(work.S2[d], work.couple_wrench)
-                j = model.body_parent[j]
+            add_column(model, work, bodies[0], x, e, out)
         k = model.body_parent[k]

@@ -157,7 +157,7 @@ def inverse_right_jacobian(x: float, y: float, z: float) -> Mat3:
 
 
 @kernel
-def times(M: Mat3, x: float, y: float, z: float) -> Vec3:
+def times(M: Mat3 | Vector, x: float, y: float, z: float) -> Vec3:
     """M (x, y, z)"""
     return (
         M[0] * x + M[1] * y + M[2] * z,
@@ -180,3 +180,11 @@ def transposed_times(M: Mat3 | Vector, x: float, y: float, z: float) -> Vec3:
 def rows_of(R: Matrix, i: int) -> Mat3:
     """R[i] as a tuple."""
     return R[i, 0], R[i, 1], R[i, 2], R[i, 3], R[i, 4], R[i, 5], R[i, 6], R[i, 7], R[i, 8]
+
+
+@kernel
+def join(out: Vector, v: Vec3, w: Vec3) -> None:
+    """out (6) = (v, w), a twist or a wrench."""
+    for k in range(3):
+        out[k] = v[k]
+        out[3 + k] = w[k]

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, start, state, velocity
-from sim.bind import bind_poses
+from sim.bind import bind_nodes, bind_poses
 from sim.layout import sizes_of, table
 from sim.model import Model, Vector
+from sim.results import SimulationError
 from sim.scratch import Scratch
 from sim.settings import Settings
+from solvers.record import Table
+from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +28,7 @@ class StateCalls:
         self.sizes = sizes_of(model)
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
         bind_poses(model)
+        self._bound: set[Callable[[Model], None]] = set()
         self._model = table(model)
         self._scratch = Scratch(self.sizes, model.contact_frame)
 
@@ -32,10 +38,26 @@ class StateCalls:
         status = start.start_at(self._model, self._scratch.table(), self.settings.time_step, v, x)
         return int(status), x
 
+    def _table(self, *needs: Callable[[Model], None]) -> Table:
+        """Table of the Model, with the kernels bound that a call needs."""
+        for bind in needs:
+            if bind not in self._bound:
+                bind(self.model)
+                self._bound.add(bind)
+        return self._model
+
+    def started(self, q: Vector, v: Vector) -> Vector:
+        """`start`; SimulationError when there is no such state."""
+        status, x = self.start(q, v)
+        if status != Status.SOLVED:
+            reason = Status(status)
+            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
+        return x
+
     def node_velocities(self, xs: Floats) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""
         out = np.zeros((len(xs), self.sizes.nv))
-        velocity.node_velocities(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        velocity.node_velocities(self._table(bind_nodes), self._scratch.table(), self.settings.time_step, xs, out)
         return out
 
     def bodies(self, xs: Floats) -> Floats:
@@ -91,7 +113,7 @@ class StateCalls:
     def energies(self, xs: Floats) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        energy.energies(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        energy.energies(self._table(bind_nodes), self._scratch.table(), self.settings.time_step, xs, out)
         return out
 
     def momenta(self, xs: Floats) -> Floats:

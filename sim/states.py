@@ -14,9 +14,7 @@ from sim.calls import Calls
 from sim.closure import Closure, LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
-from sim.results import SimulationError
 from sim.settings import Settings
-from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
@@ -92,20 +90,20 @@ class States:
         free of contacts: start(q, 0) on the ground has the velocity g h/2 that gravity alone would take away, a little
         hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as that of
         `neutral` and of `equilibrium`.
+
+        Closed loops: those of the state are closed, as by `close`, and its velocity is the part of v that they allow.
         """
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
         q0 = self._border.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
-        status, x = self._calls.start(q0, v0)
-        if status != Status.SOLVED:
-            reason = Status(status)
-            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
-        return x
+        closes = self._closes and self.order == 2
+        return Closure(self.mechanism, self._calls).start(q0, v0) if closes else self._calls.started(q0, v0)
 
     def velocity(self, x: ArrayLike) -> Floats:
         """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
 
-        They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node.
+        They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node, and of that the part
+        along closed loops, whose forces act before and after the node.
         """
         xs, lead = self._border.stacked("velocity", "x", x)
         return self._calls.node_velocities(xs).reshape(*lead, self.nv)

@@ -5,14 +5,41 @@ from __future__ import annotations
 from sim.contact_report import worst_contact
 from sim.dynamics import begin_step
 from sim.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
+from sim.loop_motion import is_farther, lead_again, meet_ahead, predict_loops
+from sim.loop_work import loops_gained
 from sim.loops import start_loops
 from sim.model import Guess, Late, Model, Options, Outcome, Vector, Work
+from solvers.jit import inlined
 from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
+_LOOP_STEP = int(Status.LOOP_STEP)
+_LEADS = 2  # times that directions of loops are found anew
+
+
+@inlined
+def solve_branch(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
+) -> Outcome:
+    """`solve` on the branch of the motion of closed loops (loop_motion.py, loop_lead.py).   inputs: (q, v, u)."""
+    q, v, u = inputs
+    if predict_loops(model, work, options.h, q, v, guess.velocity):
+        guess = Guess(work.loop_velocity, guess.impulses)
+    r = solve(model, work, options, q, v, u, guess)
+    if r.status == _SOLVED and meet_ahead(model, work):
+        r = solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses))
+        if is_farther(model, work, r.status):
+            r = solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses))
+    for _ in range(_LEADS):
+        if r.status != _SOLVED or not lead_again(model, work, options.h, q):
+            break
+        r = solve(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses))
+    if r.status == _SOLVED and loops_gained(model, work, options, v):
+        return Outcome(_LOOP_STEP, r.iterations, r.residual, r.violation)
+    return r
 
 
 @late(Late.STEP, int(Status.NOT_FINITE))
@@ -32,7 +59,7 @@ def step(
     r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
     if begin_step(model, work, options.h, q, v, u):
         start_loops(model, work, guess.impulses)
-        r = solve(model, work, options, q, v, u, guess)
+        r = solve_branch(model, work, options, (q, v, u), guess)
     total = 0.0
     for k in range(nq):
         out[k] = work.theta3[k]

@@ -16,6 +16,7 @@ class Status(IntEnum):
     NOT_FINITE = 3
     SINGULAR = 4
     ANGULAR_STEP = 5
+    LOOP_STEP = 6
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
@@ -31,6 +32,7 @@ MESSAGES: dict[Status, str] = {
     Status.NOT_FINITE: "A number that is not finite appeared.",
     Status.SINGULAR: "A matrix was singular, or not positive definite where it has to be.",
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
+    Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",

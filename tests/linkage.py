@@ -1,9 +1,12 @@
-"""A planar four-bar on the ground whose loop may be cut at any of its joints."""
+"""Planar four-bars on the ground: one whose loop may be cut at any of its joints, and one of any lengths."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+import dojo_opt as dojo
 from sim.mechanism import Mechanism
 from sim.parts import Body, Input, Joint
 from sim.shapes import Box
@@ -32,3 +35,21 @@ def fourbar(cut: str, inputs: tuple[str, ...] = (), **action: Any) -> Mechanism:
     bodies = [bar("crank", CRANK), bar("coupler", COUPLER), bar("rocker", ROCKER)]
     known = {name: q for name, q in neutral.items() if name != cut}
     return Mechanism(bodies, joints, inputs=[Input(name) for name in inputs], neutral=known)
+
+
+def plain_fourbar(
+    crank: float = 0.5, coupler: float = 1.0, rocker: float = 0.8, ground: float = 1.0, kind: str = "revolute"
+) -> Mechanism:
+    """Crank and rocker on the ground, the coupler between them."""
+    bodies = [bar("crank", crank), bar("coupler", coupler), bar("rocker", rocker)]
+    joints = [
+        Joint("revolute", None, "crank", child_point=(-crank / 2, 0, 0), axis=Y),
+        Joint("revolute", "crank", "coupler", parent_point=(crank / 2, 0, 0), child_point=(-coupler / 2, 0, 0), axis=Y),
+        Joint("revolute", None, "rocker", parent_point=(ground, 0, 0), child_point=(-rocker / 2, 0, 0), axis=Y),
+        Joint(kind, "coupler", "rocker", "pin", (coupler / 2, 0, 0), (rocker / 2, 0, 0), axis=Y, close=True),
+    ]
+    return Mechanism(bodies, joints, neutral={"crank": -1.0, "coupler": 0.6, "rocker": -1.2}, name="fourbar")
+
+
+def worst_gap(sim: dojo.Simulator, x: np.ndarray) -> float:
+    return max(float(np.abs(gap).max()) for gap in sim.loop_gaps(x).values())

@@ -4,32 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from linkage import plain_fourbar as fourbar
+from linkage import worst_gap
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
-from sim.shapes import Box
-
-Y = (0.0, 1.0, 0.0)
-
-
-def bar(name: str, length: float) -> Body:
-    return Body(name, 2.0 * length, shape=Box(x=length, y=0.05, z=0.05))
-
-
-def fourbar(
-    crank: float = 0.5, coupler: float = 1.0, rocker: float = 0.8, ground: float = 1.0, kind: str = "revolute"
-) -> Mechanism:
-    """Crank and rocker on the ground, the coupler between them."""
-    bodies = [bar("crank", crank), bar("coupler", coupler), bar("rocker", rocker)]
-    joints = [
-        Joint("revolute", None, "crank", child_point=(-crank / 2, 0, 0), axis=Y),
-        Joint("revolute", "crank", "coupler", parent_point=(crank / 2, 0, 0), child_point=(-coupler / 2, 0, 0), axis=Y),
-        Joint("revolute", None, "rocker", parent_point=(ground, 0, 0), child_point=(-rocker / 2, 0, 0), axis=Y),
-        Joint(kind, "coupler", "rocker", "pin", (coupler / 2, 0, 0), (rocker / 2, 0, 0), axis=Y, close=True),
-    ]
-    return Mechanism(bodies, joints, neutral={"crank": -1.0, "coupler": 0.6, "rocker": -1.2}, name="fourbar")
 
 
 def ring(kind: str = "spherical") -> Mechanism:
@@ -44,10 +25,6 @@ def ring(kind: str = "spherical") -> Mechanism:
     at = np.array(corners[0])
     joints.append(Joint(kind, "b3", "b0", "last", at - centres[3], at - centres[0], axis=(0.6, 0.0, 0.8), close=True))
     return Mechanism(bodies, joints, gravity=(0, 0, 0), name="ring")
-
-
-def worst_gap(sim: dojo.Simulator, x: np.ndarray) -> float:
-    return max(float(np.abs(gap).max()) for gap in sim.loop_gaps(x).values())
 
 
 def moving(sim: dojo.Simulator, speed: float = 1.0) -> np.ndarray:
