@@ -127,9 +127,8 @@ def earlier_velocity(work: Work, h: float, i: int, x: float, y: float, z: float)
     w = work.turn_in[i]
     q = 2.0 / h
     vx, vy, vz = cross(q * w[1], q * w[2], q * w[3], x, y, z)
-    a = work.pos1[i]
-    b = work.pos2[i]
-    return (b[0] - a[0]) / h + vx, (b[1] - a[1]) / h + vy, (b[2] - a[2]) / h + vz
+    m = work.move_in[i]
+    return m[0] / h + vx, m[1] / h + vy, m[2] / h + vz
 
 
 @kernel
