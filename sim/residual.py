@@ -6,7 +6,7 @@ from sim.elimination import project, subtree_sums
 from sim.gears import apply_gears
 from sim.joints import joint_impulses
 from sim.model import Model, Vector, Work
-from sim.rotation import cross, rotate
+from sim.rotation import cross
 from solvers.jit import kernel
 
 
@@ -45,35 +45,42 @@ def norm(x: Vector) -> float:
 
 @kernel
 def absorb_residual(model: Model, work: Work) -> None:
-    """momentum_out of the bodies on the world, less the residual r of their joints: so a motion hands on the momentum
-    that its steps should have left, and the tolerance of the solve does not add up.
+    """momentum_out less the residual r of the joints: a motion hands on the momenta that its steps should have left, so
+    that the tolerance of the solve does not add up.
 
-        (f, m) = (sum r_k t_k, sum r_k a_k) at the joint point;   (f, m + R2 p_child x f) at the centre of mass
+    Each joint takes (f, m) = (sum r_k t_k, sum r_k a_k) at its point o from its body, and gives it to the parent: about
+    the centre of mass x, (f, m + (o - x) x f). The total changes by the residual of joints on the world alone.
     """
+    P = work.momentum_out
     for i in range(model.body_parent.shape[0]):
-        if model.body_parent[i] >= 0 or model.joint_nrot[i] == 2:  # the axes of a swing are not orthogonal
+        if model.joint_nrot[i] == 2:  # the axes of a swing are not orthogonal
             continue
-        f0, f1, f2, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        p = model.body_parent[i]
         first = model.body_vadr[i] + model.joint_ntrans[i]
-        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            s = work.S2[d]
+        for d in range(first, model.body_vadr[i + 1]):
+            for k in range(3):
+                m = work.residual[d] * work.S2[d, 3 + k]
+                P[i, 3 + k] -= m
+                if p >= 0:
+                    P[p, 3 + k] += m
+        for d in range(model.body_vadr[i], first):
             r = work.residual[d]
-            if d < first:
-                f0, f1, f2 = f0 + r * s[0], f1 + r * s[1], f2 + r * s[2]
-            else:
-                m0, m1, m2 = m0 + r * s[3], m1 + r * s[4], m2 + r * s[5]
-        c = model.joint_child_point[i]
-        x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
-        x, y, z = cross(x, y, z, f0, f1, f2)
-        p = work.momentum_out[i]
-        p[0], p[1], p[2], p[3], p[4], p[5] = (
-            p[0] - f0,
-            p[1] - f1,
-            p[2] - f2,
-            p[3] - m0 - x,
-            p[4] - m1 - y,
-            p[5] - m2 - z,
-        )
+            s = work.S2[d]
+            a = work.arm[i]
+            x, y, z = cross(a[3], a[4], a[5], r * s[0], r * s[1], r * s[2])
+            _add(P[i], -r, s, -x, -y, -z)
+            if p >= 0:
+                o, c = work.pos2[i], work.pos2[p]
+                x, y, z = a[3] + o[0] - c[0], a[4] + o[1] - c[1], a[5] + o[2] - c[2]
+                x, y, z = cross(x, y, z, r * s[0], r * s[1], r * s[2])
+                _add(P[p], r, s, x, y, z)
+
+
+@kernel
+def _add(P: Vector, r: float, s: Vector, x: float, y: float, z: float) -> None:
+    """P += (r s, (x, y, z))"""
+    P[0], P[1], P[2] = P[0] + r * s[0], P[1] + r * s[1], P[2] + r * s[2]
+    P[3], P[4], P[5] = P[3] + x, P[4] + y, P[5] + z
 
 
 @kernel
