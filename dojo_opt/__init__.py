@@ -11,6 +11,7 @@ loads a plotting library.
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -26,6 +27,7 @@ __all__ = [
     "Contact",
     "Cylinder",
     "Disturbances",
+    "Environment",
     "Gear",
     "HalfSpace",
     "Input",
@@ -61,6 +63,7 @@ __all__ = [
     "equilibrium",
     "gaits",
     "ilqr",
+    "kernel",
     "load_mjcf",
     "load_urdf",
     "models",
@@ -83,6 +86,7 @@ _HOME: dict[str, str | None] = {
     "Contact": "sim.parts",
     "Cylinder": "sim.shapes",
     "Disturbances": "dojo_opt.plant.disturbances",
+    "Environment": "dojo_opt.environment",
     "Gear": "sim.gear",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
@@ -118,6 +122,7 @@ _HOME: dict[str, str | None] = {
     "equilibrium": "dojo_opt.rest",
     "gaits": None,
     "ilqr": "dojo_opt.planner",
+    "kernel": "dojo_opt.residual",
     "load_mjcf": "sim.mjcf",
     "load_urdf": "sim.urdf",
     "models": None,
@@ -132,6 +137,7 @@ _HOME: dict[str, str | None] = {
 
 if TYPE_CHECKING:
     from dojo_opt import constraint, cost, gaits, models, plots, problems, report, tasks, viewer
+    from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
     from dojo_opt.plan import Plan
@@ -142,6 +148,7 @@ if TYPE_CHECKING:
     from dojo_opt.plant.plant import Plant
     from dojo_opt.plant.study import monte_carlo
     from dojo_opt.problem import Problem
+    from dojo_opt.residual import kernel
     from dojo_opt.rest import equilibrium
     from dojo_opt.tracking import tracking_gains
     from sim.collisions import Collision
@@ -190,7 +197,9 @@ except PackageNotFoundError:  # run from a source tree that is not installed
 def __getattr__(name: str) -> Any:
     """Import a public name on first use (PEP 562)."""
     if name not in _HOME:
-        raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}; it has {', '.join(__all__)}")
+        close = get_close_matches(name, __all__, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"it has {', '.join(__all__)}"
+        raise AttributeError(f"module 'dojo_opt' has no attribute {name!r}; {hint}")
     home = _HOME[name]
     value = import_module(f"dojo_opt.{name}") if home is None else getattr(import_module(home), name)
     globals()[name] = value

@@ -21,6 +21,8 @@ import numpy as np
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import milliseconds
 from dojo_opt.report import STUDIES, run_report, write_page
+from dojo_opt.show import add_show, show
+from sim.checks import nearest
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
@@ -36,9 +38,13 @@ def _parser() -> argparse.ArgumentParser:
     what = "Plan a reference problem, or run a closed-loop task."
     run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=what)
     run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS]))
-    run.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem or task")
-    run.add_argument("--perturb", action="append", default=[], metavar="KEY=VALUE", help="of the plant: payload=1.0")
-    run.add_argument("--seconds", type=float, default=4.0, metavar="S", help="length of a closed-loop task")
+    run.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem or task: target=(1,0)"
+    )
+    run.add_argument(
+        "--perturb", action="append", default=[], metavar="KEY=VALUE", help="of the plant of a task: payload=1.0"
+    )
+    run.add_argument("--seconds", type=float, metavar="S", help="length of a closed-loop task, 4 by default")
     run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
@@ -57,6 +63,8 @@ def _parser() -> argparse.ArgumentParser:
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
     models.add_argument("--json", action="store_true", help="print JSON")
     models.add_argument("--thumbnails", type=Path, metavar="DIR", help="also write a picture of each, DIR/NAME.png")
+
+    add_show(commands)
 
     warmup = commands.add_parser("warmup", help="compile ahead of time", description="Compile and cache every kernel.")
     warmup.add_argument("--json", action="store_true", help="print JSON")
@@ -86,7 +94,10 @@ def _run(args: argparse.Namespace) -> int:
         return _run_loop(args)
     name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
     if name not in PROBLEMS:
-        raise ValueError(f"run: no problem or task {args.name!r}; there are {', '.join([*PROBLEMS, *LOOPS])}")
+        there = [*PROBLEMS, *LOOPS]
+        raise ValueError(f"no problem or task {args.name!r}; there are {', '.join(there)}{nearest(args.name, there)}")
+    if args.perturb or args.seconds is not None:
+        raise ValueError(f"--perturb and --seconds are for closed loops ({', '.join(LOOPS)}), and {name} is a plan")
     problem = getattr(dojo.problems, name)(**_arguments(args.set))
     start = time.perf_counter()
     plan = dojo.ilqr(problem, verbose=not args.json)
@@ -103,13 +114,15 @@ def _run(args: argparse.Namespace) -> int:
         numbers |= {"x": plan.x.tolist(), "u": plan.u.tolist()}
         print(json.dumps(numbers))
     else:
-        print(f"{plan.message}  cost {plan.fun:.4g}, violation {plan.violation:.1e}, {seconds:.2f} s")
+        for path in filter(None, (args.out, args.html)):
+            print(f"wrote {path}")
     return 0 if plan.success else 1
 
 
 def _run_loop(args: argparse.Namespace) -> int:
     mpc = getattr(dojo.tasks, args.name)(**_arguments(args.set))
-    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **_arguments(args.perturb)), args.seconds)
+    plant = dojo.tasks.plant(mpc, **_arguments(args.perturb))
+    loop = dojo.closed_loop(mpc, plant, 4.0 if args.seconds is None else args.seconds)
     if args.out:
         dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)
     if args.html:
@@ -186,6 +199,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
     "report": _report,
     "models": _models,
+    "show": show,
     "warmup": _warmup,
 }
 
@@ -195,6 +209,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(arguments)
     try:
         return _COMMANDS[args.command](args)
-    except (ValueError, TypeError, OSError) as error:
+    except (ValueError, TypeError, OSError, ImportError) as error:
         print(f"dojo-opt {args.command}: {error}", file=sys.stderr)
         return 2

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.residual import ResidualKernels
+from dojo_opt.names import chosen_components, chosen_inputs, component_name
+from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
 
 Integers = NDArray[np.int64]
@@ -18,21 +19,11 @@ Vector = NDArray[np.float64]
 __all__ = ["ControlBounds", "Goal", "ResidualConstraint", "StateBounds"]
 
 
-def chosen_components(call: str, components: Any, count: int) -> Integers:
-    """Component numbers as an array; None means all."""
-    if components is None:
-        return np.arange(count)
-    chosen = np.atleast_1d(np.asarray(components, dtype=np.int64)).copy()
-    if chosen.size == 0 or np.any(chosen < 0) or np.any(chosen >= count):
-        raise ValueError(f"{call}: expected components in [0, {count}), got {chosen.tolist()}")
-    return chosen
-
-
 @dataclass(frozen=True)
 class Goal:
     """(x_t (-) target)_i = 0 for the chosen tangent components i (default all) at `knots` (default the last).
 
-    target: (nx,), or one row per knot.
+    target: (nx,), or one row per knot. components: numbers, or names as in `Mechanism.components`: "base", "v knee".
     """
 
     target: ArrayLike
@@ -43,7 +34,7 @@ class Goal:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
         target = table("Goal(target=...)", self.target, knots.size, sim.nx)
         mask = np.zeros((knots.size, sim.ndx))
-        mask[:, chosen_components("Goal(components=...)", self.components, sim.ndx)] = 1.0
+        mask[:, chosen_components("Goal(components=...)", self.components, sim)] = 1.0
         return StateTerm("Goal", knots, mask, target, layout)
 
 
@@ -64,7 +55,8 @@ def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: In
 class StateBounds:
     """lower <= component <= upper of chosen scalar tangent components (default all) at `knots` (default 1 to T).
 
-    lower, upper: scalars or one per component, infinite where free. A rotation by quaternion has no such bounds.
+    lower, upper: scalars or one per component, infinite where free. components: numbers, or names as in
+    `Mechanism.components`: "base z", "v knee". A rotation by quaternion has no such bounds.
     """
 
     lower: ArrayLike
@@ -75,12 +67,13 @@ class StateBounds:
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
         knots = knots[knots > 0] if self.knots is None else knots
-        chosen = chosen_components("StateBounds(components=...)", self.components, sim.ndx)
+        chosen = chosen_components("StateBounds(components=...)", self.components, sim)
         reference, columns, sign = _bounds("StateBounds", self.lower, self.upper, knots.size, chosen)
         if np.any(layout[columns] < 0):
             bad = int(columns[layout[columns] < 0][0])
+            name = component_name(sim, bad)
             raise ValueError(
-                f"StateBounds(components=...): component {bad} belongs to a quaternion, which has no bounds"
+                f"StateBounds(components=...): component {bad} ({name}) belongs to a quaternion: no bounds"
             )
         pick = Pick(True, layout[columns], columns, sign)
         return PickTerm("StateBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
@@ -90,6 +83,7 @@ class StateBounds:
 class ControlBounds:
     """lower <= u_i <= upper for chosen controls (default all) at `knots` (default all), as a soft-to-hard constraint.
 
+    components: numbers or names of inputs.
     `Problem(control_limits=...)` is exact at every iteration and usually better; use this to bound single knots.
     """
 
@@ -101,7 +95,7 @@ class ControlBounds:
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
         knots = knot_list("ControlBounds(knots=...)", self.knots, horizon, last=False)
-        chosen = chosen_components("ControlBounds(components=...)", self.components, sim.nu)
+        chosen = chosen_inputs("ControlBounds(components=...)", self.components, sim)
         reference, columns, sign = _bounds("ControlBounds", self.lower, self.upper, knots.size, chosen)
         pick = Pick(False, columns, sim.ndx + columns, sign)
         return PickTerm("ControlBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
@@ -118,6 +112,7 @@ class ResidualConstraint:
     knots: Any = None
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        check_residual("ResidualConstraint", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualConstraint(knots=...)", self.knots, horizon, last=True)
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
         weight = np.ones((knots.size, self.dimension))

@@ -5,14 +5,15 @@ Weights multiply squares without a factor 1/2: a cost is `scale * sum w r^2`. Us
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.residual import ResidualKernels
+from dojo_opt.names import input_weight, state_weight
+from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
 
 Integers = NDArray[np.int64]
@@ -39,18 +40,21 @@ def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale:
 class Tracking:
     """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, tangent to the manifold: rotation vectors.
 
-    reference: (nx,), or one row per knot; weight: scalar, (ndx,), or one row per knot. knots: default all T + 1.
+    reference: (nx,), or one row per knot; weight: scalar, (ndx,), one row per knot, or a table by names as in
+    `Mechanism.components`, {"base": 10.0, "v": 0.1}, zero for what it does not name and later names before earlier
+    ones. knots: default all T + 1.
     """
 
     reference: ArrayLike
-    weight: ArrayLike
+    weight: ArrayLike | Mapping[str, ArrayLike]
     knots: Any = None
     scale: float = 1.0
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
         reference = table("Tracking(reference=...)", self.reference, knots.size, sim.nx)
-        weight = _checked_weight("Tracking(weight=...)", self.weight, knots.size, sim.ndx, self.scale)
+        named = state_weight("Tracking(weight=...)", self.weight, sim)
+        weight = _checked_weight("Tracking(weight=...)", named, knots.size, sim.ndx, self.scale)
         return StateTerm("Tracking", knots, weight, reference, layout)
 
 
@@ -58,10 +62,10 @@ class Tracking:
 class Effort:
     """scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
 
-    weight: scalar, (nu,) or (T, nu), per N^2 or (N m)^2; reference: likewise.
+    weight: scalar, (nu,), (T, nu), or a table by names of inputs, per N^2 or (N m)^2; reference: (nu,) or (T, nu).
     """
 
-    weight: ArrayLike
+    weight: ArrayLike | Mapping[str, float]
     reference: ArrayLike = 0.0
     scale: float = 1.0
 
@@ -69,17 +73,17 @@ class Effort:
         del layout
         knots = np.arange(horizon)
         reference = table("Effort(reference=...)", self.reference, horizon, sim.nu)
-        weight = _checked_weight("Effort(weight=...)", self.weight, horizon, sim.nu, self.scale)
+        named = input_weight("Effort(weight=...)", self.weight, sim)
+        weight = _checked_weight("Effort(weight=...)", named, horizon, sim.nu, self.scale)
         pick = Pick(False, np.arange(sim.nu), sim.ndx + np.arange(sim.nu), np.ones(sim.nu))
         return PickTerm("Effort", knots, weight, reference, pick)
 
 
 @dataclass(frozen=True)
 class ResidualCost:
-    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a compiled function of the user.
+    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a function of the user, which is compiled (see `dojo.kernel`):
 
-        @dojo.kernel
-        def residual(x, u, out): ...                          # out: (dimension,)
+        def residual(x, u, out): ...                          # out: (dimension,), all of it is to be written
 
     jacobian(x, u, out) with out (dimension, ndx + nu) is optional; without it the derivative is a central difference on
     the manifold. Either way the loop over the knots is compiled once per process (about a second), because Numba cannot
@@ -94,6 +98,7 @@ class ResidualCost:
     scale: float = 1.0
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualCost(knots=...)", self.knots, horizon, last=True)
         weight = _checked_weight("ResidualCost(weight=...)", self.weight, knots.size, self.dimension, self.scale)
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)

@@ -42,7 +42,9 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     """
     sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
     if sim is None:
-        raise ValueError(f"motion(simulator=...): this {type(result).__name__} does not know its simulator; give it")
+        if not hasattr(result, "x") or not hasattr(result, "u"):
+            raise TypeError(f"expected a Trajectory, a Plan or a ClosedLoop to show, got a {type(result).__name__}")
+        raise ValueError(f"this {type(result).__name__} does not know its simulator; give simulator=...")
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
     substeps = getattr(result, "substeps", 1)
     known = getattr(result, "contacts", None)  # a plan has none

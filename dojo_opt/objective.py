@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.names import component_name
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
 from dojo_opt.term import Term
@@ -22,6 +23,7 @@ class Objective:
 
     def __init__(self, problem: Problem, options: Options) -> None:
         size = problem.sim.ndx + problem.sim.nu
+        self._sim = problem.sim
         self.costs = problem.costs
         self.constraints = problem.constraints
         self.g = np.zeros((problem.horizon + 1, size))
@@ -83,6 +85,18 @@ class Objective:
             term.update(xs, us)
             worst = max(worst, float(term.violation().max(initial=0.0)))
         return worst
+
+    def worst(self, xs: Matrix, us: Matrix) -> tuple[float, str]:
+        """Largest violation of a constraint, and which entry of which it is."""
+        found = 0.0, ""
+        for term in self.constraints:
+            term.update(xs, us)
+            size = term.violation()
+            if size.size and size.max() > found[0]:
+                row, entry = divmod(int(size.argmax()), size.shape[1])
+                what = f"entry {entry}" if term.columns is None else component_name(self._sim, term.columns[entry])
+                found = float(size.max()), f"{term.name} of {what} at knot {term.knots[row]}"
+        return found
 
     def mismatch(self, xs: Matrix, us: Matrix) -> float:
         """Largest violation of a constraint, or of the complementarity of an inequality and its multiplier."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.constraint import chosen_components
+from dojo_opt.names import chosen_components
 from dojo_opt.penalty import penalty_derivatives
 from dojo_opt.term import StateTerm, Term, table
 from sim.rotation import inverse_right_jacobian
@@ -34,7 +34,7 @@ class Periodic:
         if np.any(shift[layout < 0]):
             raise ValueError("Periodic(shift=...): expected zeros for rotations by quaternion")
         mask = np.zeros((1, sim.ndx))
-        mask[:, chosen_components("Periodic(components=...)", self.components, sim.ndx)] = 1.0
+        mask[:, chosen_components("Periodic(components=...)", self.components, sim)] = 1.0
         return PeriodicTerm(sim, horizon, mask, shift, layout)
 
 

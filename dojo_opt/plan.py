@@ -36,7 +36,7 @@ def table_header() -> str:
     return _HEADER
 
 
-@dataclass
+@dataclass(repr=False)
 class Plan:
     """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
 
@@ -64,6 +64,11 @@ class Plan:
     multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
     penalties: list[Matrix] = field(default_factory=list)
     problem: Any = None  # the Problem; not saved
+
+    def __repr__(self) -> str:
+        return (
+            f"Plan({self.status.name}, {self.nit} iterations, cost {self.fun:.6g}, x {self.x.shape}, u {self.u.shape})"
+        )
 
     @property
     def time(self) -> Matrix:

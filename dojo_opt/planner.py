@@ -24,6 +24,7 @@ from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
 from dojo_opt.shooting import Shooting
+from sim import checks
 from solvers.status import MESSAGES, Status
 
 __all__ = ["Solver", "ilqr"]
@@ -47,6 +48,7 @@ def ilqr(
     controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the
     same problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
     """
+    checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
     options = Options(**settings) if options is None else replace(options, **settings)
     return Solver(problem, options).solve(controls, states, warm_start)
 
@@ -55,6 +57,8 @@ class Solver:
     """iLQR with its buffers, for problems that are solved again and again from changing starts."""
 
     def __init__(self, problem: Problem, options: Options | None = None) -> None:
+        if not isinstance(problem, Problem):
+            raise TypeError(f"ilqr(problem): expected a Problem, got {problem!r}")
         self.problem = problem
         self.options = Options() if options is None else options
         self.horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
@@ -164,7 +168,9 @@ class Solver:
         now, stride = continuation.now, self.descent.stride
         if stride is not None and status == Status.SOLVED and not self.descent.repeat(now):
             detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
-        violation = self.objective.violation(now.x, now.u)
+        violation, culprit = self.objective.worst(now.x, now.u)
+        if status != Status.SOLVED and violation > options.violation:
+            detail += f" Violated most: {culprit}, by {violation:.2g}."
         plan = Plan(
             success=status == Status.SOLVED,
             status=status,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.cost import Spec
 from dojo_opt.manifold import tangent_layout
+from dojo_opt.names import chosen_components
 from dojo_opt.term import table
 
 Vector = NDArray[np.float64]
@@ -23,6 +24,8 @@ def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector
     """Control limits as two (nu,) arrays, infinite where free."""
     if limits is None:
         return None
+    if not hasattr(limits, "__len__") or len(limits) != 2:
+        raise ValueError(f"Problem(control_limits=...): expected (lower, upper), got {limits!r}")
     lo, hi = (np.asarray(b, dtype=float) for b in limits)
     for side, bound in (("lower", lo), ("upper", hi)):
         if bound.shape not in ((), (nu,)) or np.any(np.isnan(bound)):
@@ -37,14 +40,16 @@ def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector
     return lo, hi
 
 
-def _components(call: str, chosen: Any, count: int) -> Any:
+def _components(call: str, chosen: Any, sim: Any) -> Any:
     """Component numbers as an array; None for none, True for all."""
     if chosen is None or chosen is False:
         return None
-    numbers = np.arange(count) if chosen is True else np.unique(np.asarray(chosen, dtype=np.int64))
-    if numbers.ndim != 1 or numbers.size == 0 or numbers[0] < 0 or numbers[-1] >= count:
-        raise ValueError(f"{call}: expected components in [0, {count}), got {numbers.tolist()}")
-    return numbers
+    return np.unique(chosen_components(call, None if chosen is True else chosen, sim))
+
+
+def _terms(given: Any) -> tuple[Spec, ...]:
+    """One term, or several, as a tuple."""
+    return tuple(given) if isinstance(given, Iterable) else (given,)
 
 
 class Problem:
@@ -54,8 +59,8 @@ class Problem:
     guesses that `ilqr` starts from: with states, the trajectory need not be consistent and its gaps are closed on the
     way; without, it is the rollout of the controls (zero by default).
 
-    free_start: tangent components of the start that the planner may change, or True for all; `start` is then a guess.
-    Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
+    free_start: tangent components of the start that the planner may change, by number or name, or True for all;
+    `start` is then a guess. Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
     """
 
     def __init__(
@@ -64,8 +69,8 @@ class Problem:
         start: ArrayLike,
         horizon: int,
         *,
-        cost: Sequence[Spec] = (),
-        constraints: Sequence[Spec] = (),
+        cost: Spec | Sequence[Spec] = (),
+        constraints: Spec | Sequence[Spec] = (),
         control_limits: tuple[ArrayLike, ArrayLike] | None = None,
         substeps: int = 1,
         controls0: ArrayLike | None = None,
@@ -84,12 +89,13 @@ class Problem:
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
         self.start: Vector = table("Problem(start=...)", start, 1, sim.nx)[0]
         self.layout = tangent_layout(sim, self.start)
-        self.free_start = _components("Problem(free_start=...)", free_start, sim.ndx)
-        self.specs = (tuple(cost), tuple(constraints))
+        self.free_start = _components("Problem(free_start=...)", free_start, sim)
+        self.specs = (_terms(cost), _terms(constraints))
         for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
             for i, spec in enumerate(specs):
                 if not hasattr(spec, "bind"):
-                    raise TypeError(f"Problem({argument}=...): entry {i} is a {type(spec).__name__}, not a term")
+                    what = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
+                    raise TypeError(f"Problem({argument}=...): entry {i} is {what}")
         self.bind()
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.locomotion import bound, follow, jump, leap, pace, trot, turn, walk
 from dojo_opt.problem import Problem
+from sim.checks import nearest
 from sim.simulator import Simulator
 
 __all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
@@ -96,3 +97,12 @@ def swingup(name: str = "cartpole") -> Problem:
         control_limits=limits,
         controls0=np.broadcast_to(ramp, (horizon, sim.nu)).copy(),
     )
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A name that is not there, with the ones that are."""
+        raise AttributeError(
+            f"dojo_opt.problems has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}"
+        )

@@ -123,6 +123,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(
             f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
-            f"weight: {left[k]:.3g} N or N m is left at degree of freedom {k}"
+            f"weight: {left[k]:.3g} N or N m is left at {sim.mechanism.dof_names[k]!r}"
         )
     return state, u

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ from dojo_opt.mpc.moving import Sampled
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim import checks
+from sim.checks import nearest
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -128,3 +129,10 @@ def quadruped_mpc(
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
     """The plant that belongs to an MPC: its own mechanism with a finer step and harder contact, and a perturbation."""
     return Plant(mpc.sim.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A name that is not there, with the ones that are."""
+        raise AttributeError(f"dojo_opt.tasks has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")

@@ -24,13 +24,24 @@ __all__ = ["save_html"]
 
 FRAMES = 60  # per second of the animation
 _THICK = 0.002  # of a drawn plane [m]
+_GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
+
+_SKY, _HORIZON, _FLOOR, _LINE = (1.0, 1.0, 1.0), (0.84, 0.88, 0.93), 0xECEBE7, 0xB9B7B1
 
 _PAGE = """<!DOCTYPE html>
 <html>
 <head><meta charset="utf-8"><title>{title}</title>
-<style>body {{margin: 0}} #meshcat-pane {{width: 100vw; height: 100vh; overflow: hidden}}</style></head>
+<style>
+body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
+#meshcat-pane {{width: 100vw; height: 100vh; overflow: hidden}}
+#bar {{position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: 12px; align-items: center;
+      padding: 8px 16px; background: rgba(255, 255, 255, 0.8)}}
+#bar input {{flex: 1}} #bar button {{width: 64px}} #clock {{width: 110px; font-variant-numeric: tabular-nums}}
+</style></head>
 <body><div id="meshcat-pane"></div>
+<div id="bar"><b>{title}</b><button id="play">pause</button><input id="time" type="range" min="0" max="{duration}"
+step="0.001" value="0"><span id="clock"></span><span>drag to turn, scroll to zoom</span></div>
 <script>{viewer}</script>
 <script>
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
@@ -39,7 +50,25 @@ for (const text of [{commands}])
 viewer.camera.position.set({eye});
 viewer.controls.target.set({target});
 viewer.controls.update();
+viewer.set_property(["Background"], "top_color", [{sky}]);
+viewer.set_property(["Background"], "bottom_color", [{horizon}]);
+viewer.show_background();
+for (const part of ["Axes", "Grid"]) viewer.set_property([part], "visible", false);
 viewer.set_dirty();
+const animator = viewer.animator, slider = document.getElementById("time"), button = document.getElementById("play");
+const now = () => animator.actions.length ? animator.actions[0].time : 0;
+const tell = () => {{document.getElementById("clock").textContent = now().toFixed(2) + " of {duration} s"}};
+button.onclick = () => {{
+    animator.playing ? animator.pause() : animator.play();
+    button.textContent = animator.playing ? "pause" : "play";
+}};
+slider.oninput = () => {{
+    animator.pause();
+    button.textContent = "play";
+    animator.seek(Number(slider.value));
+    tell();
+}};
+setInterval(() => {{ if (animator.playing) {{slider.value = now(); tell();}} }}, 50);
 </script></body></html>
 """
 
@@ -67,11 +96,13 @@ def _page(m: Motion, commands: list[Any]) -> str:
     eye = target + max(1.0, float(np.linalg.norm(high - low))) * np.array([0.5, -1.0, 0.4])
     # the axes of MeshCat's camera: y is up
     places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", target))}
-    return _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded, **places)
+    places |= {name: ", ".join(map(str, rgb)) for name, rgb in (("sky", _SKY), ("horizon", _HORIZON))}
+    duration = f"{m.time[-1]:.3g}"
+    return _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded, duration=duration, **places)
 
 
 def _ground(m: Motion) -> list[Any]:
-    """Commands that draw all ground that contacts touch; level ground at height zero is MeshCat's grid."""
+    """Commands that draw all ground that contacts touch; level ground at height zero has lines."""
     from meshcat import geometry
     from meshcat.commands import SetObject, SetTransform
     from meshcat.path import Path as Node
@@ -86,6 +117,7 @@ def _ground(m: Motion) -> list[Any]:
         commands.append(SetObject(surface, earth, Node(("meshcat", "ground", f"terrain{k}"))))
     for k, (normal, height) in enumerate(planes):
         if (normal, height) == ((0.0, 0.0, 1.0), 0.0):
+            commands += _floor()
             continue
         n = np.asarray(normal)
         side = np.cross(n, [0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0])
@@ -96,6 +128,26 @@ def _ground(m: Motion) -> list[Any]:
         node = Node(("meshcat", "ground", str(k)))
         commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]
     return commands
+
+
+def _floor() -> list[Any]:
+    """Commands that draw level ground at height zero: a light plane with lines."""
+    from meshcat import geometry
+    from meshcat.commands import SetObject, SetTransform
+    from meshcat.path import Path as Node
+
+    plane, lines = Node(("meshcat", "floor", "plane")), Node(("meshcat", "floor", "lines"))
+    half, places = 0.5 * _GRID, np.arange(-0.5 * _GRID, 0.5 * _GRID + 0.5 * _SQUARE, _SQUARE)
+    # in pieces: software renderers leave out lines that begin behind the camera
+    starts = np.arange(-half, half, _PIECE)
+    ends = [(along, side) for along in places for start in starts for side in (start, start + _PIECE)]
+    points = np.array([(a, b, 0.0) for a, b in ends] + [(b, a, 0.0) for a, b in ends]).T
+    ink = geometry.LineBasicMaterial(color=_LINE)
+    return [
+        SetObject(geometry.Box([_GRID, _GRID, _THICK]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
+        SetTransform(_place((0.0, 0.0, -2.0 * _THICK)), plane),
+        SetObject(geometry.LineSegments(geometry.PointsGeometry(points.astype(np.float32)), ink), path=lines),
+    ]
 
 
 def _surface(m: Motion, terrain: Terrain, height: float) -> tuple[Any, Any]:

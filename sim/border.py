@@ -66,7 +66,7 @@ class Border:
         rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
-    def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
+    def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:
         """Inputs of the given shape."""
         return checks.array(f"Simulator.{method}({name})", u, shape)
 
@@ -143,8 +143,8 @@ def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
         raise ValueError(text) from None
 
 
-def whole(call: str, value: Any) -> int:
-    """`value` as a whole number of at least one."""
-    if not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{call}: expected a whole number >= 1, got {value!r}")
+def whole(call: str, value: Any, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    if not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
     return int(value)

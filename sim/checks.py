@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
@@ -29,10 +30,12 @@ def _floats(call: str, value: Any) -> Floats:
         raise ValueError(f"{call}: expected real numbers, got {value!r}") from None
 
 
-def array(call: str, value: Any, shape: tuple[int | None, ...]) -> Floats:
-    """`value` as a finite float64 array of the given shape (None: any length)."""
+def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
+    """`value` as a finite float64 array of the given shape; None or a letter stands for any length."""
     out = _floats(call, value)
-    fits = out.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, out.shape, strict=True))
+    fits = out.ndim == len(shape) and all(
+        not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True)
+    )
     if fits and isfinite(out.sum()):
         return out
     if not fits:
@@ -94,8 +97,23 @@ def one_of(call: str, value: Any, known: Iterable[str]) -> str:
     """`value` as one of the known words."""
     words = list(known)
     if not isinstance(value, str) or value not in words:
-        raise ValueError(f"{call}: {value!r} is not one of: {', '.join(words) or '(none)'}")
+        raise ValueError(f"{call}: {value!r} is not one of: {', '.join(words) or '(none)'}{nearest(value, words)}")
     return value
+
+
+def nearest(value: Any, known: Iterable[str]) -> str:
+    """The end of a message: "did you mean", when `value` looks like one of the known words; else nothing."""
+    words = list(known)
+    close = get_close_matches(value, words, n=1, cutoff=0.6) if isinstance(value, str) and len(words) > 1 else []
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def keywords(call: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Refuse keywords that a call does not have, with those that it has."""
+    words = list(known)
+    for word in given:
+        if word not in words:
+            raise TypeError(f"{call}: no keyword {word!r}; there are {', '.join(words)}{nearest(word, words)}")
 
 
 def distinct(call: str, names: Iterable[str]) -> None:

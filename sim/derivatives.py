@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.parameters import Parameter, Parameters, Plan, all_parameters
+from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
 from sim.sensitivity import adjoint_sweep, parameter_columns
@@ -92,7 +92,7 @@ class Derivatives(States):
         As `rollout` and `linearize_trajectory`, but every step is solved once. An unsolved step raises SimulationError.
         """
         call = "linearize_rollout"
-        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, (None, self.nu))
+        state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, ("T", self.nu))
         knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, self._border.kappa(call, kappa))
         if knot < len(inputs):
             raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
@@ -113,8 +113,8 @@ class Derivatives(States):
         if wrenches is not None:
             return pushed.linearize_trajectory(cast(Any, self), xs, us, wrenches, substeps, kappa)
         call = "Simulator.linearize_trajectory"
-        inputs = self._border.inputs("linearize_trajectory", "us", us, (None, self.nu))
-        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, (None, self.nx)))
+        inputs = self._border.inputs("linearize_trajectory", "us", us, ("T", self.nu))
+        states = self._border.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, ("T", self.nx)))
         if len(states) - len(inputs) not in (0, 1):
             raise ValueError(
                 f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
@@ -159,7 +159,7 @@ class Derivatives(States):
         call = "Simulator.vjp"
         self._check_order(call)
         xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
-        inputs = self._border.inputs("vjp", "trajectory", us, (None, self.nu))
+        inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
         asked = _names(f"{call}(wrt=...)", wrt)
@@ -230,6 +230,7 @@ def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if not isinstance(name, str):
             raise ValueError(f"{call}: expected names, got {name!r}")
+        checks.one_of(f"{call}: kind", name.split(":")[0].split("[")[0], (*_VARIABLES, *KINDS))
     checks.distinct(call, names)
     return names
 

@@ -9,8 +9,10 @@ import numpy as np
 from sim.build import mechanism_sizes
 from sim.left_out import reach
 from sim.mechanism import Mechanism
-from sim.parts import Joint
+from sim.parts import WORLD, Contact, Joint
+from sim.shapes import Solid
 from sim.tableau import tableau
+from sim.touch import Touch
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator
@@ -20,16 +22,16 @@ def describe(sim: Simulator) -> str:
     """A page of text."""
     mech = sim.mechanism
     lines = [
-        f"{mech.name}: {sim.nbody} bodies, {sim.nv} degrees of freedom, {_total_mass(mech):.4g} kg",
+        f"{mech.name}: {_count(sim.nbody, 'body', 'bodies')}, {_count(sim.nv, 'degree', 'degrees')} of freedom, "
+        f"{_total_mass(mech):.4g} kg",
         f"  state x ({sim.nx},) = q ({sim.nq},), v ({sim.nv},);  perturbation dx ({sim.ndx},);  input u ({sim.nu},)",
         f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
         "joints",
         *(_joint_line(mech, j) for j in mech.joints),
         *_loop_lines(sim),
-        "inputs",
-        *(f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)),
-        "contacts",
+        *_titled("inputs", [f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)]),
         *_contact_lines(mech),
+        *_collision_lines(mech),
         "a step",
         *(f"  {what:<18}{state}" for what, state in _parts(mech, sim.order)),
         *_far_lines(sim),
@@ -82,7 +84,37 @@ def _contact_lines(mech: Mechanism) -> list[str]:
         more = f", restitution {c.restitution:g}" if c.restitution else ""
         more += ", on terrain" if c.terrain is not None else ""
         lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}{more}")
-    return lines
+    return _titled("contacts", lines)
+
+
+def _collision_lines(mech: Mechanism) -> list[str]:
+    """Which shapes touch, and at how many points they may."""
+    lines = []
+    for c in mech.collisions:
+        points = sum(touch.name == c.name or touch.name.startswith(f"{c.name}_") for touch in mech.touches)
+        kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
+        more = f", restitution {c.restitution:g}" if c.restitution else ""
+        law = c.law if c.friction > 0 else "impact"
+        lines.append(
+            f"  {c.name:<18}{kinds[0]} on {c.a}, {kinds[1]} {'of the' if c.b == WORLD else 'on'} {c.b}: "
+            f"{_count(points, 'point', 'points')}, law {law}, friction {c.friction:g}{more}"
+        )
+    return _titled("collisions", lines)
+
+
+def _solid(mech: Mechanism, body: str, shape: Solid | None) -> str:
+    """What kind of shape a collision has on a body."""
+    own = shape if shape is not None or body == WORLD else mech.bodies[mech.body_names.index(body)].shape
+    return type(own).__name__.lower()
+
+
+def _titled(title: str, lines: list[str]) -> list[str]:
+    """The lines below their title, and no title without lines."""
+    return [title, *lines] if lines else []
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
 
 
 def _far_lines(sim: Simulator) -> list[str]:
@@ -99,18 +131,19 @@ def _far_lines(sim: Simulator) -> list[str]:
 def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     """What a step computes, and what it leaves out."""
     nlimit = mechanism_sizes(mech).nlimit
-    cones = sum(c.friction > 0 and c.law == "nonlinear" for c in mech.contacts)
-    pyramids = sum(c.friction > 0 and c.law == "linear" for c in mech.contacts)
-    impacts = len(mech.contacts) - cones - pyramids
+    points: list[Contact | Touch] = [*mech.contacts, *mech.touches]
+    cones = sum(c.friction > 0 and c.law == "nonlinear" for c in points)
+    pyramids = sum(c.friction > 0 and c.law == "linear" for c in points)
+    impacts = len(points) - cones - pyramids
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
-    solver = "interior point" if mech.contacts or nlimit else "Newton's method; interior point left out"
+    solver = "interior point" if points or nlimit else "Newton's method; interior point left out"
     if order > 2:
         solver = f"none: {len(tableau(order)[1])} evaluations of the equations of motion"
     counts = (
-        ("contacts", len(mech.contacts), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
-        ("joint limits", nlimit, f"{nlimit} bounds"),
-        ("springs", springs, f"{springs} joints"),
-        ("dampers", dampers, f"{dampers} joints"),
+        ("contacts", len(points), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
+        ("joint limits", nlimit, _count(nlimit, "bound", "bounds")),
+        ("springs", springs, _count(springs, "joint", "joints")),
+        ("dampers", dampers, _count(dampers, "joint", "joints")),
     )
     return [("solver", solver), *((what, text if n else "left out") for what, n, text in counts)]

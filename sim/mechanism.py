@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim.closing import carried
 from sim.collisions import Collision
+from sim.dofs import components, dof_names
 from sim.gear import Gear, check_gears
 from sim.naming import name_contacts, name_inputs
 from sim.parts import WORLD, Body, Contact, Input, Joint
@@ -120,6 +121,19 @@ class Mechanism:
     def input_names(self) -> tuple[str, ...]:
         """Names of the entries of u."""
         return tuple(i.name for i in self.inputs or ())
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, (nv,), in the order of v: "knee", "base x", "base rz"."""
+        return dof_names(self.joints)
+
+    def components(self, *names: str) -> NDArray[np.int64]:
+        """Numbers in a perturbation dx = [dq; dv] of joints and degrees of freedom.
+
+        "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their velocities, "q" and
+        "v" all coordinates and all velocities.
+        """
+        return components("Mechanism.components(...)", self.joints, names)
 
     def q_slice(self, joint: str) -> slice:
         """Where the coordinates of a joint are in q."""

@@ -94,7 +94,7 @@ def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, frame: str) -> 
     for k, (state, control) in enumerate(zip(states, us, strict=True)):
         knot, _, reports, _ = sim._calls.roll(state, control[None])
         if knot == 0:
-            raise sim._error(call, reports[0])
+            raise sim._error(call, reports[0], state)
         work, h = sim._calls.last(), sim.time_step
         rows = [_tree_joint(joint, i, sim.model, work, h, frame) for i, joint in enumerate(sim.mechanism.joints)]
         rows += [_loop_joint(sim.mechanism, loop, m, sim.model, work, h, frame) for m, loop in loops]

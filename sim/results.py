@@ -77,7 +77,7 @@ class StepResult:
         return MESSAGES[self.status]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows."""
 
@@ -91,6 +91,11 @@ class Trajectory:
     iterations: Integers  # (T,)
     contacts: Contacts
     message: str
+
+    def __repr__(self) -> str:
+        sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
+        steps = f"{self.knot} steps of {sim.time_step:g} s"
+        return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
 
     @property
     def success(self) -> bool:
@@ -151,3 +156,9 @@ def error_of(
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)
+
+
+def fastest(mech: Mechanism, z: Floats) -> str:
+    """The body that turns fastest in a maximal state (nbody, 13), as a sentence; for short steps, else turns wrap."""
+    spin = np.linalg.norm(z[:, 10:], axis=1)
+    return f"The fastest is {mech.body_names[int(spin.argmax())]!r}, with {spin.max():.3g} rad/s before the step."

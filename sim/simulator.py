@@ -16,8 +16,9 @@ from sim.describe import describe
 from sim.horizon import Horizon
 from sim.left_out import left_out
 from sim.mechanism import Mechanism
+from sim.policies import Feedback, roll
 from sim.reactions import Reactions, reactions
-from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of
+from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of, fastest
 from sim.scene import with_contacts
 from sim.settings import Settings
 from sim.wrenches import Wrenches
@@ -117,7 +118,7 @@ class Simulator(Derivatives):
         knot, xs, reports, contacts = self._calls.roll(state, us[None])
         status, iterations, residual, violation = reports[0, :4]
         if knot == 0 and throw:
-            raise self._error("Simulator.step", reports[0])
+            raise self._error("Simulator.step", reports[0], state)
         out = xs[knot] if knot else state
         return StepResult(
             out,
@@ -129,21 +130,31 @@ class Simulator(Derivatives):
         )
 
     def rollout(
-        self, x: ArrayLike, us: ArrayLike, *, throw: bool = False, wrenches: Wrenches | None = None
+        self,
+        x: ArrayLike,
+        us: ArrayLike | Feedback,
+        *,
+        steps: int | None = None,
+        throw: bool = False,
+        wrenches: Wrenches | None = None,
     ) -> Trajectory:
         """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so.
 
+        us may be a function instead, u = us(time, x), asked before each of so many `steps`.
         wrenches: external ones, (T, nbody, 6), or {body: (6,) or (T, 6)}; a force at the centre of mass [N], then a
         torque [N m], both in world axes and constant over a step.
         """
         if wrenches is not None:
-            return pushed.rollout(self, x, us, wrenches, throw)
+            return pushed.rollout(self, x, us, wrenches, throw, steps)
         state = self._border.state("rollout", x)
-        inputs = self._border.inputs("rollout", "us", us, (None, self.nu))
-        knot, xs, reports, contacts = self._calls.roll(state, inputs)
+        if callable(us):
+            inputs, (knot, xs, reports, contacts) = roll(self, state, us, steps)
+        else:
+            inputs = self._border.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
+            knot, xs, reports, contacts = self._calls.roll(state, inputs)
         last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
         status = Status(int(last[0]))
-        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last)
+        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last, xs[knot])
         if error and throw:
             raise error
         return Trajectory(
@@ -159,17 +170,20 @@ class Simulator(Derivatives):
             message=str(error) if error else MESSAGES[status],
         )
 
-    def _error(self, where: str, report: Floats) -> SimulationError:
-        """Why the last step of this thread was not solved."""
+    def _error(self, where: str, report: Floats, x: Floats | None = None) -> SimulationError:
+        """Why the last step of this thread was not solved; x (nx,): the state it began from."""
         mech = self.mechanism
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
-        return error_of(mech, where, report, self.tolerance, max(gaps, default=None))
+        error = error_of(mech, where, report, self.tolerance, max(gaps, default=None))
+        if error.status == Status.ANGULAR_STEP and x is not None:
+            return SimulationError(f"{error} {fastest(mech, self.replace(time_step=1e-6).maximal(x))}", error.status)
+        return error
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
         call = "Simulator.rollout_batch"
-        inputs = self._border.inputs("rollout_batch", "us", us, (None, None, self.nu))
+        inputs = self._border.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._border.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
         xs, status, knots = self._calls.roll_batch(starts, inputs)
         for x, knot in zip(xs, knots, strict=True):
@@ -196,14 +210,13 @@ class Simulator(Derivatives):
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
         us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
-        of u; wrenches (T, nbody, 6) as in `rollout`, held over a knot.
-        It stops at the first knot that cannot be solved.
+        of u; wrenches (T, nbody, 6) as in `rollout`, held over a knot. Stops at the first knot that cannot be solved.
         """
         if wrenches is not None:
             gains: dict[str, Any] = {"xs": xs, "ks": ks, "Ks": Ks, "gaps": gaps, "alpha": alpha, "limits": limits}
             return pushed.closed_loop(self, x0, us, wrenches, substeps=substeps, kappa=kappa, **gains)
         call = "closed_loop"
-        state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, (None, self.nu))
+        state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, ("T", self.nu))
         name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
         knot, path = self._calls.closed_loop(

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.border import whole
 from sim.parts import Input
+from sim.policies import Feedback
 from sim.results import Linearization, Shot, StepResult, Trajectory
 
 if TYPE_CHECKING:
@@ -67,7 +69,7 @@ def _pushed(sim: Simulator, method: str, wrenches: Any, us: Floats) -> tuple[Sim
 
 def _inputs(sim: Simulator, method: str, name: str, us: ArrayLike) -> Floats:
     """Inputs (steps, nu), checked."""
-    return checks.array(f"Simulator.{method}({name})", us, (None, sim.nu))
+    return checks.array(f"Simulator.{method}({name})", us, ("T", sim.nu))
 
 
 def step(sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches, throw: bool) -> StepResult:
@@ -77,10 +79,22 @@ def step(sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches, 
     return other.step(x, inputs[0], throw=throw)
 
 
-def rollout(sim: Simulator, x: ArrayLike, us: ArrayLike, wrenches: Wrenches, throw: bool) -> Trajectory:
+def rollout(
+    sim: Simulator, x: ArrayLike, us: ArrayLike | Feedback, wrenches: Wrenches, throw: bool, steps: int | None = None
+) -> Trajectory:
     """`Simulator.rollout` under wrenches (T, nbody, 6)."""
-    other, inputs = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
-    found = other.rollout(x, inputs, throw=throw)
+    if callable(us):
+        count = whole("Simulator.rollout(steps=...)", steps)
+        other, rows = _pushed(sim, "rollout", wrenches, np.zeros((count, sim.nu)))
+
+        def policy(time: float, state: Floats) -> Floats:
+            more = rows[round(time / sim.time_step), sim.nu :]
+            return np.concatenate([np.asarray(us(time, state), dtype=np.float64), more])
+
+        found = other.rollout(x, policy, steps=count, throw=throw)
+    else:
+        other, inputs = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
+        found = other.rollout(x, inputs, steps=steps, throw=throw)
     return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]))
 
 

@@ -14,6 +14,8 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+from solvers.notice import compiling
+
 __all__ = ["EntryCompiler", "InnerCompiler"]
 
 _ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every function
@@ -62,7 +64,8 @@ class _Compiler(Compiler):
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        return super().compile_extra(func)
+        with compiling():
+            return super().compile_extra(func)
 
 
 class InnerCompiler(_Compiler):

@@ -23,12 +23,14 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba import prange
+from numba.core.errors import NumbaError as CompilationError
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.types.misc import unliteral
 
 from solvers.code import EntryCompiler, InnerCompiler
 
 __all__ = [
+    "CompilationError",
     "cache_folder",
     "compiled_signatures",
     "inlined",
@@ -38,6 +40,7 @@ __all__ = [
     "parallel_kernel",
     "prange",
     "threads",
+    "users_kernel",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -183,6 +186,16 @@ def local_kernel(func: F) -> F:
     compiled = Kernel(func, Kernel(func, None, no_cpython_wrapper=True, no_cfunc_wrapper=True), no_cfunc_wrapper=True)
     _REGISTRY.append(compiled)
     return cast(F, compiled)
+
+
+def users_kernel(func: F) -> F:
+    """Compile a function of the user, or a loop around one, which may allocate: once per process, as `local_kernel`.
+
+    A function that is compiled already stays as it is.
+    """
+    if numba.config.DISABLE_JIT or isinstance(func, CPUDispatcher):
+        return func
+    return cast(F, numba.njit(**_FLAGS)(func))
 
 
 def parallel_kernel(func: F) -> F:

@@ -5,6 +5,7 @@ Slow and obvious: plain Python, derivatives by central differences on the manifo
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,6 +48,13 @@ class System:
     def __init__(self) -> None:
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
         self.calls: list[float] = []
+        dofs, inputs = (tuple(f"{what} {i}" for i in range(n)) for what, n in (("dof", self.nv), ("input", self.nu)))
+        self.mechanism = SimpleNamespace(dof_names=dofs, input_names=inputs)
+
+    def neutral(self):
+        return self.integrate(
+            np.eye(1, self.nx, self.quaternion or 0)[0] * (self.quaternion is not None), np.zeros(self.ndx)
+        )
 
     def move(self, x, u, kappa):
         """Next state, or None when it cannot be solved."""

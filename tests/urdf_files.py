@@ -12,6 +12,8 @@ import dojo_opt as dojo
 from sim.shapes import rotation_matrix
 from sim.urdf.stance import poses
 
+BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+AXIS = '<axis xyz="0 1 0"/>'
 SKEWED = (0.02, 0.03, 0.04, 0.002, -0.003, 0.004)  # xx yy zz xy xz yz [kg m^2]
 
 
@@ -46,6 +48,35 @@ def write(folder: Path, *parts: str, name: str = "robot") -> Path:
     path = folder / f"{name}.urdf"
     path.write_text("\n".join([f'<robot name="{name}">', *parts, "</robot>"]))
     return path
+
+
+def arm(folder: Path, *extra: str, kind: str = "revolute", inside: tuple[str, ...] = ()) -> Path:
+    """A base, and a forearm on a joint called elbow."""
+    return write(
+        folder,
+        link("base", inertial(2.0), BALL),
+        link("forearm"),
+        joint("elbow", "base", "forearm", kind, *inside),
+        *extra,
+    )
+
+
+def branched(folder: Path) -> Path:
+    """A tree with offset and turned inertias, three kinds of joints, and fixed links in the middle and at the ends."""
+    turned = inertial(1.3, "0.05 -0.1 0.02", "0.7 -0.2 1.1")
+    limits = '<limit lower="-1.5" upper="1.5"/>'
+    return write(
+        folder,
+        link("base", turned),
+        *(link(name, turned, BALL) for name in ("upper", "bracket", "lower", "slider", "tool")),
+        link("marker", ""),
+        joint("shoulder", "base", "upper", "revolute", '<axis xyz="1 1 0"/>', limits, '<dynamics damping="0.1"/>'),
+        joint("plate", "upper", "bracket", "fixed", ""),
+        joint("elbow", "bracket", "lower", "continuous", '<axis xyz="0 -1 2"/>'),
+        joint("rail", "bracket", "slider", "prismatic", '<axis xyz="0 0 1"/>', limits),
+        joint("flange", "lower", "tool", "fixed", ""),
+        joint("spot", "tool", "marker", "fixed", ""),
+    )
 
 
 # -- MuJoCo's reading of the same file ---------------------------------------------------------------------------------

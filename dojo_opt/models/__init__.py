@@ -3,6 +3,8 @@
 `catalogue()` lists them with their sizes. `box` and `box2d` are older names of `block` and `block2d`.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from dojo_opt.models.acrobot import acrobot
 from dojo_opt.models.ant import ant
 from dojo_opt.models.atlas import atlas
@@ -40,6 +42,7 @@ from dojo_opt.models.twister import twister
 from dojo_opt.models.uuv import uuv
 from dojo_opt.models.walker import walker
 from dojo_opt.models.youbot import youbot
+from sim.checks import nearest
 
 __all__ = [
     "acrobot",
@@ -80,3 +83,10 @@ __all__ = [
 ]
 
 box, box2d = block, block2d
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A name that is not there, with the ones that are."""
+        raise AttributeError(f"dojo_opt.models has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")

@@ -59,6 +59,9 @@ class MPC:
     ) -> None:
         if int(iterations) != iterations or iterations < 1:
             raise ValueError(f"MPC(iterations=...): expected a whole number >= 1, got {iterations!r}")
+        if not isinstance(problem, Problem):
+            raise TypeError(f"MPC(problem): expected a Problem, got {problem!r}")
+        checks.keywords("MPC(...)", settings, Settings.__dataclass_fields__)
         self.settings = Settings(**settings)
         self._again = partial(MPC, problem, int(iterations), reference=reference, plan=plan, **settings)
         self.problem = with_own_terms(problem)
@@ -104,6 +107,8 @@ class MPC:
     def __call__(self, time: float, x: ArrayLike) -> Vector:
         """Input (nu,) [N, N m] for the measured state x (nx,) at `time` [s]; with a `delay`, that for time + delay."""
         now = checks.number("MPC(time)", time)
+        if self.log and now < self.log[-1].time:
+            raise ValueError(f"MPC(time): time goes on, {now:g} s is before {self.log[-1].time:g} s; see reset()")
         measured = checks.array("MPC(x)", x, (self.sim.nx,))
         self._measured.add(now, measured)
         if self.policy is None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.mpc.tick import Tick
+from dojo_opt.names import chosen_components
 from dojo_opt.plant.plant import Plant
 from sim import checks
 from sim.results import Contacts
@@ -24,7 +25,7 @@ Controller = Callable[[float, Vector], ArrayLike]
 __all__ = ["ClosedLoop", "closed_loop"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ClosedLoop:
     """What happened, up to the end, a fall, or the first step of the plant that could not be solved."""
 
@@ -40,6 +41,11 @@ class ClosedLoop:
     log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
     reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
 
+    def __repr__(self) -> str:
+        return (
+            f"ClosedLoop({self.duration:g} s, {self.message} x {self.x.shape}, u {self.u.shape}, {len(self.log)} ticks)"
+        )
+
     @property
     def duration(self) -> float:
         """How long it lasted [s]."""
@@ -52,9 +58,16 @@ class ClosedLoop:
         sim = self.simulator
         return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
 
-    def rms(self, components: ArrayLike = (0, 1)) -> float:
-        """Root of the mean square of the distance from the reference in these coordinates [m], x and y by default."""
-        return float(np.sqrt(np.mean(np.sum(self.error()[:, np.asarray(components)] ** 2, axis=1))))
+    def rms(self, components: Any = (0, 1)) -> float:
+        """Root of the mean square of the distance from the reference in these coordinates, the first two by default.
+
+        components: numbers below nv, or names as in `Mechanism.components`. The first two of a floating base are x and
+        y [m].
+        """
+        error = self.error()
+        call = "ClosedLoop.rms(components)"
+        chosen = chosen_components(call, components if error.shape[1] > 1 else None, self.simulator)
+        return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
 
 
 def closed_loop(
@@ -73,6 +86,8 @@ def closed_loop(
     reference     times (n,) -> states (n, nx) for the error; that of the controller by default
     fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
     """
+    if not isinstance(plant, Plant):
+        raise TypeError(f"closed_loop(plant): expected a Plant, as Plant(simulator), got {plant!r}")
     h = plant.sim.time_step
     steps = round(checks.number("closed_loop(duration)", duration, above=0.0) / h)
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)

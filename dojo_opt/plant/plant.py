@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.plant.perturbation import Perturbation
 from sim import checks
+from sim.mechanism import Mechanism
+from sim.parts import Joint
 from sim.results import StepResult
+from sim.shapes import rotation_matrix
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -19,6 +22,7 @@ __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
 _LOW = 0.5  # fallen: below this share of the first height,
+_LEVEL = 1e-6  # vertical part of a level axis
 _TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
 
 
@@ -41,6 +45,9 @@ class Plant:
         perturbation: Perturbation | None = None,
         **fields: Any,
     ) -> None:
+        if not isinstance(sim, Simulator):
+            raise TypeError(f"Plant(sim): expected a Simulator, got {sim!r}")
+        checks.keywords("Plant(...)", fields, Perturbation.__dataclass_fields__)
         if perturbation is not None and fields:
             raise ValueError(f"Plant(perturbation=...): give either it or its fields, got also {', '.join(fields)}")
         self.sim = sim
@@ -112,14 +119,29 @@ class Plant:
         return result
 
     def fallen(self, x: Vector) -> bool:
-        """Whether a robot on a floating base lies: below half its first height, or tilted by more than 60 degrees.
+        """Whether a robot lies: its base below half its first height, or tilted by more than 60 degrees from the start.
 
-        A robot without a floating base never does.
+        A robot whose base neither floats nor moves in a vertical plane never does.
         """
-        if self.sim.mechanism.joints[0].kind != "floating":
+        if not stands_free(self.sim.mechanism):
             return False
-        w, i, j, k = x[3:7]
-        up = np.array([2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)])
+        now, first = self._base(x), self._base(self._x0)
         floor = self.perturbation.ground_height
-        height = self.normal @ x[:3] - floor
-        return bool(height < _LOW * (self.normal @ self._x0[:3] - floor) or up @ self.normal < _TILTED)
+        low = self.normal @ now[:3] - floor < _LOW * (self.normal @ first[:3] - floor)
+        up = rotation_matrix(now[6:10]) @ rotation_matrix(first[6:10]).T @ self.normal
+        return bool(low or up @ self.normal < _TILTED)
+
+    def _base(self, x: Vector) -> Vector:
+        """Maximal state (13,) of the first body."""
+        return np.asarray(self.sim.maximal(x)[0])
+
+
+def stands_free(mechanism: Mechanism) -> bool:
+    """Whether the first joint lets its body move up and down and tip over: no pendulum and no arm."""
+    base = mechanism.joints[0]
+    return base.kind == "floating" or (base.kind == "planar_axis" and abs(_world_axis(base)[2]) < _LEVEL)
+
+
+def _world_axis(joint: Joint) -> Vector:
+    """Axis of a joint on the world, world axes."""
+    return np.asarray(rotation_matrix(joint.orientation) @ np.asarray(joint.axis))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dojo_opt.motion import Array, Motion, motion
-from dojo_opt.plots.axes import finish
+from dojo_opt.plots.axes import finish, panel
 from sim.simulator import Simulator
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ def _edges(m: Motion) -> Array:
     return np.concatenate([[0.0], m.contact_time])
 
 
+@panel
 def gait_diagram(m: Motion, ax: Axes) -> Axes:
     """One row per foot, filled while it is on the ground."""
     feet, edges = _feet(m), _edges(m)
@@ -65,6 +66,7 @@ def gait_diagram(m: Motion, ax: Axes) -> Axes:
     return finish(ax, "on the ground", "time [s]")
 
 
+@panel
 def normal_forces(m: Motion, ax: Axes) -> Axes:
     """Mean normal force of every foot over each simulation step, in the colours of the gait diagram."""
     for row, k in enumerate(_feet(m)):
@@ -72,6 +74,7 @@ def normal_forces(m: Motion, ax: Axes) -> Axes:
     return finish(ax, "normal force [N]", "time [s]")
 
 
+@panel
 def friction_use(m: Motion, ax: Axes) -> Axes:
     """Friction force over its limit, friction coefficient times normal force, of every foot on the ground: 1 slides."""
     loaded = _loaded(m)
@@ -84,6 +87,7 @@ def friction_use(m: Motion, ax: Axes) -> Axes:
     return finish(ax, "friction / its limit", "time [s]")
 
 
+@panel
 def foot_paths(m: Motion, ax: Axes) -> Axes:
     """Height of the underside of every foot over the way it goes; drawn larger where the foot is on the ground."""
     loaded = _loaded(m)

@@ -9,17 +9,23 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dojo_opt.motion import motion
 from dojo_opt.mpc.tick import Tick, milliseconds
 from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.plant import stands_free
 from dojo_opt.plant.study import Study
-from dojo_opt.plots.axes import finish
+from dojo_opt.plots.axes import finish, plain_ticks, units
+from dojo_opt.plots.trajectory import controls, state, velocities
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["base_path", "closed_loop", "study", "survival", "tick_times", "tracking"]
+Matrix = NDArray[np.float64]
+
+__all__ = ["base_height", "base_path", "closed_loop", "study", "survival", "tick_times", "tracking"]
 
 
 def _axes(ax: Axes | None) -> Axes:
@@ -31,49 +37,77 @@ def _axes(ax: Axes | None) -> Axes:
 
 
 def closed_loop(result: ClosedLoop) -> Figure:
-    """Four panels of a closed loop: height and reference, distance from the reference, path of the base, tick times."""
+    """Four panels of a closed loop: height and reference, distance from the reference, path of the base, tick times.
+
+    Of a robot without a base that can fall, an arm or a pendulum, coordinates and inputs instead of height and path;
+    without a reference, the inputs instead of the distance from it; without a log of ticks, the inputs instead.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 7), layout="constrained")
     axes = np.ravel(figure.subplots(2, 2))
-    coordinate(result, 2, axes[0], "height of the base [m]")
-    tracking(result, axes[1])
-    base_path(result, axes[2])
-    tick_times(result.log, ax=axes[3])
+    m = motion(result)
+    free = stands_free(result.simulator.mechanism)
+    if free:
+        base_height(result, axes[0])
+        base_path(result, axes[2])
+    else:
+        state(m, axes[0])
+        controls(m, axes[2])
+    spare = controls if free else velocities
+    if result.reference is not None:
+        tracking(result, axes[1])
+    else:
+        spare(m, axes[1])
+    if len(result.log) > 1:
+        tick_times(result.log, ax=axes[3])
+    else:
+        spare(m, axes[3])
     figure.suptitle(result.message)
     return figure
 
 
-def coordinate(result: ClosedLoop, index: int, ax: Axes | None = None, label: str = "") -> Axes:
-    """One coordinate of the state over time, and its reference, dashed."""
+def _path(result: ClosedLoop, xs: Matrix) -> Matrix:
+    """(n, 3) positions of the first body in the states xs [m]."""
+    return np.asarray(result.simulator.maximal(xs)[:, 0, :3])
+
+
+def base_height(result: ClosedLoop, ax: Axes | None = None) -> Axes:
+    """Height of the first body over time, and that of the reference, dashed."""
     ax = _axes(ax)
-    ax.plot(result.time, result.x[:, index], label="plant")
+    ax.plot(result.time, _path(result, result.x)[:, 2], label="plant")
     if result.reference is not None:
-        ax.plot(result.time, np.asarray(result.reference(result.time))[:, index], "--", color="0.4", label="reference")
+        rows = _path(result, np.asarray(result.reference(result.time)))
+        ax.plot(result.time, rows[:, 2], "--", color="0.4", label="reference")
     _mark(result.log, ax)
-    return finish(ax, label or f"coordinate {index}", "time [s]")
+    return finish(ax, "height of the base [m]", "time [s]")
 
 
 def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Distance from the reference over time, along each axis."""
+    """Distance from the reference over time: lengths of a base that can fall, else all coordinates."""
     ax = _axes(ax)
-    error = result.error()
-    for k, name in enumerate("xyz"[: min(3, error.shape[1])]):
-        ax.plot(result.time, error[:, k], label=name)
+    mechanism = result.simulator.mechanism
+    count = mechanism.joints[0].ntrans if stands_free(mechanism) else mechanism.nv
+    for name, error in list(zip(mechanism.dof_names, result.error().T, strict=True))[:count]:
+        ax.plot(result.time, error, label=name)
     _mark(result.log, ax)
-    return finish(ax, "off the reference [m]", "time [s]")
+    return finish(ax, f"off the reference {units(mechanism, 'm', 'rad', range(count))}", "time [s]")
 
 
 def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Path of the base seen from above, and that of the reference, dashed."""
+    """Path of the first body from above, or from the side where it stays in a plane; that of the reference, dashed."""
     ax = _axes(ax)
-    ax.plot(result.x[:, 0], result.x[:, 1], label="plant")
-    ax.plot(result.x[-1, 0], result.x[-1, 1], "o", color="C0")
+    path = _path(result, result.x)
+    planar = result.simulator.mechanism.joints[0].kind == "planar_axis"
+    across = 2 if planar else 1
+    along = int(planar and np.ptp(path[:, 1]) > np.ptp(path[:, 0]))
+    ax.plot(path[:, along], path[:, across], label="plant")
+    ax.plot(path[-1, along], path[-1, across], "o", color="C0")
     if result.reference is not None:
-        rows = np.asarray(result.reference(result.time))
-        ax.plot(rows[:, 0], rows[:, 1], "--", color="0.4", label="reference")
+        rows = _path(result, np.asarray(result.reference(result.time)))
+        ax.plot(rows[:, along], rows[:, across], "--", color="0.4", label="reference")
     ax.set_aspect("equal", adjustable="datalim")
-    return finish(ax, "y [m]", "x [m]")
+    return finish(ax, f"{'xyz'[across]} [m]", f"{'xyz'[along]} [m]")
 
 
 def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None = None) -> Axes:
@@ -91,6 +125,7 @@ def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None
     if period is not None:
         ax.axhline(1e3 * period, color="0.4", label=f"period {1e3 * period:g} ms")
     ax.set_yscale("log")
+    plain_ticks(ax)
     return finish(ax, "tick [ms]", "time [s]")
 
 
@@ -105,6 +140,7 @@ def study(result: Study) -> Figure:
     right.plot(ms, np.arange(1, ms.size + 1) / max(1, ms.size))
     right.axhline(0.99, color="0.4", ls="--", label="99 %")
     right.set_xscale("log")
+    plain_ticks(right)
     finish(right, "share of ticks", "tick [ms]")
     return figure
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from dojo_opt.plots.axes import finish as _finish
+from dojo_opt.plots.axes import input_units, panel, units
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
@@ -41,36 +42,39 @@ def trajectory(
     axes = np.ravel(figure.subplots(2, 2))
     state(m, axes[0])
     controls(m, axes[1])
-    (contact_forces if m.mechanism.contacts else velocities)(m, axes[2])
+    (contact_forces if m.mechanism.contact_names else velocities)(m, axes[2])
     paths(m, axes[3])
     return figure
 
 
+@panel
 def state(m: Motion, ax: Axes) -> Axes:
     """Coordinates that change, over time; the orientation of a quaternion joint as its rotation vector."""
-    for label, values in _coordinates(m):
+    drawn = []
+    for dof, (label, values) in enumerate(zip(_labels(m.mechanism), coordinates(m), strict=True)):
         if np.ptp(values) > 1e-4 or m.mechanism.nv == 1:
             ax.plot(m.time, values, label=label)
-    return _finish(ax, "coordinates [m, rad]", "time [s]")
+            drawn.append(dof)
+    return _finish(ax, f"coordinates {units(m.mechanism, 'm', 'rad', drawn)}", "time [s]")
 
 
+@panel
 def velocities(m: Motion, ax: Axes) -> Axes:
     """Joint velocities over time, each the mean of the step that led to its knot."""
-    nq = m.mechanism.nq
-    for joint in m.mechanism.joints:
-        v = m.x[:, nq:][:, m.mechanism.v_slice(joint.name)]
-        for k in range(v.shape[1]):
-            ax.plot(m.time, v[:, k], label=joint.name if v.shape[1] == 1 else f"{joint.name} {k}")
-    return _finish(ax, "velocities [m/s, rad/s]", "time [s]")
+    for label, values in zip(_labels(m.mechanism), m.x[:, m.mechanism.nq :].T, strict=True):
+        ax.plot(m.time, values, label=label)
+    return _finish(ax, f"velocities {units(m.mechanism, 'm/s', 'rad/s')}", "time [s]")
 
 
+@panel
 def controls(m: Motion, ax: Axes) -> Axes:
     """Inputs over time, held over each knot."""
     for k, name in enumerate(m.mechanism.input_names):
         ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
-    return _finish(ax, "inputs [N, N m]", "time [s]")
+    return _finish(ax, f"inputs {input_units(m.mechanism)}", "time [s]")
 
 
+@panel
 def contact_forces(m: Motion, ax: Axes) -> Axes:
     """Mean normal force over each step of every contact with load, and the size of its friction force, dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
@@ -83,6 +87,7 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
     return _finish(ax, "contact forces [N] (dashed: friction)", "time [s]")
 
 
+@panel
 def paths(m: Motion, ax: Axes) -> Axes:
     """Paths, in the vertical plane of the motion, of the first body and of the feet; without feet, of all bodies."""
     side = int(np.ptp(m.position[:, :, 1], axis=0).max() > np.ptp(m.position[:, :, 0], axis=0).max())
@@ -117,27 +122,19 @@ def _ground(m: Motion, side: int, ax: Axes) -> None:
     ax.plot(along, first.terrain.height(x, y) + first.height, color="0.6", linewidth=1)
 
 
-def _coordinates(m: Motion) -> list[tuple[str, Any]]:
-    """(label, values over time) of every degree of freedom."""
-    rows = []
+def coordinates(m: Motion) -> list[Any]:
+    """Values over time of every degree of freedom, in the order of v."""
+    rows: list[Any] = []
     for joint in m.mechanism.joints:
         q = m.x[:, m.mechanism.q_slice(joint.name)]
-        for k in range(joint.ntrans):
-            rows.append((_label(m.mechanism, joint.name, "xyz"[k] if joint.ntrans > 1 else ""), q[:, k]))
-        if joint.nrot == 1:
-            rows.append((_label(m.mechanism, joint.name, "angle" if joint.ntrans else ""), q[:, -1]))
-        elif joint.nrot == 2:
-            rows += [(_label(m.mechanism, joint.name, f"r{k + 1}"), q[:, k - 2]) for k in range(2)]
-        elif joint.nrot == 3:
-            vectors = _rotation_vectors(q[:, -4:])
-            rows += [(_label(m.mechanism, joint.name, f"r{a}"), vectors[:, k]) for k, a in enumerate("xyz")]
+        rows += list((q if joint.nrot < 3 else np.hstack([q[:, :-4], _rotation_vectors(q[:, -4:])])).T)
     return rows
 
 
-def _label(mechanism: Mechanism, joint: str, coordinate: str) -> str:
-    if len(mechanism.joints) == 1 and coordinate:
-        return coordinate
-    return f"{joint} {coordinate}".strip()
+def _labels(mechanism: Mechanism) -> list[str]:
+    """Names of the degrees of freedom, without that of the joint when there is no other."""
+    names = list(mechanism.dof_names)
+    return [name.split(" ", 1)[-1] for name in names] if len(mechanism.joints) == 1 else names
 
 
 def _rotation_vectors(quaternions: Any) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sim import checks
+from sim.border import whole
 from sim.mjcf.contacts import find_contacts
 from sim.mjcf.drives import find_inputs, left_out
 from sim.mjcf.equalities import find_gears, find_loops
@@ -59,22 +60,14 @@ def load_mjcf(
     whose inertia no rigid body has; OSError for a file that is not there.
     """
     model, file = _compile(source)
-    checks.one_of("load_mjcf(law=...)", law, LAWS)
-    if not isinstance(rim_points, int | np.integer) or rim_points < 3:
-        raise ValueError(f"load_mjcf(rim_points=...): expected a whole number >= 3, got {rim_points!r}")
-    mu = None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0)
+    touching = (
+        None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
+        checks.one_of("load_mjcf(law=...)", law, LAWS),
+        whole("load_mjcf(rim_points=...)", rim_points, 3),
+    )
     notes = Notes()
     groups, where = find_groups(model)
-    bodies: list[Body] = []
-    joints: list[Joint] = []
-    homes: dict[int, tuple[str, int]] = {}
-    for group in groups:
-        carried = carry(model, group, merge, notes)
-        inertia = group.inertia
-        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group)) if inertia.mass else None
-        bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
-        joints += carried.joints
-        homes |= carried.homes
+    bodies, joints, homes = _tree(model, groups, merge, notes)
     if not joints:
         raise ValueError(f"load_mjcf: {file}: no joint is free to move")
     inputs, gear, low, high = find_inputs(model, homes, notes)
@@ -82,7 +75,7 @@ def load_mjcf(
     mech = MjcfMechanism(
         bodies,
         [*joints, *find_loops(model, where, notes)],
-        find_contacts(model, where, (mu, law, int(rim_points)), notes) if ground else [],
+        find_contacts(model, where, touching, notes) if ground else [],
         inputs,
         gravity=model.opt.gravity if gravity is None else gravity,
         name=Path(file).stem,
@@ -98,6 +91,23 @@ def load_mjcf(
         if note.warn:
             warnings.warn(f"load_mjcf: {file}: {note}", MjcfWarning, stacklevel=2)
     return replace(mech, report=report)
+
+
+def _tree(
+    model: Any, groups: list[Group], merge: bool, notes: Notes
+) -> tuple[list[Body], list[Joint], dict[int, tuple[str, int]]]:
+    """Bodies, the joints they hang on, and where every joint of the file went."""
+    bodies: list[Body] = []
+    joints: list[Joint] = []
+    homes: dict[int, tuple[str, int]] = {}
+    for group in groups:
+        carried = carry(model, group, merge, notes)
+        inertia = group.inertia
+        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group)) if inertia.mass else None
+        bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
+        joints += carried.joints
+        homes |= carried.homes
+    return bodies, joints, homes
 
 
 def _compile(source: str | Path) -> tuple[Any, str]:

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from sim import checks
+from sim.border import whole
 from sim.parts import LAWS, Contact
 from sim.urdf.assemble import Choices, assemble
 from sim.urdf.loops import read_loops
 from sim.urdf.report import Notes, UrdfMechanism
-from sim.urdf.robot import read_robot
+from sim.urdf.robot import Robot, read_robot
 from sim.urdf.xml import parse
 
 MIMIC = ("free", "locked", "gear")
@@ -71,39 +71,43 @@ def load_urdf(
     Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
     names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
     """
-    file = Path(path)
-    notes = Notes()
+    file, notes = Path(path), Notes()
     root = parse(file)
     robot = read_robot(root, notes)
     loops = read_loops(root, robot, notes)
-    checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
-    checks.one_of("load_urdf(law=...)", law, LAWS)
-    if not isinstance(rim_points, int | np.integer) or rim_points < 3:
-        raise ValueError(f"load_urdf(rim_points=...): expected a whole number >= 3, got {rim_points!r}")
-    held = [locked] if isinstance(locked, str) else list(locked)
-    for name in held:
-        checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
-    if following := [name for name in robot.mimics if name not in held]:
-        if mimic == "gear":
-            notes.add("joints that follow another one, by a gear", following)
-        else:
-            fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
-            notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
-        held += following if mimic == "locked" else []
+    held, geared = _held(robot, locked, mimic, notes)
     choices = Choices(
         file=file.name,
         fixed_base=not floating,
         merge=merge_fixed,
-        locked=frozenset(held),
-        geared=tuple(following) if mimic == "gear" else (),
+        locked=held,
+        geared=geared,
         repair=repair,
         neutral=dict(neutral or {}),
         position=checks.vector("load_urdf(position=...)", position, 3),
         actuated=None if actuated is None else tuple(actuated),
         contacts=(contacts if ground else ()),
         friction=None if friction is None else checks.number("load_urdf(friction=...)", friction, at_least=0.0),
-        law=law,
-        rim_points=int(rim_points),
+        law=checks.one_of("load_urdf(law=...)", law, LAWS),
+        rim_points=whole("load_urdf(rim_points=...)", rim_points, 3),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
     )
     return assemble(robot, loops, choices, notes)
+
+
+def _held(robot: Robot, locked: Collection[str], mimic: str, notes: Notes) -> tuple[frozenset[str], tuple[str, ...]]:
+    """Joints that do not move, and joints that a gear ties to another one."""
+    checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
+    held = [locked] if isinstance(locked, str) else list(locked)
+    for name in held:
+        checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
+    following = [name for name in robot.mimics if name not in held]
+    if following and mimic == "gear":
+        notes.add("joints that follow another one, by a gear", following)
+    elif following:
+        fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
+        notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
+    return (
+        frozenset([*held, *following] if mimic == "locked" else held),
+        tuple(following) if mimic == "gear" else (),
+    )

@@ -9,91 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import random_body, random_state, unit_quaternion
+from branches import ORDERS, apart, branch, end
+from mechanisms import random_state
 
 import dojo_opt as dojo
 from sim.mechanism import Mechanism
-from sim.parts import KINDS, Input, Joint
-from sim.tableau import stable, tableau
-
-ORDERS = (4, 6, 8)
-
-
-def branch(kind: str, on_world: bool, *, spring: float = 3.0, damper: float = 0.0, free: bool = False) -> Mechanism:
-    """A joint of one kind with a branch behind it, every frame skewed, pushed by inputs of every sort."""
-    rng = np.random.default_rng(4)
-    names = ["a", "b", "c"]
-    kinds = [kind, "revolute", "spherical"] if on_world else ["floating", kind, "revolute"]
-
-    def joint(k: int) -> Joint:
-        n = sum(KINDS[kinds[k]])
-        loose = free or kinds[k] == "floating"
-        return Joint(
-            kinds[k], None if k == 0 else "a", names[k], parent_point=0.3 * rng.normal(size=3),
-            child_point=0.3 * rng.normal(size=3), axis=rng.normal(size=3), orientation=unit_quaternion(rng),
-            spring=0.0 if loose else spring, damper=0.0 if loose else damper, rest=0.2 * rng.normal(size=n),
-        )  # fmt: skip
-
-    inputs = [
-        Input("joint1", dof=0) if sum(KINDS[kinds[1]]) else Input(body="b", force=(0, 1, 0)),
-        Input(body="c", force=(1.0, 0.5, -2.0), torque=(0.1, 0.2, 0.3), frame="body"),
-        Input(body="b", force=(0.3, 0.1, -0.4), torque=(0.3, -0.2, 0.1), frame="world"),
-    ]
-    joints = [replace(joint(k), name=f"joint{k}") for k in range(3)]
-    return Mechanism([random_body(rng, n) for n in names], joints, inputs=inputs)
-
-
-def end(mech: Mechanism, order: int, h: float, duration: float, u: np.ndarray | None = None) -> np.ndarray:
-    sim = dojo.Simulator(mech, time_step=h, order=order, tolerance=1e-13)
-    q, v = random_state(np.random.default_rng(3), mech, speed=1.0)
-    steps = round(duration / h)
-    us = np.zeros((steps, sim.nu)) if u is None else np.tile(u, (steps, 1))
-    return np.asarray(sim.rollout(sim.start(q, v), us, throw=True).x[-1])
-
-
-def apart(mech: Mechanism, a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.abs(dojo.Simulator(mech, time_step=1.0).difference(a, b)).max())
-
-
-def trees(size: int) -> list[tuple]:
-    """Rooted trees of so many nodes, as sorted tuples of the trees below the root."""
-    if size == 1:
-        return [()]
-    parts = {()}
-    for _ in range(size - 1):  # hang one more leaf anywhere
-        parts = {tuple(sorted(t)) for old in parts for t in _grown(old)}
-    return sorted(parts)
-
-
-def _grown(tree: tuple) -> list[tuple]:
-    below = [(*tree[:k], new, *tree[k + 1 :]) for k in range(len(tree)) for new in _grown(tree[k])]
-    return [tuple(sorted(t)) for t in ((*tree, ()), *below)]
-
-
-def _size(tree: tuple) -> int:
-    return 1 + sum(map(_size, tree))
-
-
-def _density(tree: tuple) -> int:
-    return _size(tree) * int(np.prod([_density(t) for t in tree], dtype=int))
-
-
-def _weight(tree: tuple, a: np.ndarray) -> np.ndarray:
-    out = np.ones(len(a))
-    for t in tree:
-        out = out * (a @ _weight(t, a))
-    return out
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_coefficients_meet_the_order_conditions(order: int) -> None:
-    """Sum of b_i over every rooted tree is 1 over its density (Butcher): 200 conditions for order 8."""
-    a, b = tableau(order)
-    assert np.all(np.triu(a) == 0.0)
-    for size in range(1, order + 1):
-        for tree in trees(size):
-            assert abs(b @ _weight(tree, a) - 1.0 / _density(tree)) < 1e-13, tree
-    assert any(abs(b @ _weight(tree, a) - 1.0 / _density(tree)) > 1e-7 for tree in trees(order + 1))
+from sim.tableau import stable
 
 
 @pytest.mark.parametrize("kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "prismatic", "fixed"])
@@ -226,61 +147,6 @@ def test_springs_and_dampers_are_refused_where_they_would_be_unstable(order: int
 def test_what_is_not_smooth_or_too_fast_is_refused(mechanism: Mechanism, what: str) -> None:
     with pytest.raises(ValueError, match=what):
         dojo.Simulator(mechanism, time_step=0.01, order=4)
-
-
-@pytest.mark.parametrize(
-    "kind", ["floating", "spherical", "revolute", "cylindrical_free", "planar_axis", "prismatic", "fixed"]
-)
-@pytest.mark.parametrize("on_world", [True, False])
-def test_derivatives_are_those_of_central_differences(kind: str, on_world: bool) -> None:
-    mech = branch(kind, on_world, damper=0.1)
-    sim = dojo.Simulator(mech, time_step=0.05, order=4)
-    x = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
-    u = np.array([0.5, 0.3, -0.7])
-    A, B = sim.linearize(x, u)
-
-    def difference(dx: np.ndarray, du: np.ndarray) -> np.ndarray:
-        ends = (sim.step(sim.integrate(x, s * dx), u + s * du, throw=True).x for s in (1e-5, -1e-5))
-        return np.asarray(sim.difference(*ends)) / 2e-5
-
-    for k, column in enumerate(np.eye(sim.ndx)):
-        np.testing.assert_allclose(A[:, k], difference(column, 0.0 * u), atol=1e-8 * np.abs(A).max(), rtol=0)
-    for k, column in enumerate(np.eye(sim.nu)):
-        np.testing.assert_allclose(B[:, k], difference(np.zeros(sim.ndx), column), atol=1e-8, rtol=0)
-
-
-def test_knots_of_several_steps_are_products_and_policies_follow_trajectories() -> None:
-    mech = branch("spherical", False)
-    sim = dojo.Simulator(mech, time_step=0.02, order=6)
-    x0 = sim.start(*random_state(np.random.default_rng(3), mech, speed=1.0))
-    us = np.random.default_rng(1).normal(size=(4, sim.nu))
-    fine = sim.rollout(x0, np.repeat(us, 2, axis=0), throw=True).x
-    line = sim.linearize_trajectory(fine[::2], us, substeps=2)
-    np.testing.assert_allclose(line.x_next, fine[2::2], atol=1e-12)
-    (A1, B1), (A2, B2) = (sim.linearize(x, us[0]) for x in fine[:2])
-    np.testing.assert_allclose(line.A[0], A2 @ A1, atol=1e-10)
-    np.testing.assert_allclose(line.B[0], A2 @ B1 + B2, atol=1e-10)
-    xs, rolled = sim.linearize_rollout(x0, us[:2])
-    np.testing.assert_allclose(xs, sim.rollout(x0, us[:2]).x, atol=1e-12)
-    np.testing.assert_allclose(rolled.A[0], A1, atol=1e-10)
-    Ks = np.random.default_rng(2).normal(size=(4, sim.nu, sim.ndx))
-    shot = sim.closed_loop(x0, us, fine[::2], Ks=Ks, substeps=2)
-    np.testing.assert_allclose(shot.x, fine[::2], atol=1e-10)
-    dx = 1e-6 * np.random.default_rng(4).normal(size=sim.ndx)
-    shot = sim.closed_loop(sim.integrate(x0, dx), us, fine[::2], Ks=Ks, substeps=2)
-    np.testing.assert_allclose(sim.difference(shot.x[1], fine[2]), (line.A[0] + line.B[0] @ Ks[0]) @ dx, atol=1e-9)
-
-
-def test_a_swing_up_is_planned() -> None:
-    problem = dojo.problems.swingup("cartpole")
-    costs, constraints = problem.specs
-    sim = problem.sim.replace(order=4)
-    plan = dojo.ilqr(
-        dojo.Problem(
-            sim, problem.start, problem.horizon, cost=costs, constraints=constraints, controls0=problem.controls0
-        )
-    )
-    assert plan.success, plan.message
 
 
 def test_what_order_two_alone_has_and_unknown_orders_are_refused() -> None:

@@ -140,7 +140,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: SIM.step(state(_3=0.5)), r"Simulator.step\(x\): joint 'body': expected a unit quaternion, got length 0.5"),
     (lambda: SIM.step(X, np.zeros(2)), r"Simulator.step\(u\): expected shape \(3,\), got \(2,\)"),
     (lambda: SIM.step(X, [0, np.inf, 0]), r"Simulator.step\(u\): expected finite numbers, got inf at index 1"),
-    (lambda: SIM.rollout(X, np.zeros((4, 2))), r"Simulator.rollout\(us\): expected shape \(any, 3\), got \(4, 2\)"),
+    (lambda: SIM.rollout(X, np.zeros((4, 2))), r"Simulator.rollout\(us\): expected shape \(T, 3\), got \(4, 2\)"),
     (lambda: SIM.rollout(X, np.full((4, 3), np.nan)), r"Simulator.rollout\(us\): .* got nan at index \(0, 0\)"),
     (lambda: SIM.rollout_batch(X, np.zeros((2, 4, 3))), r"rollout_batch\(x0s\): expected shape \(2, 15\), got \(15,\)"),
     (lambda: SIM.linearize(X, kappa=0), r"Simulator.linearize\(kappa=\.\.\.\): expected a number > 0"),

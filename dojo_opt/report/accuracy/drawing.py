@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy.curves import Curves
 
 PANELS = (  # scene, what, title
@@ -52,6 +53,7 @@ def figure(measured: Mapping[str, Curves], panels: Sequence[tuple[str, str, str]
             axis.loglog(x, y, "o" if ours else "s", ms=4, color=names[name], label=name, **style)
         axis.set_title(title, fontsize=10)
         axis.set_xlabel("processor time [ms]")
+        plain_ticks(axis)
         axis.grid(alpha=0.3)
     for axis in axes[len(panels) :]:
         axis.set_visible(False)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy import curves, drawing, scenes
 from dojo_opt.report.accuracy.start import start
 from dojo_opt.report.engines import Engine, Ours, installed
@@ -209,4 +210,5 @@ def _figure(name: str, trials: Sequence[Trial], own: float, target: float) -> An
     axis.set_title(f"{name}: error against run time (numbers: time step in ms)", fontsize=10)
     axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     axis.grid(alpha=0.3)
+    plain_ticks(axis)
     return out

@@ -1,0 +1,41 @@
+"""Rollouts under a policy: u = policy(time, x), a function of the user that is asked before every step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import checks
+from sim.border import whole
+
+if TYPE_CHECKING:
+    from sim.simulator import Simulator
+
+Floats = NDArray[np.float64]
+Rolled = tuple[int, Floats, Floats, Floats]  # solved steps; states, report and contacts of every step, see Calls.roll
+Feedback = Callable[[float, Floats], ArrayLike]
+
+__all__ = ["Feedback", "roll"]
+
+
+def roll(sim: Simulator, x: Floats, policy: Feedback, steps: int | None) -> tuple[Floats, Rolled]:
+    """Inputs (T, nu) and what came of them; T is `steps`, or fewer when one cannot be solved.
+
+    Every step is solved afresh: states differ within the tolerance from those of one rollout of the same inputs.
+    """
+    count = whole("Simulator.rollout(steps=...)", steps)
+    us, rolled = [], []
+    for k in range(count):
+        u = policy(k * sim.time_step, x.copy())
+        us.append(checks.array(f"Simulator.rollout: u of the policy at step {k}", u, (sim.nu,)))
+        rolled.append(sim._calls.roll(x, us[-1][None]))
+        if rolled[-1][0] == 0:
+            break
+        x = rolled[-1][1][1]
+    solved = sum(knot for knot, *_ in rolled)
+    states = np.concatenate([rolled[0][1][:1], *(xs[1:] for _, xs, _, _ in rolled)])
+    reports, contacts = (np.concatenate([part[i] for part in rolled]) for i in (2, 3))
+    return np.array(us), (solved, states, reports, contacts)

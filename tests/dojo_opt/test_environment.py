@@ -1,0 +1,74 @@
+"""Problems as Gymnasium environments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+pytest.importorskip("gymnasium")
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # that states and inputs have no bounds; faults are assertions
+def test_it_is_an_environment_as_gymnasium_has_them():
+    from gymnasium.utils.env_checker import check_env
+
+    check_env(dojo.Environment(dojo.problems.swingup("cartpole")), skip_render_check=True)
+
+
+def test_rewards_of_a_plan_add_up_to_its_cost():
+    problem = dojo.problems.hop()
+    plan = dojo.ilqr(problem)
+    env = dojo.Environment(problem)
+    x, _ = env.reset(seed=0)
+    np.testing.assert_allclose(x, problem.start)
+    total, over = 0.0, False
+    for u in plan.u:
+        x, reward, terminated, over, info = env.step(u)
+        total += reward
+        assert not terminated
+    assert over and info["violation"] < 2e-3
+    np.testing.assert_allclose(total, -plan.fun, rtol=1e-5)
+    np.testing.assert_allclose(x, plan.x[-1], atol=1e-4)
+    with pytest.raises(RuntimeError, match="the episode is over"):
+        env.step(u)
+
+
+def test_actions_are_shares_of_the_limits():
+    problem = dojo.problems.block()
+    limited = dojo.Problem(problem.sim, problem.start, 3, cost=dojo.cost.Effort(1.0), control_limits=(-2.0, [2, 4, 6]))
+    env = dojo.Environment(limited)
+    env.reset(seed=0)
+    _, reward, *_ = env.step(np.array([1.0, -1.0, 0.0]))
+    np.testing.assert_allclose(reward, -(2.0**2 + 2.0**2 + 2.0**2))
+    assert env.action_space.high.tolist() == [1, 1, 1]
+
+
+def test_perturbations_are_drawn_from_the_seed_and_a_fall_ends_it():
+    problem = dojo.problems.hop()
+    plant = dojo.Plant(problem.sim.replace(time_step=0.01), problem.start)
+
+    def sampler(rng):
+        return dojo.Perturbation(payload=float(rng.uniform(0, 2)))
+
+    env = dojo.Environment(problem, plant, sampler)
+    ends = []
+    for seed in (1, 1, 2):
+        env.reset(seed=seed)
+        done = False
+        while not done:
+            x, _, terminated, truncated, info = env.step(np.array([5.0, 0.0, 0.0]))
+            done = terminated or truncated
+        assert terminated and info["message"] == "The robot has fallen."
+        ends.append(x)
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert np.abs(ends[0] - ends[2]).max() > 1e-6
+
+
+def test_a_plant_that_does_not_fit_is_refused():
+    problem = dojo.problems.hop()
+    with pytest.raises(ValueError, match=r"Environment\(plant=\.\.\.\): expected a time step that divides a knot"):
+        dojo.Environment(problem, dojo.Plant(problem.sim.replace(time_step=0.03)))
+    with pytest.raises(TypeError, match=r"Environment\(problem\): expected a Problem"):
+        dojo.Environment(problem.sim)

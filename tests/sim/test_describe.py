@@ -1,0 +1,36 @@
+"""What `describe` and messages say about a scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import dojo_opt as dojo
+
+
+def test_collisions_are_contacts_of_a_step() -> None:
+    ball = dojo.Body("ball", 1.0, shape=dojo.Sphere(0.1))
+    box = dojo.Body("box", 1.0, shape=dojo.Box(0.2, 0.2, 0.2))
+    mech = dojo.Mechanism(
+        [ball, box],
+        [dojo.Joint("floating", None, "ball"), dojo.Joint("floating", None, "box")],
+        collisions=[dojo.Collision("ball", "box"), dojo.Collision("box", shape_b=dojo.HalfSpace(), friction=0.0)],
+    )
+    text = dojo.Simulator(mech, time_step=0.01).describe()
+    assert "sphere on ball, box on box: 1 point, law nonlinear, friction 0.5" in text
+    assert "box on box, halfspace of the world: 8 points, law impact, friction 0" in text
+    assert "1 cones, 0 pyramids, 8 without friction" in text
+    assert "interior point" in text and "left out" in text and "Newton" not in text
+    assert "\ncontacts\n" not in text
+
+
+def test_a_pendulum_has_no_empty_lists_and_one_of_each() -> None:
+    text = dojo.Simulator(dojo.models.pendulum(), time_step=0.01).describe()
+    assert "1 body, 1 degree of freedom" in text
+    assert "\ncontacts\n" not in text and "\ncollisions\n" not in text
+
+
+def test_a_body_that_turns_too_far_is_named() -> None:
+    sim = dojo.Simulator(dojo.models.block(), time_step=0.1)
+    x = sim.neutral()
+    x[2], x[-1] = 3.0, 100.0
+    assert "The fastest is 'block', with 100 rad/s before the step." in sim.rollout(x, np.zeros((3, 3))).message

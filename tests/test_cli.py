@@ -1,0 +1,128 @@
+"""The command line: what it says, what it writes, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import HOME
+from urdf_files import branched
+
+import dojo_opt as dojo
+from dojo_opt import cli
+from dojo_opt.report.result import Report, Row
+
+
+@pytest.mark.parametrize("command", [[], ["run"], ["report"], ["models"], ["show"], ["warmup"]])
+def test_help_is_no_error(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main([*command, "--help"])
+    assert stop.value.code == 0
+    assert "usage: dojo-opt" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", [[], ["rum"], ["report", "nothing"], ["run"]])
+def test_a_command_that_cannot_be_read_exits_with_2(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(command)
+    assert stop.value.code == 2
+    capsys.readouterr()
+
+
+def test_an_unknown_problem_exits_with_2_and_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "hopp"]) == 2
+    assert "hop" in capsys.readouterr().err
+
+
+def test_every_problem_can_be_run_from_the_command_line() -> None:
+    assert set(cli.PROBLEMS) == set(dojo.problems.__all__) - {"follow"}  # which takes a gait
+    assert set(cli.GAITS) <= set(cli.PROBLEMS)
+
+
+def test_arguments_of_a_problem_are_literals_or_words() -> None:
+    parsed = cli._arguments(["goal=up", "target=(0.5, 0.5)", "horizon=10"])
+    assert parsed == {"goal": "up", "target": (0.5, 0.5), "horizon": 10}
+    with pytest.raises(ValueError, match="expected KEY=VALUE, got 'goal'"):
+        cli._arguments(["goal"])
+
+
+def test_models_lists_every_model_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["models", "--json"]) == 0
+    names = {row["name"] for row in json.loads(capsys.readouterr().out)}
+    assert names == set(dojo.models.__all__)
+
+
+def test_run_writes_plan_figure_and_animation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    figure, page = tmp_path / "block.png", tmp_path / "block.html"
+    command = ["run", "block", "--set", "goal=right", "--json", "--out", str(figure), "--html", str(page)]
+    assert cli.main(command) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["success"] is True
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert page.read_text().count("MeshCat.Viewer") == 1
+
+
+def test_a_missed_bar_exits_with_1_only_when_strict(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = Report(
+        "title", "command", [Row("fast", np.float64(1.0), "us", 2.0), Row("slow", np.float64(3.0), "us", 2.0)]
+    )
+    monkeypatch.setattr(cli, "run_report", lambda name, **_: report)
+    assert cli.main(["report", "timing", "--out", str(tmp_path)]) == 0
+    assert "NO" in capsys.readouterr().out
+    assert cli.main(["report", "timing", "--strict", "--json"]) == 1
+    numbers = json.loads((tmp_path / "report.json").read_text())
+    assert numbers["command"] == "dojo-opt report timing"
+    assert numbers["studies"]["timing"]["rows"][1]["met"] is False
+    capsys.readouterr()
+
+
+def test_the_module_runs_as_a_program() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "dojo_opt", "--version"],
+        env={**os.environ, "PYTHONPATH": str(HOME)},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout.split()[0]) == (0, "dojo-opt")
+
+
+@pytest.mark.parametrize("flag", [["--perturb", "payload=1"], ["--seconds", "2"]])
+def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "hop", *flag]) == 2
+    assert "are for closed loops (hopper_mpc, quadruped_mpc), and hop is a plan" in capsys.readouterr().err
+
+
+def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    figure, page = tmp_path / "fall.png", tmp_path / "fall.html"
+    command = ["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--out", str(figure), "--html", str(page)]
+    assert cli.main(command) == 0
+    text = capsys.readouterr().out
+    assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "let go for 0.1 s" in text
+    assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
+
+
+def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = branched(tmp_path)
+    assert cli.main(["show", str(path), "--seconds", "0.05", "--drop", "0.2"]) == 0
+    text = capsys.readouterr().out
+    assert "shoulder" in text and "robot.urdf: 7 links" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["quadrupet"], "'quadrupet' is neither a .urdf nor an .xml file, nor a model; did you mean 'quadruped'?"),
+        (["nowhere.urdf"], "nowhere.urdf"),
+        (["pendulum", "--drop", "1"], "--drop is for a floating base, and 'joint_0' is revolute"),
+    ],
+)
+def test_show_refuses_by_name(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", *arguments]) == 2
+    assert message in capsys.readouterr().err
