@@ -46,7 +46,7 @@ def cost() -> str:
     loss = np.ones((T + 1, sim.ndx))
     kinds = [k for k in KINDS if any(n.startswith(k) for n in every.names)]
     A = calls.linearize_one(x, u, None)[0]
-    columns = seconds(lambda: parameter_columns(calls, (x, u), A, plan))
+    columns = seconds(lambda: parameter_columns(calls, sim.mechanism, (x, u), A, plan))
     step = seconds(lambda: sim.rollout(x, us)) / T
     both = seconds(lambda: sim.linearize_rollout(x, us)) / T
     sweep = seconds(lambda: sim.vjp(t, loss)) / T

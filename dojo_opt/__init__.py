@@ -37,6 +37,7 @@ __all__ = [
     "Mechanism",
     "MjcfMechanism",
     "MjcfWarning",
+    "ParameterSpace",
     "Parameters",
     "Perturbation",
     "Plan",
@@ -96,6 +97,7 @@ _HOME: dict[str, str | None] = {
     "Mechanism": "sim.mechanism",
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
+    "ParameterSpace": "dojo_opt.parameter_space",
     "Parameters": "sim.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
@@ -140,6 +142,7 @@ if TYPE_CHECKING:
     from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
+    from dojo_opt.parameter_space import ParameterSpace
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
     from dojo_opt.plant.disturbances import Disturbances

@@ -17,6 +17,7 @@ from sim.elimination_panel import solve_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector, Work
 from sim.parameter_columns import clear_columns, fill_columns
+from sim.parameter_terrain import add_height_gradient
 from sim.rollout import Cube, Linearized, linearize
 from sim.rotation import left_jacobian
 from solvers.jit import kernel
@@ -44,6 +45,8 @@ class Sweep(NamedTuple):
     y: Vector  # (nv + nrow,) gradient by the residual of a step and by the gaps of its loops
     twists: Matrix  # (12, 6)
     below: Vector  # (nbody,)
+    places: Matrix  # (1, 3 nground) scratch
+    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) when not asked for
 
 
 @kernel
@@ -71,7 +74,7 @@ def sweep(
         linearize(model_at, work_at, settings, (0, 1), 1, one)
         if line.report[0, 0] != _SOLVED:
             return t
-        if line.parameters.shape[0] > 0:
+        if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
             at = At(settings[0], line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
             _add_parameters(model, work, at, line, terms, weights)
         for j in range(line.us.shape[1]):
@@ -137,6 +140,8 @@ def _add_parameters(model: Model, work: Work, at: At, line: Sweep, terms: Intege
     nv = w.shape[0]
     _velocity_gradient(model, work, at.h, costate, w)
     _residual_gradient(model, work, w, y)
+    if line.heights.shape[1] > 0:
+        add_height_gradient(model, work, at.h, y, line.places, line.heights)
     width = work.columns.shape[1]
     count = line.parameters.shape[0]
     first = 0

@@ -19,6 +19,8 @@ from sim import (
     pair_jacobian,
     pair_stiffness,
     pairs,
+    parameter_surface,
+    parameter_terrain,
     pyramid,
     restitution,
     restitution_gradient,
@@ -151,3 +153,14 @@ def bind_gradient(model: Model) -> None:
         _bind(model, (restitution_gradient.add_bounce_composites,))
         if len(model.pair_kind):
             _bind(model, (restitution_gradient.add_bounce_derivatives,))
+
+
+def bind_parameters(model: Model) -> None:
+    """What derivatives by parameters need beyond that."""
+    if np.any(model.contact_terrain):
+        _bind(model, (parameter_surface.add_surface_radius,))
+
+
+def bind_heights(model: Model) -> None:
+    """What gradients by the heights of a terrain need beyond that."""
+    _bind(model, (parameter_terrain.add_height_gradient,))

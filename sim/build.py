@@ -148,9 +148,11 @@ def height_fields(mech: Mechanism) -> dict[tuple[int, float], Terrain]:
 
 def _pack_terrain(mech: Mechanism, model: Model) -> None:
     fields = height_fields(mech)
+    known = {id(contact.terrain): contact.terrain for contact in mech.contacts if contact.terrain is not None}
     first = 0
-    for k, surface in enumerate(fields.values()):
+    for k, ((terrain, radius), surface) in enumerate(fields.items()):
         P = surface.coefficients
+        model.terrain_rates[first : first + P.size] = known[terrain].radius_rate(radius).ravel()
         model.terrain_size[k] = first, *P.shape
         model.terrain_heights[first : first + P.size] = P.ravel()
         model.terrain_place[k] = (

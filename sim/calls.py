@@ -59,9 +59,9 @@ class Calls(StateCalls):
                 self._bound.add(bind)
         return self._model
 
-    def tables(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Tables of the Model, bound for derivatives, and of the first Work of this thread."""
-        return self._table(bind_step, bind_gradient), self._scratch.table()
+    def tables(self, *needs: Callable[[Model], None]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Tables of the Model, bound for derivatives and what else a call needs, and of this thread's first Work."""
+        return self._table(bind_step, bind_gradient, *needs), self._scratch.table()
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """(number of solved steps, states, report of every step, contacts of every step)."""

@@ -15,7 +15,7 @@ from sim.border import whole
 from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 from sim.results import Linearization, Trajectory, error_of
 from sim.selection import select, with_values
-from sim.sensitivity import adjoint_sweep, parameter_columns
+from sim.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
@@ -80,23 +80,32 @@ class Derivatives(States):
         if _parameters(asked):
             self._check_order("Simulator.linearize(wrt=...)")
         found, plan = self._select("Simulator.linearize(wrt=...)", _parameters(asked))
-        J = parameter_columns(self._calls, (state, us), A, plan)
+        J = parameter_columns(self._calls, self.mechanism, (state, us), A, plan)
         blocks = {"state": A, "input": B}
         return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
 
     def linearize_rollout(
-        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None
+        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None, wrt: Sequence[str] = ()
     ) -> tuple[Floats, Linearization]:
         """States (T + 1, nx) of a rollout from x under us (T, nu), and its derivatives, in one pass.
 
-        As `rollout` and `linearize_trajectory`, but every step is solved once. An unsolved step raises SimulationError.
+        As `rollout` and `linearize_trajectory`, but every step is solved once. wrt: parameters, whose derivatives
+        (T, ndx, n) are then in `Linearization.parameters`, by name. An unsolved step raises SimulationError.
         """
         call = "linearize_rollout"
         state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, ("T", self.nu))
-        knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, self._border.kappa(call, kappa))
+        level = self._border.kappa(call, kappa)
+        blocks: Blocks = {}
+        if names := _parameters(_names(f"Simulator.{call}(wrt=...)", wrt)):
+            self._check_order(f"Simulator.{call}(wrt=...)")
+            found, plan = self._select(f"Simulator.{call}(wrt=...)", names)
+            knot, xs, A, B, J, reports = roll_parameters(self._calls, self.mechanism, state, inputs, plan, level)
+            blocks = {name: J[:, :, found.rows[name]] for name in names}
+        else:
+            knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, level)
         if knot < len(inputs):
             raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
-        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64))
+        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64), blocks)
 
     def linearize_trajectory(
         self,
@@ -166,7 +175,7 @@ class Derivatives(States):
         found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
         level = self._border.kappa("vjp", kappa)
-        knot, line = adjoint_sweep(self._calls, path, loss, plan, level)
+        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, level)
         if knot >= 0:
             raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
         blocks = {"state": line.costate[0], "input": line.inputs}
@@ -178,23 +187,25 @@ class Derivatives(States):
             kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
 
         A name without a component stands for all of them, one without a part for all parts; `kind:*` is a single one
-        that adds the same to all parts, at the mean of their values. Kinds (see sim/parameters.py for units):
+        that adds the same to all parts, at the mean of their values. Kinds (units: sim/parameter.py):
 
             mass, inertia, com          of bodies; a mass changes alone; com is a displacement from where it is, and
                                         joints, contacts and shapes stay where they are on the body
             parent_point, child_point   of joints, also of those that close loops
             orientation, axis           rotation vector of the joint frame, from where it is; direction
-            spring, damper, rest, armature, lower, upper, cone       of joints
+            spring, damper, rest, armature, lower, upper, cone       of joints; gear_ratio, gear_offset
+            input_force, input_torque   of a unit of an input on a body; gravity, time_step
             friction, restitution       of contacts and collisions
-            contact_point, contact_radius, contact_height, contact_normal
+            contact_point, contact_radius, contact_height, contact_normal; terrain, heights of its grid
             shape_a, shape_b            centres of the shapes of collisions in their bodies
-            gravity, time_step
+            size_a, size_b              their [radius], [length], [x], [y], [z]; of a polytope its [scale], 1 as it is;
+                                        a body's inertia is that of its own shape, and stays
         """
-        names = [p.name for p in self._known] if wrt is None else _names("Simulator.parameters(wrt)", wrt)
-        return self._select("Simulator.parameters(wrt)", tuple(names))[0]
+        call = "Simulator.parameters(wrt)"
+        return self._select(call, tuple(p.name for p in self._known) if wrt is None else _names(call, wrt))[0]
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
-        """The same simulator with other values of the named parameters, as in `parameters`; compiled code is shared."""
+        """The same with other values of parameters; a ValueError names what no body, joint or shape can have."""
         mech, time_step = with_values("Simulator.with_parameters(...)", self.mechanism, self.time_step, values)
         return self.replace(mechanism=mech, time_step=time_step)
 

@@ -32,8 +32,30 @@ class Effect(IntEnum):
     LOOP_PARENT = 18  # joint frame of a closing joint on its parent [loop, axis]
     LOOP_CHILD = 19  # its joint point on the child [loop, axis]
     LOOP_TURN = 20  # right rotation of its frame, as ORIENTATION [loop, axis]
-    RESTITUTION = 22  # [contact]
     SHAPE_SHIFT = 21  # of the shapes of a collision [pair of the first point; 3 side + axis of the body]
+    RESTITUTION = 22  # [contact]
+    GEAR_RATIO = 23  # [gear]
+    GEAR_OFFSET = 24  # [gear]
+    INPUT = 25  # force and torque per unit of an input on a body [input, which of the six]
+    SHAPE_SIZE = 26  # of the shapes of a collision [pair of the first point; SIDE side + Size]
+    TERRAIN = 27  # a height of the ground, of all in a row [height]: not in a list of terms, see terrain_heights.py
+
+
+class Size(IntEnum):
+    """How the surface of a shape moves where it is touched, per unit of one of its sizes; see parameter_sizes.py."""
+
+    BALL = 0  # radius around a point, a segment, or a polytope: along the normal
+    ROD = 1  # half length of a capsule: its ends
+    SIDE_X = 2  # half side of a box: corners, edges and faces, away from the middle
+    SIDE_Y = 3
+    SIDE_Z = 4
+    RIM = 5  # radius of a cylinder: away from the axis
+    LENGTH = 6  # half length of a cylinder: its ends
+    SCALE = 7  # of a polytope: away from the centre
+    STRING = 8  # length: the point stays, the gap grows
+
+
+SIDE = 16  # stride of the two shapes in the component of a SHAPE_SIZE
 
 
 class At(NamedTuple):

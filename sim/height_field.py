@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import floor
 
-from sim.model import Model
+from sim.model import Model, Vector
 from sim.rotation import Vec3
 from solvers.jit import kernel
 
@@ -44,6 +44,14 @@ def cell(s: float, count: int) -> tuple[int, float]:
 @kernel
 def height_field(model: Model, k: int, x: float, y: float) -> tuple[float, float, float, float, float, float]:
     """(F, F_x, F_y, F_xx, F_xy, F_yy) of field k at the place (x, y), world axes."""
+    return field_values(model, model.terrain_heights, k, x, y)
+
+
+@kernel
+def field_values(
+    model: Model, coefficients: Vector, k: int, x: float, y: float
+) -> tuple[float, float, float, float, float, float]:
+    """The same with other coefficients on its grid."""
     p = model.terrain_place[k]
     first, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
     C, S = p[0], p[1]
@@ -54,7 +62,7 @@ def height_field(model: Model, k: int, x: float, y: float) -> tuple[float, float
         row = first + ny * min(max(i + r, 0), nx - 1)
         q, qt, qtt = 0.0, 0.0, 0.0
         for c in range(4):
-            z = model.terrain_heights[row + min(max(j + c, 0), ny - 1)]
+            z = coefficients[row + min(max(j + c, 0), ny - 1)]
             w, dw, ddw = weight(c, b)
             q, qt, qtt = q + w * z, qt + dw * z, qtt + ddw * z
         w, dw, ddw = weight(r, a)

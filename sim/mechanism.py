@@ -159,14 +159,18 @@ class Mechanism:
 
         return added(self, other, pose, prefix, name or self.name)
 
-    def on(self, terrain: Terrain, contacts: Sequence[str] | None = None) -> Mechanism:
+    def on(
+        self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
+    ) -> Mechanism:
         """The same on other ground, under all contacts or those named; it stands there as high as it touches.
 
-        Contacts keep their friction; what normal and height they had is replaced.
+        Contacts keep their friction; what normal and height they had is replaced. The shapes of `bodies` touch it too,
+        by balls and corners that are added as contacts (sim/shape_contacts.py); options: of these (friction, law,
+        restitution).
         """
         from sim.scene import on_terrain
 
-        return on_terrain(self, terrain, contacts)
+        return on_terrain(self, terrain, contacts, bodies, **options)
 
     def with_collisions(self, *collisions: Collision) -> Mechanism:
         """The same with more collisions."""

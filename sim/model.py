@@ -114,8 +114,11 @@ class Late(IntEnum):
     ALL_NEAR = 55
     # gears
     APPLY_GEARS = 56
-    # joints with two rotations, again
-    SWING_TURN = 57
+    # derivatives by the heights of a terrain, and by radii on it
+    HEIGHT_GRADIENT = 57
+    RADIUS_ON_TERRAIN = 58
+    # joints with two rotations, over an interval
+    SWING_TURN = 59
 
 
 class Model(NamedTuple):
@@ -169,6 +172,7 @@ class Model(NamedTuple):
     contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
     terrain_place: Matrix  # (nterrain, 8) see height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
+    terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
     cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
     pair_far: Matrix  # (npair, 7) what says that a collision is far (pair_far.py), at its first pair
@@ -251,7 +255,7 @@ class Work(NamedTuple):
     contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 16) see restitution.py
+    bounce: Matrix  # (ncontact, 22) see restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same

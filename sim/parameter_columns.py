@@ -21,13 +21,17 @@ from sim.parameter_effects import (
     add_bound,
     add_gravity,
     add_inertia,
+    add_input,
     add_mass,
     add_rest,
     add_spring,
     add_time_step,
 )
-from sim.parameter_geometry import add_geometry, add_loop_geometry, add_loop_turn
+from sim.parameter_geometry import add_geometry
+from sim.parameter_loops import add_gear_offset, add_gear_ratio, add_loop_geometry, add_loop_turn
 from sim.parameter_pairs import add_shapes_shift
+from sim.parameter_sizes import add_shapes_size
+from sim.parameter_surface import add_surface_radius
 from solvers.jit import kernel
 
 _MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
@@ -37,7 +41,9 @@ _REST, _BOUND, _FRICTION, _POINT = int(Effect.REST), int(Effect.BOUND), int(Effe
 _HEIGHT, _NORMAL, _GRAVITY = int(Effect.HEIGHT), int(Effect.NORMAL), int(Effect.GRAVITY)
 _TIME_STEP, _LOOP_PARENT, _LOOP_CHILD = int(Effect.TIME_STEP), int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
 _LOOP_TURN, _SHAPE_SHIFT = int(Effect.LOOP_TURN), int(Effect.SHAPE_SHIFT)
-_RADIUS, _RESTITUTION = int(Effect.RADIUS), int(Effect.RESTITUTION)
+_RADIUS, _RESTITUTION, _INPUT = int(Effect.RADIUS), int(Effect.RESTITUTION), int(Effect.INPUT)
+_GEAR_RATIO, _GEAR_OFFSET = int(Effect.GEAR_RATIO), int(Effect.GEAR_OFFSET)
+_SHAPE_SIZE = int(Effect.SHAPE_SIZE)
 
 
 @kernel
@@ -59,29 +65,51 @@ def add_term(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: f
         add_rest(model, work, at, i, k, w, col)
     elif effect == _BOUND:
         add_bound(model, work, i, w, col)
-    elif effect == _FRICTION:
+    elif effect == _GRAVITY:
+        add_gravity(model, work, at.h, k, w, col)
+    elif effect == _INPUT:
+        add_input(model, work, at, i, k, w, col)
+    elif effect == _TIME_STEP:
+        add_time_step(model, work, at, w, col)
+        add_slips_time_step(model, work, at.h, w, col)
+    else:
+        add_contact_term(model, work, at.h, effect, i, k, w, col)
+        add_coupled_term(model, work, at.h, effect, i, k, w, col)
+
+
+@kernel
+def add_contact_term(model: Model, work: Work, h: float, effect: int, i: int, k: int, w: float, col: int) -> None:
+    """`add_term` of effects on contacts, those of pairs among them."""
+    if effect == _FRICTION:
         add_friction(model, work, i, w, col)
     elif effect == _RESTITUTION:
         add_restitution(model, work, i, w, col)
     elif effect == _POINT:
-        add_point(model, work, at.h, i, k, w, col)
+        add_point(model, work, h, i, k, w, col)
     elif effect == _RADIUS:
-        add_radius(model, work, at.h, i, w, col)
+        add_radius(model, work, h, i, w, col)
+        add_surface_radius(model, work, h, i, w, col)
     elif effect == _HEIGHT:
         add_height(model, work, i, w, col)
     elif effect == _NORMAL:
-        add_normal(model, work, at.h, i, k, w, col)
-    elif effect == _GRAVITY:
-        add_gravity(model, work, at.h, k, w, col)
-    elif effect == _TIME_STEP:
-        add_time_step(model, work, at, w, col)
-        add_slips_time_step(model, work, at.h, w, col)
+        add_normal(model, work, h, i, k, w, col)
+
+
+@kernel
+def add_coupled_term(model: Model, work: Work, h: float, effect: int, i: int, k: int, w: float, col: int) -> None:
+    """`add_term` of effects on what couples branches: shapes of collisions, loops, gears."""
+    if effect == _SHAPE_SHIFT:
+        add_shapes_shift(model, work, h, i, k, w, col)
+    elif effect == _SHAPE_SIZE:
+        add_shapes_size(model, work, h, i, k, w, col)
     elif effect == _LOOP_PARENT or effect == _LOOP_CHILD:
         add_loop_geometry(model, work, effect, i, k, w, col)
     elif effect == _LOOP_TURN:
         add_loop_turn(model, work, i, k, w, col)
-    elif effect == _SHAPE_SHIFT:
-        add_shapes_shift(model, work, at, i, k, w, col)
+    elif effect == _GEAR_RATIO:
+        add_gear_ratio(model, work, i, w, col)
+    elif effect == _GEAR_OFFSET:
+        add_gear_offset(model, work, i, w, col)
 
 
 @kernel

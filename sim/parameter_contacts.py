@@ -6,11 +6,14 @@ made of; f = n gamma + T^T beta acts on the body, so dR_d = -S2_d.(df, (d2 + r) 
 
 from __future__ import annotations
 
+from sim.collision.witness import dot
 from sim.friction import contact_impulse, law_of
-from sim.model import Law, Matrix, Model, Vector, Work
+from sim.model import Law, Model, Vector, Work
+from sim.pair_stiffness import unit_vector
 from sim.pairs import is_absent, pair_arm, pair_force
 from sim.parameter_effects import add_wrench, moment
 from sim.rotation import Vec3, cross, rotate
+from sim.terrain_contact import centre
 from solvers.jit import kernel
 
 _NONLINEAR, _LINEAR = int(Law.NONLINEAR), int(Law.LINEAR)
@@ -152,7 +155,7 @@ def add_point(model: Model, work: Work, h: float, c: int, k: int, w: float, col:
         return
     i = model.contact_body[c]
     F, kin = work.contact_frame[c], work.contact_kin[c]
-    x, y, z = 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
+    x, y, z = unit_vector(k)
     e = rotate(work.rot3, i, x, y, z)
     b = work.bounce[c]
     gap = _along(kin, 18, e)
@@ -178,13 +181,13 @@ def add_point(model: Model, work: Work, h: float, c: int, k: int, w: float, col:
 
 @kernel
 def add_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -> None:
-    """dr = -n    gap n.dr = -1    slip T (omega x dr)"""
+    """dr = -n    gap n.dr = -1    slip T (omega x dr);  on terrain the gap is left to parameter_surface.py"""
     if not is_near(work, c):
         return
     F = work.contact_frame[c]
     dr = (-F[0], -F[1], -F[2])
     v = turning(work, h, model.contact_body[c], dr)
-    gap = -1.0 - floor_change(work, c, -1.0, -1.0)
+    gap = 0.0 if model.contact_terrain[c] > 0 else -1.0 - floor_change(work, c, -1.0, -1.0)
     p = impulse_change(work, c, gap, _along(F, 3, v), _along(F, 6, v))
     add_ground(model, work, c, ground_force(work, c, p), dr, w, col)
 
@@ -202,34 +205,30 @@ def add_height(model: Model, work: Work, c: int, w: float, col: int) -> None:
 
 
 @kernel
-def _centre_along(model: Model, pos: Matrix, rot: Matrix, c: int, n: Vec3) -> float:
-    """n.(x + R p) of contact c."""
-    i = model.contact_body[c]
-    p = model.contact_point[c]
-    x, y, z = rotate(rot, i, p[0], p[1], p[2])
-    return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z)
+def add_normal(model: Model, work: Work, h: float, c: int, k: int, w: float, col: int) -> None:
+    """The half-space of contact c turns by e_k about the origin:  gap dn.(x3 + R3 p)"""
+    if is_near(work, c):
+        F = work.contact_frame[c]
+        e = unit_vector(k)
+        n = cross(e[0], e[1], e[2], F[0], F[1], F[2])
+        gap = dot(n, centre(model, c, work.pos3, work.rot3))
+        before = dot(n, centre(model, c, work.pos1, work.rot1)), dot(n, centre(model, c, work.pos2, work.rot2))
+        add_turn(model, work, h, c, e, gap - floor_change(work, c, before[0], before[1]), w, col)
 
 
 @kernel
-def add_normal(model: Model, work: Work, h: float, c: int, k: int, w: float, col: int) -> None:
-    """The half-space of contact c turns by e = e_k about the origin:
+def add_turn(model: Model, work: Work, h: float, c: int, e: Vec3, gap: float, w: float, col: int) -> None:
+    """The frame of contact c turns by e, and its gap grows by `gap`:
 
-    dn = e x n, dt = e x t, dr = -radius dn    gap dn.(x3 + R3 p)    slip dt.u + t.(omega x dr)    df = F^T W d + e x f
+    dn = e x n, dt = e x t, dr = -radius dn    slip dt.u + t.(omega x dr)    df = F^T W d + e x f
     """
-    if not is_near(work, c):
-        return
     i = model.contact_body[c]
     F = work.contact_frame[c]
     kin = work.contact_kin[c]
-    e = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
     n = cross(e[0], e[1], e[2], F[0], F[1], F[2])
     rho = model.contact_radius[c]
     dr = (-rho * n[0], -rho * n[1], -rho * n[2])
     p, q = work.pos3[i], work.pos2[i]
-    gap = n[0] * (p[0] + kin[6]) + n[1] * (p[1] + kin[7]) + n[2] * (p[2] + kin[8])
-    gap -= floor_change(
-        work, c, _centre_along(model, work.pos1, work.rot1, c, n), _centre_along(model, work.pos2, work.rot2, c, n)
-    )
     u = turning(work, h, i, (kin[3], kin[4], kin[5]))
     u = (u[0] + (p[0] - q[0]) / h, u[1] + (p[1] - q[1]) / h, u[2] + (p[2] - q[2]) / h)
     eu = cross(u[0], u[1], u[2], e[0], e[1], e[2])  # (e x t).u = t.(u x e)

@@ -11,6 +11,7 @@ from math import cos, sin
 from sim.ball_spring import spring_turns
 from sim.effects import At
 from sim.model import InputKind, Model, Vector, Work
+from sim.pair_stiffness import unit_vector
 from sim.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from solvers.jit import kernel
 
@@ -92,9 +93,10 @@ def add_inertia(model: Model, work: Work, h: float, i: int, e: int, w: float, co
 @kernel
 def add_gravity(model: Model, work: Work, h: float, k: int, w: float, col: int) -> None:
     """f = -h m e_k on every body"""
+    e = unit_vector(k)
     for i in range(model.body_parent.shape[0]):
         m = -h * model.body_mass[i]
-        f = (m if k == 0 else 0.0, m if k == 1 else 0.0, m if k == 2 else 0.0)
+        f = (m * e[0], m * e[1], m * e[2])
         add_wrench(model, work, i, f, moment(work, i, f, (0.0, 0.0, 0.0)), w, col)
 
 
@@ -197,6 +199,19 @@ def _input_wrench(model: Model, work: Work, j: int, u: Vector) -> tuple[Vec3, Ve
         return f, t
     i = model.input_index[j]
     return rotate(work.rot2, i, f[0], f[1], f[2]), rotate(work.rot2, i, t[0], t[1], t[2])
+
+
+@kernel
+def add_input(model: Model, work: Work, at: At, j: int, k: int, w: float, col: int) -> None:
+    """f = -h u e_k (k < 3), t = -h u e_k-3, of an input on a body"""
+    g = -at.h * at.u[j]
+    e = unit_vector(k % 3)
+    i = model.input_index[j]
+    if model.input_kind[j] != _WORLD:
+        e = rotate(work.rot2, i, e[0], e[1], e[2])
+    e = (g * e[0], g * e[1], g * e[2])
+    f, t = (e, (0.0, 0.0, 0.0)) if k < 3 else ((0.0, 0.0, 0.0), e)
+    add_wrench(model, work, i, f, moment(work, i, f, t), w, col)
 
 
 @kernel

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from sim.effects import At
+from sim.collision.witness import dot
 from sim.friction import contact_impulse
-from sim.model import Model, Work
+from sim.model import Model, Vector, Work
+from sim.pair_stiffness import unit_vector
 from sim.pairs import is_absent, pair_force
 from sim.parameter_contacts import add_pair, floor_change, impulse_change, is_near, turning
 from sim.rotation import Vec3, cross, rotate
@@ -12,56 +13,44 @@ from solvers.jit import kernel
 
 
 @kernel
-def _row_times(M: Vec3, v: Vec3) -> float:
-    return M[0] * v[0] + M[1] * v[1] + M[2] * v[2]
+def row(X: Vector, first: int) -> Vec3:
+    """Three numbers of a vector."""
+    return X[first], X[first + 1], X[first + 2]
 
 
 @kernel
-def shape_floor(work: Work, c: int, i: int, k: int) -> float:
-    """Change of the floor that an impact raises when the shape of a (k < 3) or b on body i moves."""
-    r = k % 3
-    e = (1.0 if r == 0 else 0.0, 1.0 if r == 1 else 0.0, 1.0 if r == 2 else 0.0)
-    e1 = rotate(work.rot1, i, e[0], e[1], e[2]) if i >= 0 else e
-    e2 = rotate(work.rot2, i, e[0], e[1], e[2]) if i >= 0 else e
+def pair_floor(work: Work, c: int, side: int, e1: Vec3, e2: Vec3) -> float:
+    """Change of the floor that an impact raises when the shape of a (0) or b (1) is moved by e1, e2 at 1 and 2."""
     b = work.bounce[c]
-    d = floor_change(work, c, _row_times((b[2], b[3], b[4]), e1), _row_times((b[8], b[9], b[10]), e2))
-    return d if k < 3 else -d
+    d = floor_change(work, c, dot(row(b, 2), e1), dot(row(b, 8), e2))
+    return d if side == 0 else -d
 
 
 @kernel
-def add_shape_shift(model: Model, work: Work, at: At, j: int, k: int, w: float, col: int) -> None:
-    """The shape of a (k < 3) or b of pair j moves by e along an axis of its body; a relative to b:
+def add_moved_shape(
+    model: Model, work: Work, h: float, j: int, side: int, e: Vec3, floor: float, w: float, col: int
+) -> None:
+    """The shape of a (side 0) or b (1) of pair j moves by e, the floor of an impact rises by `floor`; a relative to b:
 
-    frame turns by Omega e, the point moves by M e, gap n.e       slip as in pair_jacobian
+    frame turns by Omega z, the point moves by M z, gap n.z       slip as in pair_jacobian
     """
-    c = model.contact_height.shape[0] + j
-    if is_absent(work, j) or not is_near(work, c):
-        return
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    i = a if k < 3 else b
-    r = k % 3
-    e = (1.0 if r == 0 else 0.0, 1.0 if r == 1 else 0.0, 1.0 if r == 2 else 0.0)
-    if i >= 0:
-        e = rotate(work.rot3, i, e[0], e[1], e[2])
-    z = e if k < 3 else (-e[0], -e[1], -e[2])  # of a relative to b
+    c = model.contact_height.shape[0] + j
+    z = e if side == 0 else (-e[0], -e[1], -e[2])
     Omega, M, F = work.pair_turn[j], work.pair_shift[j], work.pair_frame[j]
-    turn = (_row_times((Omega[0], Omega[1], Omega[2]), z), _row_times((Omega[6], Omega[7], Omega[8]), z),
-            _row_times((Omega[12], Omega[13], Omega[14]), z))  # fmt: skip
-    dp = (_row_times((M[0], M[1], M[2]), z), _row_times((M[6], M[7], M[8]), z),
-          _row_times((M[12], M[13], M[14]), z))  # fmt: skip
-    if k >= 3:
+    turn = (dot(row(Omega, 0), z), dot(row(Omega, 6), z), dot(row(Omega, 12), z))
+    dp = (dot(row(M, 0), z), dot(row(M, 6), z), dot(row(M, 12), z))
+    if side == 1:
         dp = (dp[0] + e[0], dp[1] + e[1], dp[2] + e[2])
-    p = (F[9], F[10], F[11])
-    u = _relative_velocity(work, at.h, a, b, p)
-    v = turning(work, at.h, a, dp)
+    u = _relative_velocity(work, h, a, b, row(F, 9))
+    v = turning(work, h, a, dp)
     if b >= 0:
-        t = turning(work, at.h, b, dp)
+        t = turning(work, h, b, dp)
         v = (v[0] - t[0], v[1] - t[1], v[2] - t[2])
     x = cross(u[0], u[1], u[2], turn[0], turn[1], turn[2])
     v = (v[0] + x[0], v[1] + x[1], v[2] + x[2])
-    gap = _row_times((F[0], F[1], F[2]), z) - shape_floor(work, c, i, k)
-    g = impulse_change(work, c, gap, _row_times((F[3], F[4], F[5]), v), _row_times((F[6], F[7], F[8]), v))
+    g = impulse_change(work, c, dot(row(F, 0), z) - floor, dot(row(F, 3), v), dot(row(F, 6), v))
     df = pair_force(work, j, g[0], g[1], g[2])
     q = contact_impulse(model, work, c)
     f = pair_force(work, j, q[0], q[1], q[2])
@@ -87,9 +76,24 @@ def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
 
 
 @kernel
-def add_shapes_shift(model: Model, work: Work, at: At, first: int, k: int, w: float, col: int) -> None:
-    """`add_shape_shift` for all points of the collision whose first pair this is."""
+def is_felt(model: Model, work: Work, j: int) -> bool:
+    """Whether pair j had a part in the step."""
+    return not is_absent(work, j) and is_near(work, model.contact_height.shape[0] + j)
+
+
+@kernel
+def add_shapes_shift(model: Model, work: Work, h: float, first: int, k: int, w: float, col: int) -> None:
+    """The shape of a (k < 3) or b of the collision whose first pair this is moves along axis k % 3 of its body."""
+    side, e = k // 3, unit_vector(k % 3)
+    i = model.coupling_body[model.pair_coupling[first], side]
+    e1, e2, e3 = e, e, e
+    if i >= 0:
+        e1 = rotate(work.rot1, i, e[0], e[1], e[2])
+        e2 = rotate(work.rot2, i, e[0], e[1], e[2])
+        e3 = rotate(work.rot3, i, e[0], e[1], e[2])
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        add_shape_shift(model, work, at, j, k, w, col)
+        if is_felt(model, work, j):
+            floor = pair_floor(work, model.contact_height.shape[0] + j, side, e1, e2)
+            add_moved_shape(model, work, h, j, side, e3, floor, w, col)
         j += 1

@@ -19,7 +19,7 @@ example). Where the impulses of a step did work in all,
 its restitutions are halved, all of them, and it is solved again: without restitution they never do.
 
 Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
-of 2, 14 phi1, 15 phi2. Derivatives: restitution_gradient.py.
+of 2, 14 phi1, 15 phi2, of pairs 16:19 the contact point at 1, 19:22 at 2. Derivatives: restitution_gradient.py.
 
 Scenes without restitution do not compile these kernels.
 """
@@ -72,6 +72,8 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             o = work.origin
             row[0], row[1], row[2] = F[0], F[1], F[2]
             row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], F[0], F[1], F[2])
+            for r in range(3):
+                b[16 + r if first else 19 + r] = F[9 + r]
             if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
                 b[14 if first else 15] = -_NEVER if first else _NEVER
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -122,6 +123,7 @@ class Linearization:
     B: Floats  # (T, ndx, nu)
     x_next: Floats  # (T, nx)
     status: Integers  # (T,) Status of each knot; what belongs to an unsolved knot is zero
+    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from sim import checks
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
+from sim.shape_contacts import shape_contacts
 from sim.shapes import Solid, Sphere, rotation_matrix
 from sim.terrain import Terrain
 from sim.urdf.stance import poses
@@ -154,7 +155,9 @@ def with_collisions(mech: Mechanism, collisions: Iterable[Collision]) -> Mechani
     return replace(mech, collisions=[*mech.collisions, *collisions])
 
 
-def on_terrain(mech: Mechanism, terrain: Terrain, contacts: Sequence[str] | None) -> Mechanism:
+def on_terrain(
+    mech: Mechanism, terrain: Terrain, contacts: Sequence[str] | None, bodies: Sequence[str], **options: Any
+) -> Mechanism:
     """See `Mechanism.on`."""
     call = "Mechanism.on"
     if not isinstance(terrain, Terrain):
@@ -162,9 +165,15 @@ def on_terrain(mech: Mechanism, terrain: Terrain, contacts: Sequence[str] | None
     names = [c.name for c in mech.contacts]
     for name in contacts or ():
         checks.one_of(f"{call}(contacts=...)", name, names)
+    for name in bodies:
+        checks.one_of(f"{call}(bodies=...)", name, mech.body_names)
+    if options and not bodies:
+        raise ValueError(f"{call}({', '.join(options)}=...): of the contacts of bodies=[...]; none are given")
+    shaped = [c for b in mech.bodies if b.name in bodies for c in shape_contacts(f"{call}(bodies=...)", b, **options)]
     level: Any = {"normal": (0.0, 0.0, 1.0), "height": 0.0, "terrain": terrain}
-    chosen = names if contacts is None else contacts
-    moved = replace(mech, contacts=[replace(c, **level) if c.name in chosen else c for c in mech.contacts])
+    chosen = [*(names if contacts is None else contacts), *(c.name for c in shaped)]
+    found = [*mech.contacts, *shaped]
+    moved = replace(mech, contacts=[replace(c, **level) if c.name in chosen else c for c in found])
     return replace(moved, neutral=_standing(moved))
 
 

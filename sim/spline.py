@@ -5,6 +5,8 @@ Compiled code reads the same coefficients in height_field.py.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,6 +19,12 @@ def spline_coefficients(heights: ArrayLike) -> Floats:
     for _ in range(2):
         out = np.linalg.solve(_collocation(len(out)), np.concatenate([out, np.zeros((2, out.shape[1]))])).T
     return np.ascontiguousarray(out)
+
+
+def spline_gradient(rows: Floats) -> Floats:
+    """(n, nx, ny) gradients by the heights, from those by the coefficients (n, nx + 2, ny + 2)."""
+    across, along = (np.linalg.inv(_collocation(n - 2))[:, : n - 2] for n in rows.shape[1:])
+    return np.asarray(across.T @ rows @ along)
 
 
 def _collocation(n: int) -> Floats:
@@ -40,6 +48,18 @@ def spline(coefficients: Floats, s: Floats, t: Floats) -> tuple[Floats, Floats, 
     c = coefficients[rows[..., :, None], columns[..., None, :]]
     pick = "...i,...ij,...j->..."
     return np.einsum(pick, bs, c, bt), np.einsum(pick, ds, c, bt), np.einsum(pick, bs, c, dt)
+
+
+def spline_shares(shape: tuple[int, ...], s: Floats, t: Floats) -> Any:
+    """(number of points, nx ny) shares of the coefficients, `shape` (nx, ny), in F at grid coordinates; sparse."""
+    from scipy.sparse import csr_array
+
+    bs, _, rows = _basis(s.ravel(), shape[0])
+    bt, _, columns = _basis(t.ravel(), shape[1])
+    index = rows[:, :, None] * shape[1] + columns[:, None, :]
+    points = np.broadcast_to(np.arange(len(index))[:, None, None], index.shape)
+    weights = bs[:, :, None] * bt[:, None, :]
+    return csr_array((weights.ravel(), (points.ravel(), index.ravel())), shape=(len(index), shape[0] * shape[1]))
 
 
 def _basis(s: Floats, count: int) -> tuple[Floats, Floats, NDArray[np.int64]]:

@@ -5,7 +5,7 @@ of a ball cannot sink below, the surface at its radius, is a height field too,
 
     F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2),
 
-and is computed here, once for every radius: kernels then know points only.
+and is computed once for every radius (ball_surface.py): kernels then know points only.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.spline import spline, spline_coefficients
+from sim.ball_surface import raised
+from sim.spline import spline, spline_coefficients, spline_gradient, spline_shares
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,14 @@ class Terrain:
     spacing    (dx, dy) of the grid [m]
     direction  (x, y) of the first grid axis in the plane
     plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
+    name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
+
+    Derivatives by what the heights are made of follow from those by the heights. Of a loss L, by the rises of stairs:
+
+        by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
+        by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]
+
+    A slope is a half-space: its parameters are contact_normal and contact_height, of all contacts "contact_normal:*".
     """
 
     heights: ArrayLike = ((0.0,),)
@@ -43,6 +52,7 @@ class Terrain:
     spacing: ArrayLike = (1.0, 1.0)
     direction: ArrayLike = (1.0, 0.0)
     plane: tuple[Any, float] | None = None
+    name: str = "ground"
     coefficients: Floats = field(init=False, repr=False)  # (nx + 2, ny + 2) of the spline
 
     def __post_init__(self) -> None:
@@ -50,6 +60,7 @@ class Terrain:
         if heights.size == 0:
             raise ValueError(f"Terrain(heights=...): expected one height at least, got shape {heights.shape}")
         heights.flags.writeable = False
+        object.__setattr__(self, "name", checks.name("Terrain(name=...)", self.name))
         object.__setattr__(self, "heights", heights)
         object.__setattr__(self, "origin", checks.vector("Terrain(origin=...)", self.origin, 2))
         spacing = checks.vector("Terrain(spacing=...)", self.spacing, 2)
@@ -143,23 +154,58 @@ class Terrain:
 
     def offset(self, radius: float) -> Terrain:
         """The surface that the centre of a ball of this radius cannot sink below, over a grid that is as much wider."""
-        if radius == 0.0 or self.plane is not None:
-            return self
-        spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
-        pads = [0 if n == 1 else int(np.ceil(radius / d)) + _MARGIN for n, d in zip(self.shape, spacing, strict=True)]
-        lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
-        heights = _raised(self.coefficients, spacing, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1), radius)
-        x, y = (-p * d for p, d in zip(pads, spacing, strict=True))
-        start = np.asarray(self.origin) + x * direction + y * np.array([-direction[1], direction[0]])
-        return Terrain(heights, start, spacing, direction)
+        return self._offset(radius)[0]
 
     def surface(self, radius: float) -> Terrain:
         """`offset`, computed once per radius."""
+        return self._kept(radius)[0]
+
+    def height_gradient(self, radius: float, rows: Floats) -> Floats:
+        """(n, nx, ny) gradients by the heights, from those by the coefficients of the surface at this radius.
+
+        rows: (n, ncoefficient).  The surface at a height of its grid is as high as the ground where the ball touches.
+        """
+        surface, touched = self._kept(radius)
+        gradient = rows.reshape(len(rows), *surface.coefficients.shape)
+        if touched is not None:
+            kept = self.__dict__.setdefault("_shares", {})
+            if radius not in kept:
+                kept[radius] = spline_shares(self.coefficients.shape, touched[..., 0], touched[..., 1])
+            gradient = spline_gradient(gradient).reshape(len(rows), -1) @ kept[radius]
+            gradient = gradient.reshape(-1, *self.coefficients.shape)
+        return spline_gradient(gradient)
+
+    def radius_rate(self, radius: float) -> Floats:
+        """d(coefficients of `surface`)/d(radius), whose values are sqrt(1 + |grad|^2) of the ground that is touched."""
+        kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
+        if radius not in kept:
+            touched = self._kept(radius)[1]
+            if touched is None:
+                touched = np.stack(np.meshgrid(*(np.arange(float(n)) for n in self.shape), indexing="ij"), axis=-1)
+            _, fs, ft = spline(self.coefficients, touched[..., 0], touched[..., 1])
+            dx, dy = np.asarray(self.spacing)
+            kept[radius] = spline_coefficients(np.sqrt(1.0 + (fs / dx) ** 2 + (ft / dy) ** 2))
+        return kept[radius]
+
+    def _kept(self, radius: float) -> tuple[Terrain, Floats | None]:
         kept = self.__dict__.setdefault("_surfaces", {})
         if radius not in kept:
-            kept[radius] = self.offset(radius)
-        surface: Terrain = kept[radius]
-        return surface
+            kept[radius] = self._offset(radius)
+        found: tuple[Terrain, Floats | None] = kept[radius]
+        return found
+
+    def _offset(self, radius: float) -> tuple[Terrain, Floats | None]:
+        """The surface, and where balls over its grid touch, (..., 2) in our grid; None where it is ourselves."""
+        if radius == 0.0 or self.plane is not None:
+            return self, None
+        spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
+        pads = [0 if n == 1 else int(np.ceil(radius / d)) + _MARGIN for n, d in zip(self.shape, spacing, strict=True)]
+        lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
+        here = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+        heights, arm = raised(self.coefficients, spacing, here, radius)
+        x, y = (-p * d for p, d in zip(pads, spacing, strict=True))
+        start = np.asarray(self.origin) + x * direction + y * np.array([-direction[1], direction[0]])
+        return Terrain(heights, start, spacing, direction, name=self.name), (here + arm) / spacing
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -191,38 +237,3 @@ def _lines(call: str, given: ArrayLike) -> Floats:
     if not np.allclose(np.diff(lines), lines[-1] - lines[-2] if len(lines) > 1 else 0.0, rtol=1e-6, atol=0.0):
         raise ValueError(f"{call}: expected equally spaced grid lines, as of np.linspace")
     return lines
-
-
-def _raised(coefficients: Floats, spacing: Floats, here: Floats, radius: float) -> Floats:
-    """Heights of the surface at a distance: the highest that a ball over every place here (..., 2) comes to lie.
-
-    The best of 97 directions from the centre to the ground, then steps to where that direction is the normal.
-    """
-
-    def reach(arm: Floats) -> tuple[Floats, Floats, Floats]:
-        """Height of a ball that touches the ground `arm` away from below its centre, gradient there, and its rise."""
-        at = (here + arm) / spacing
-        f, fs, ft = spline(coefficients, at[..., 0], at[..., 1])
-        rise = np.sqrt(np.maximum(radius**2 - np.sum(arm**2, axis=-1), 0.0))
-        return f + rise, np.stack([fs, ft], axis=-1) / spacing, rise
-
-    best, arm = reach(np.zeros_like(here))[0], np.zeros_like(here)
-    for tilt in np.linspace(0.15, 1.5, 8):
-        for turn in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False):
-            other = np.broadcast_to(radius * np.sin(tilt) * np.array([np.cos(turn), np.sin(turn)]), here.shape)
-            value = reach(other)[0]
-            better = value > best
-            best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
-    share = np.ones(best.shape)
-    for _ in range(100):
-        slope = reach(arm)[1]
-        goal = radius * slope / np.sqrt(1.0 + np.sum(slope**2, axis=-1, keepdims=True))
-        other = arm + share[..., None] * (goal - arm)
-        value = reach(other)[0]
-        better = value >= best
-        gain = float(np.max(value - best))
-        best, arm = np.where(better, value, best), np.where(better[..., None], other, arm)
-        share = np.where(better, np.minimum(1.0, 1.5 * share), 0.5 * share)
-        if gain < 1e-14:
-            break
-    return best

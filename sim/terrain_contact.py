@@ -34,19 +34,18 @@ def upright_frame(x: float, y: float, z: float, out: Vector) -> None:
 
 
 @kernel
-def centre(model: Model, work: Work, c: int, third: bool) -> Vec3:
-    """Centre of the ball of contact c at configuration 3 or 2, world axes."""
+def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
+    """Centre of the ball of contact c, world axes, at the poses pos (nbody, 3), rot (nbody, 9) of bodies."""
     i = model.contact_body[c]
     p = model.contact_point[c]
-    pos = work.pos3 if third else work.pos2
-    x, y, z = rotate(work.rot3 if third else work.rot2, i, p[0], p[1], p[2])
+    x, y, z = rotate(rot, i, p[0], p[1], p[2])
     return x + pos[i, 0], y + pos[i, 1], z + pos[i, 2]
 
 
 @late(Late.TERRAIN_PLACE)
 def place_on_terrain(model: Model, work: Work, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
-    x, y, z = centre(model, work, c, True)
+    x, y, z = centre(model, c, work.pos3, work.rot3)
     F, Fx, Fy, _xx, _xy, _yy = height_field(model, model.contact_terrain[c] - 1, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
     upright_frame(-i * Fx, -i * Fy, i, work.contact_frame[c])
@@ -57,7 +56,7 @@ def place_on_terrain(model: Model, work: Work, c: int) -> None:
 def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
     """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
-    x, y, z = centre(model, work, c, third)
+    x, y, z = centre(model, c, work.pos3, work.rot3) if third else centre(model, c, work.pos2, work.rot2)
     F = height_field(model, k, x, y)[0]
     return (z - F - model.contact_height[c]) / model.terrain_place[k, 6]
 
@@ -65,14 +64,14 @@ def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
 @kernel
 def turn_columns(n: Vector, Fxx: float, Fxy: float, Fyy: float) -> tuple[Vec3, Vec3]:
     """Rotation of the frame with the normal n per displacement of the centre along x, and along y."""
-    ax, ay, az = _frame_turn(n, -Fxx, -Fxy)
-    bx, by, bz = _frame_turn(n, -Fxy, -Fyy)
+    ax, ay, az = frame_turn(n, -Fxx, -Fxy)
+    bx, by, bz = frame_turn(n, -Fxy, -Fyy)
     return (ax, ay, az), (bx, by, bz)
 
 
 @kernel
-def _frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
-    """The same for the change (gx, gy, 0) of w n."""
+def frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
+    """Rotation of the frame with the normal n for the change (gx, gy, 0) of w n."""
     d = n[0] * gx + n[1] * gy
     x, y, z = n[2] * (gx - d * n[0]), n[2] * (gy - d * n[1]), -n[2] * d * n[2]
     s = (n[1] * x - n[0] * y) / (1.0 + n[2])
@@ -90,7 +89,7 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
     i = model.contact_body[c]
     k = work.contact_kin[c]
     f = work.contact_frame[c]
-    x, y, z = centre(model, work, c, True)
+    x, y, z = centre(model, c, work.pos3, work.rot3)
     _F, Fx, Fy, Fxx, Fxy, Fyy = height_field(model, model.contact_terrain[c] - 1, x, y)
     e1, e2 = turn_columns(f[:3], Fxx, Fxy, Fyy)
     ax, ay, az = x - work.origin[0], y - work.origin[1], z - work.origin[2]

@@ -40,6 +40,7 @@ class Touch:
     friction: float
     law: str
     restitution: float
+    collision: str
 
 
 def touches(mech: Mechanism) -> list[Touch]:
@@ -99,6 +100,7 @@ def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[T
             collision.friction,
             collision.law,
             collision.restitution,
+            collision.name,
         )
         for feature in range(number)
     ]
@@ -119,7 +121,7 @@ def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> 
     for k, point in enumerate(np.asarray(shape.vertices) @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
         where = places.copy()
         where[0, :3] = point
-        law = (collision.friction, collision.law, collision.restitution)
+        law = (collision.friction, collision.law, collision.restitution, collision.name)
         out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
     return out
 
@@ -140,7 +142,7 @@ def _polytopes(collision: Collision, ends: list[End]) -> list[Touch]:
         ends, around, code = ends[::-1], around[::-1], code + kinds.SWAPPED
     places = np.array([_place(shape) for _, shape in ends])
     bodies, circles = (ends[0][0], ends[1][0]), (around[0], around[1])
-    law = (collision.friction, collision.law, collision.restitution)
+    law = (collision.friction, collision.law, collision.restitution, collision.name)
     return [
         Touch(f"{collision.name}_{k}", bodies, code, k, sizes, tables if k == 0 else (), circles, places, *law)
         for k in range(number)

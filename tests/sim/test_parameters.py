@@ -10,8 +10,9 @@ from coupled_scenes import COUPLED, kinds
 from jacobians import check_jacobian
 
 import dojo_opt as dojo
+from dojo_opt.report.mechanics.case import Case
 from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import CASES, Case
+from dojo_opt.report.mechanics.situations import CASES
 from sim.parameters import KINDS
 
 ALL = {**CASES, **COUPLED}

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.mechanics.situations import CASES, Case, kind_of
+from dojo_opt.report.mechanics.case import Case, kind_of
+from dojo_opt.report.mechanics.situations import CASES
 
 Floats = NDArray[np.float64]
 

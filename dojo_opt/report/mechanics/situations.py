@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.report.mechanics.case import Case, turned
+from dojo_opt.report.mechanics.couplings import STONE, colliding, geared, loop, touching
 from sim.bodies import rotated
-from sim.collisions import Collision
 from sim.mechanism import Mechanism
-from sim.parameters import KINDS
 from sim.parts import KINDS as JOINTS
 from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box, Sphere
+from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
 from sim.simulator import Simulator
 from sim.terrain import Terrain
 
@@ -25,25 +25,6 @@ H = 0.02  # [s]
 GRID = np.linspace(-3.0, 3.0, 25)
 HILLS = Terrain.from_function(lambda x, y: 0.1 * np.sin(2.0 * x + 0.3) * np.cos(1.5 * y - 0.2), GRID, GRID)
 LEVEL = (0.0, 0.0, -9.81)
-
-
-class Case(NamedTuple):
-    """A step."""
-
-    sim: Simulator
-    x: Floats
-    u: Floats
-
-    def kinds(self) -> list[str]:
-        """The kinds of its parameters; without restitution, a step need not be a continuous function of it."""
-        known = self.sim.parameters().names
-        bounces = self.sim.model.contact_restitution.any()
-        return [k for k in KINDS if any(kind_of(n) == k for n in known) and (bounces or k != "restitution")]
-
-
-def kind_of(name: str) -> str:
-    """Kind of the parameter of that name: "com" of "com:body[2]"."""
-    return name.partition(":")[0].partition("[")[0]
 
 
 def _pair(kind: str, base: str | None, gravity: ArrayLike, **options: Any) -> Mechanism:
@@ -65,7 +46,7 @@ def _pair(kind: str, base: str | None, gravity: ArrayLike, **options: Any) -> Me
                 kind,
                 parent,
                 f"body{i}",
-                orientation=_turn(rng.normal(size=3)),
+                orientation=turned(rng.normal(size=3)),
                 axis=rng.normal(size=3),
                 parent_point=rng.normal(size=3) / 4.0,
                 child_point=rng.normal(size=3) / 4.0,
@@ -82,12 +63,6 @@ def _random_state(sim: Simulator, rng: np.random.Generator, speed: float, spread
     x = np.array(sim.neutral())
     x[sim.nq :] = 0.0
     return sim.integrate(x, dx)
-
-
-def _turn(w: ArrayLike) -> Floats:
-    """Quaternion of the rotation vector w [rad]."""
-    angle = float(np.linalg.norm(w))
-    return np.concatenate([[np.cos(0.5 * angle)], 0.5 * np.sinc(0.5 * angle / np.pi) * np.asarray(w)])
 
 
 def _centre(sim: Simulator, x: Floats, foot: Contact) -> Floats:
@@ -121,16 +96,22 @@ def _pyramid() -> Case:
         Input(body="box", force=(0.0, 1.0, 2.0), torque=(0.0, 0.1, 0.3)),
     ]
     mech = Mechanism([Body("box", 1.0, (0.02, 0.03, 0.04))], [Joint("floating", None, "box")], contacts, inputs)
-    x = np.r_[0.0, 0.0, 0.1, _turn(np.array([0.05, 0.02, 0.3])), 1.0, 0.5, -0.2, 0.3, -0.5, 1.0]
+    x = np.r_[0.0, 0.0, 0.1, turned(np.array([0.05, 0.02, 0.3])), 1.0, 0.5, -0.2, 0.3, -0.5, 1.0]
     return Case(Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, np.array([1.0, -2.0]))
 
 
-def _bouncing(terrain: Terrain | None = None) -> Case:
-    """A spinning body on a joint falls on its foot, on a tilted ground or on terrain; with terrain, it slides."""
+def falling(
+    terrain: Terrain | None = None, restitution: float = 0.5, friction: float = 0.5, sunk: float = 0.03
+) -> Case:
+    """A spinning body on a joint falls on its foot, on a tilted ground or on terrain; with terrain, it slides.
+
+    sunk: how far it would sink in without the ground [m].
+    """
     rng = np.random.default_rng(3)
     mech = _pair("revolute", "floating", LEVEL, spring=3.0, damper=0.2)
     ground = {"terrain": terrain} if terrain else {"normal": (0.2, -0.1, 0.9)}
-    foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, height=-1e3, restitution=0.5, **ground)
+    foot = Contact("body1", point=(0.1, -0.05, -0.2), radius=0.05, height=-1e3, **ground)
+    foot = replace(foot, restitution=restitution, friction=friction)
     mech = replace(mech, contacts=[foot])
     far = Simulator(mech, time_step=H, kappa=1e-12, tolerance=3e-14)
     x, u = _random_state(far, rng, 1.0, 0.4), 0.1 * rng.normal(size=far.nu)
@@ -138,7 +119,7 @@ def _bouncing(terrain: Terrain | None = None) -> Case:
     centre = _centre(far, far.step(x, u, throw=True).x, foot)
     level = replace(foot, height=0.0)
     steep = level.normal_at(centre)[2] if terrain else 1.0
-    foot = replace(foot, height=float(level.gap(centre) / steep) + 0.03)
+    foot = replace(foot, height=float(level.gap(centre) / steep) + sunk)
     mech = replace(mech, contacts=[foot])
     return Case(Simulator(mech, time_step=H, kappa=1e-4, tolerance=3e-14), x, u)
 
@@ -155,62 +136,26 @@ def _limited(kind: str) -> Case:
     return Case(sim, x, rng.normal(size=sim.nu))
 
 
-def _loop(kind: str, tree: str = "spherical") -> Case:
-    """A floating ring of four bodies, moving."""
-    bodies = [Body(f"b{k}", 1.0 + 0.3 * k, (0.02, 0.03, 0.04)) for k in range(4)]
-    corners = np.array([(0.5, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.5, 0.0)])
-    centres = 0.5 * (corners + np.roll(corners, -1, axis=0))
-    joints = [Joint("floating", None, "b0")]
-    for k in range(1, 4):
-        at = corners[k]
-        ends = (at - centres[k - 1], at - centres[k])
-        joints.append(Joint(tree if k == 1 else "spherical", f"b{k - 1}", f"b{k}", "", *ends, damper=0.1))
-    ends = (corners[0] - centres[3], corners[0] - centres[0])
-    joints.append(Joint(kind, "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True))
-    sim = Simulator(Mechanism(bodies, joints), time_step=0.01, tolerance=1e-12)
-    x = sim.neutral()
-    x[sim.nq :] = np.random.default_rng(1).normal(size=sim.nv)
-    return Case(sim, sim.close(x), np.zeros(sim.nu))
-
-
-def _colliding(b: Box | Sphere, restitution: float = 0.0) -> Case:
-    """Two spinning bodies run into each other."""
-    bodies = [
-        Body("a", 1.0, (0.02, 0.03, 0.04), shape=Box(0.4, 0.3, 0.5)),
-        Body("b", 2.0, (0.05, 0.06, 0.07), shape=b),
-    ]
-    joints = [Joint("floating", None, name) for name in "ab"]
-    mech = Mechanism(
-        bodies, joints, collisions=[Collision("a", "b", restitution=restitution)], gravity=(0.1, 0.2, -0.3)
-    )
-    sim = Simulator(mech, time_step=0.01, kappa=1e-4, tolerance=1e-12)
-    n = np.array([0.6, 0.0, 0.8])
-    turns = [_turn(np.array(t)) for t in ((0.3, 0.2, 0.1), (-0.2, 0.4, 0.3))]
-    v = np.r_[-2.0 * n + (0.1, 0.2, 0.0), 0.5, -0.3, 1.0, 2.0 * n, 0.2, 0.7, -0.4]
-    x = np.r_[n, turns[0], np.zeros(3), turns[1], v]
-    for _ in range(60):
-        r = sim.step(x)
-        hit = np.abs(r.contacts.impulse).max() > 0.1 if restitution else r.contacts.gap.min() < 0.01
-        if hit:
-            return Case(sim, x, np.zeros(0 if sim.nu == 0 else sim.nu))
-        x = r.x
-    raise AssertionError("they do not meet")
-
-
 CASES: dict[str, Callable[[], Case]] = {
     "flying": lambda: _resting("planar_axis", 0.3, 0.5, 2.0),
     "touching": lambda: _resting("prismatic_orbital", 0.0, 0.5, 0.3),
     "sliding": lambda: _resting("cylindrical_free", -0.01, 0.1, 2.0),
     "sticking": lambda: _resting("revolute", -0.01, 0.7, 0.02, 1e-3),
     "sliding, pyramid": _pyramid,
-    "bouncing": _bouncing,
-    "on terrain": lambda: _bouncing(HILLS),
+    "bouncing": falling,
+    "on terrain": lambda: falling(HILLS),
+    "on terrain, sticking": lambda: falling(HILLS, 0.0, 2.0),
     "at a limit": lambda: _limited("planar_axis"),
     "at a cone": lambda: _limited("cylindrical_free"),
-    "in a loop": lambda: _loop("revolute"),
-    "in a loop, orbital": lambda: _loop("spherical", "orbital"),
-    "in a loop, fixed": lambda: _loop("fixed"),
-    "colliding, box and sphere": lambda: _colliding(Sphere(0.2)),
-    "colliding, bouncing": lambda: _colliding(Sphere(0.2), 0.5),
-    "colliding, boxes": lambda: _colliding(Box(0.3, 0.3, 0.4)),
+    "in a loop": lambda: loop("revolute"),
+    "in a loop, orbital": lambda: loop("spherical", "orbital"),
+    "in a loop, fixed": lambda: loop("fixed"),
+    "geared": geared,
+    "colliding, box and sphere": lambda: colliding(Sphere(0.2)),
+    "colliding, bouncing": lambda: colliding(Sphere(0.2), 0.5),
+    "colliding, boxes": lambda: colliding(Box(0.3, 0.3, 0.4)),
+    "colliding, capsules": lambda: touching(Capsule(0.1, 0.4), Capsule(0.15, 0.3), -0.01),
+    "colliding, polytopes": lambda: touching(STONE, STONE, -0.01),
+    "rolling": lambda: touching(Cylinder(0.2, 0.1), HalfSpace(), -0.01),
+    "tied": lambda: touching(String(0.5), String(0.5), -0.01),
 }

@@ -71,12 +71,12 @@ class Mechanics:
             report.rows.append(_worst(title, values, bar, "" if what == "derivative" else "m"))
 
     def _parameters(self, report: Report, progress: Progress) -> None:
-        """A line per kind of parameter, loops and collisions apart; a row per situation with the worst of them."""
+        """A line per kind of parameter, what couples bodies apart; a row per situation with the worst of them."""
         names = QUICK_CASES if self.quick else tuple(CASES)
         found = {name: parameters.check(name) for name in progress([(name, name) for name in names], "parameters")}
-        coupled = [name for name in names if name.startswith(("in a loop", "colliding"))]
+        coupled = [name for name in names if name.startswith(("in a loop", "geared", "colliding", "rolling", "tied"))]
         trees = [name for name in names if name not in coupled]
-        for title, part in (("", trees), (", loops and collisions", coupled)):
+        for title, part in (("", trees), (", loops, gears and collisions", coupled)):
             kinds = [kind for kind in PARAMETERS if any(kind in found[name] for name in part)]
             lines = [[kind, *(_short(found[name].get(kind)) for name in part)] for kind in kinds]
             if part:
