@@ -16,7 +16,6 @@ from sim.effects import At, Effect
 from sim.elimination_panel import solve_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector, Work
-from sim.moves import other_quaternions
 from sim.parameter_columns import fill_columns
 from sim.rotation import left_jacobian
 from solvers.jit import kernel
@@ -67,7 +66,6 @@ def parameter_jacobian(
     work = work_view(work_at)
     nv = at.v.shape[0]
     width = work.columns.shape[1]
-    other_quaternions(work)
     first = 0
     start = 0
     while first < out.shape[1]:
