@@ -11,7 +11,6 @@ import ast
 import json
 import sys
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -205,18 +204,11 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 }
 
 
-def _tell(message: Warning | str, *_: Any, **__: Any) -> None:
-    """A warning without the line of ours that it came from."""
-    print(f"dojo-opt: {message}", file=sys.stderr)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     args = _parser().parse_args(arguments)
     try:
-        with warnings.catch_warnings():
-            warnings.showwarning = _tell
-            return _COMMANDS[args.command](args)
+        return _COMMANDS[args.command](args)
     except (ValueError, TypeError, OSError, ImportError) as error:
         print(f"dojo-opt {args.command}: {error}", file=sys.stderr)
         return 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any
 
@@ -57,6 +58,29 @@ class Feet:
         """Distances (..., k) of the balls from the ground [m]."""
         at = self.positions(x)
         return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
+
+    def put_down(self, x: Array) -> Array:
+        """The state x (nx,) of a robot on a floating base, moved up or down until its lowest ball touches."""
+        out = x.copy()
+        for _ in range(_ITERATIONS):
+            least = float((self.gaps(out) / self.normals(out)[:, 2]).min())
+            out[2] -= least
+            if abs(least) < _CLOSE:
+                break
+        return out
+
+    def normals(self, x: Array) -> Array:
+        """Outward normals (k, 3) of the ground at the balls, at one state x (nx,)."""
+        return np.stack([c.normal_at(p) for c, p in zip(self.contacts, self.positions(x), strict=True)])
+
+    def touching(self, x: Array) -> Feet:
+        """The same with the points of the balls nearest to the ground at x (nx,), instead of their centres."""
+        z = self.sim.maximal(x)[self._body]
+        w, v, arm = z[:, 6:7], -z[:, 7:10], -self.radius[:, None] * self.normals(x)
+        side = np.cross(v, arm)
+        other = copy.copy(self)
+        other._point = self._point + arm + 2.0 * (w * side + np.cross(v, side))
+        return other
 
     def jacobian(self, x: ArrayLike) -> Array:
         """d(positions)/d(dq), (..., k, 3, nv), by central differences."""

@@ -13,7 +13,7 @@ from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
 from dojo_opt.gaits.gait import Gait
-from dojo_opt.options import CONTINUATION
+from dojo_opt.options import CONTINUATION, PLANNED
 from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
@@ -176,6 +176,7 @@ def leap(
     duration: float = 1.0,
     damping: float = 0.5,
     time_step: float = 0.02,
+    refinement: int = 5,
     **model: Any,
 ) -> Problem:
     """The quadruped gets `distance` [m] ahead from rest with nothing but a goal: no gait, no contact sequence.
@@ -184,10 +185,10 @@ def leap(
     the pose itself; squares of place weigh 1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`, and
     the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
     shooting. It asks for the height and does not insist: the base rises by .15, .22 and .26 m for .15, .2 and .25 m.
-    At a finer time step than the plan's most of these leaps stumble at their landing, which their gains know at one
-    instant only; `ilqr(problem.refined(5), warm_start=plan)` makes them land at 1 ms, too.
+    Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, because their gains know it at one
+    instant only. `ilqr` therefore ends with every step cut into `refinement`, and such plans land at 1 ms, too.
     """
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step, kappa=PLANNED)
     horizon = max(2, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
     start, torques = equilibrium(sim)
     goal = start.copy()
@@ -203,7 +204,7 @@ def leap(
         np.full(6, VELOCITY),
         np.full(legs, RATE),
     ]
-    return Problem(
+    problem = Problem(
         sim,
         start,
         horizon,
@@ -215,6 +216,8 @@ def leap(
         control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
         controls0=torques,
     )
+    problem.refinement = refinement
+    return problem
 
 
 _FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
@@ -226,5 +229,6 @@ def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, 
     follows |= {key: settings[key] for key in _FOLLOW if key in settings}
     rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step / follows.get("substeps", 1))
+    h = time_step / follows.get("substeps", 1)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
     return follow(gait(sim, **keywords, **rest), **follows)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
-__all__ = ["CONTINUATION", "Options", "Stage"]
+__all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
 class Stage(NamedTuple):
@@ -26,6 +26,7 @@ CONTINUATION = (
     Stage(1e-4, 1e-4),
     Stage(1e-6, 1e-6),
 )
+PLANNED = CONTINUATION[-1].kappa_eval  # [N s m] of plans: a simulator of it reproduces their motion
 
 
 @dataclass(frozen=True)

@@ -47,10 +47,18 @@ def ilqr(
 
     controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the
     same problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
+
+    A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
+    is one of the finer problem then, and its history is that of both.
     """
     checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
     options = Options(**settings) if options is None else replace(options, **settings)
-    return Solver(problem, options).solve(controls, states, warm_start)
+    plan = Solver(problem, options).solve(controls, states, warm_start)
+    if problem.refinement == 1 or not plan.success:
+        return plan
+    finer = Solver(problem.refined(problem.refinement), options).solve(warm_start=plan)
+    history, seconds = plan.history + finer.history, plan.seconds + finer.seconds
+    return replace(finer, nit=plan.nit + finer.nit, history=history, seconds=seconds)
 
 
 class Solver:

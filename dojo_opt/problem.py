@@ -61,6 +61,8 @@ class Problem:
 
     free_start: tangent components of the start that the planner may change, by number or name, or True for all;
     `start` is then a guess. Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
+
+    The attribute `refinement` is 1; set to more, `ilqr` ends by planning `refined(refinement)` from what it has found.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Problem:
         self.sim = sim
         self.horizon = int(horizon)
         self.substeps = int(substeps)
+        self.refinement = 1
         start = np.asarray(start, dtype=float)
         if start.shape != (sim.nx,):
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
@@ -112,6 +115,7 @@ class Problem:
         finer = copy.copy(self)
         finer.sim = self.sim.replace(time_step=self.sim.time_step / int(count))
         finer.substeps = self.substeps * int(count)
+        finer.refinement = 1
         finer.bind()
         return finer
 

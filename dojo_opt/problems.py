@@ -11,6 +11,7 @@ from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.locomotion import bound, follow, jump, leap, pace, trot, turn, walk
+from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from sim.checks import nearest
 from sim.simulator import Simulator
@@ -27,7 +28,7 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
     force that carries the body.   Howell et al. 2022, Dojo, hopper example.
     """
     knot, horizon = 0.05, 20
-    sim = Simulator(models.raiberthopper(**model), time_step=knot / substeps)
+    sim = Simulator(models.raiberthopper(**model), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     goal, apex = start.copy(), start.copy()
     goal[:2] += np.asarray(target, dtype=float)
@@ -59,7 +60,7 @@ def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Proble
     shifts = {"right": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
     if goal not in shifts:
         raise ValueError(f'problems.block(goal=...): expected "right" or "up", got {goal!r}')
-    sim = Simulator(models.block(friction=friction, **model), time_step=0.1)
+    sim = Simulator(models.block(friction=friction, **model), time_step=0.1, kappa=PLANNED)
     start = sim.neutral()
     target = start.copy()
     target[:3] += shifts[goal]

@@ -33,11 +33,11 @@ def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
 
 
 def input_map(sim: Simulator) -> Array:
-    """(nv, nu) generalised forces per unit of every input; ValueError when one acts on a body."""
+    """(nv, nu) generalised forces per unit of every input on a joint; those on bodies, such as pushes, have none."""
     out = np.zeros((sim.nv, sim.nu))
     for k, part in enumerate(sim.mechanism.inputs or ()):
         if part.joint is None:
-            raise ValueError(f"equilibrium({sim.mechanism.name}): input {part.name!r} acts on a body, not on a joint")
+            continue
         out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = 1.0
     return out
 
@@ -54,9 +54,23 @@ def stop_torques(sim: Simulator, x: Array) -> Array:
     return out
 
 
-def _down(feet: Feet, state: Array) -> Array:
-    """(k, nv) d(gaps)/dq: generalised forces of unit normal forces."""
-    return np.einsum("kc,kcv->kv", feet.normal, feet.jacobian(state))
+def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
+    """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the normals' share of those (k,)."""
+    normal = feet.normals(state)
+    gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
+    return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
+
+
+def _check_friction(name: str, feet: Feet, share: Array, force: Array) -> None:
+    """Refuse vertical forces outside the friction cones."""
+    for contact, cosine, loaded in zip(feet.contacts, share, force > 0.0, strict=True):
+        limit = 0.0 if contact.law == "impact" else contact.friction
+        slope = float(np.sqrt(max(0.0, 1.0 - cosine**2)) / max(cosine, 1e-12))
+        if loaded and slope > limit + 1e-12:
+            raise ValueError(
+                f"equilibrium({name}): {contact.name!r} stands on ground of slope {slope:.3g} with friction {limit:g}, "
+                "and would slide"
+            )
 
 
 def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -66,27 +80,32 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
     forces that share a load most evenly are nearly, and not quite, those of a state.
     """
     for _ in range(_ROUNDS):
-        gap, down = feet.gaps(state), _down(feet, state)
-        force = sim.kappa / (sim.time_step * np.maximum(gap, 1e-12))
-        left = potential_gradient(sim, state) - stop_torques(sim, state) - down.T @ force
+        gap, (down, up, share) = feet.gaps(state), _under(feet, state)
+        force = sim.kappa / (sim.time_step * share * np.maximum(gap, 1e-12))
+        left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
         if np.abs(left[free]).max(initial=0.0) < 1e-9 * np.abs(left).max() or gap.min() <= 0.0:
             break
-        slope = (down[:, free].T * (force / gap)) @ down
+        slope = (up[:, free].T * (force / gap)) @ down
         move = np.zeros(sim.ndx)
         move[: sim.nv] = np.linalg.lstsq(slope, -left[free], rcond=_RANK)[0]
         change = np.abs(down @ move[: sim.nv] / gap).max()
         state = sim.integrate(state, move * min(1.0, 0.5 / max(change, 1e-300)))
-    return state, sim.kappa / (sim.time_step * np.maximum(feet.gaps(state), 1e-12))
+    return state, sim.kappa / (sim.time_step * _under(feet, state)[2] * np.maximum(feet.gaps(state), 1e-12))
 
 
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
     """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
 
-    The contacts press straight down, so nothing creeps, and share the load as evenly as balance allows; the joints
-    carry what gravity and springs leave. On the central path a contact with normal impulse g floats kappa / g above the
-    ground: the state is moved to those heights. ValueError when no such forces exist: the centre of mass is not above
-    the feet, a joint without input would have to carry something, or the smoothing is so large that contacts far above
-    the ground carry the weight.
+    The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows;
+    the joints carry what gravity and springs leave; inputs that act on bodies are zero. On the central path a contact
+    with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
+    carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that shall carry have to be
+    within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by
+    `dojo_opt.feet.Feet.place`.
+
+    ValueError when no such forces exist: the centre of mass is not above the feet, a joint without input would have to
+    carry something, the ground is steeper than friction holds, or the smoothing is so large that contacts far above the
+    ground carry the weight.
 
     Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
     """
@@ -99,17 +118,17 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     left: Array = np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
-        down = _down(feet, state)
+        down, up, share = _under(feet, state)
         gap = feet.gaps(state)
         touching = gap < gap.min() + _NEAR
-        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * np.maximum(gap, _NEAR)))
-        load = potential_gradient(sim, state) - stop_torques(sim, state) - down.T @ afar
-        rows = np.concatenate([(down[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * share * np.maximum(gap, _NEAR)))
+        load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
+        rows = np.concatenate([(up[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
         force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
-        left = load - down.T @ force
+        left = load - up.T @ force
         u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
         loaded = force > 1e-3 * weight
-        wanted = sim.kappa / (sim.time_step * force[loaded])
+        wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
         error = wanted - gap[loaded]
         if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
             break
@@ -117,7 +136,8 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
         state = sim.integrate(state, move)
     state, force = _pressed(sim, feet, state, free)
-    left = potential_gradient(sim, state) - stop_torques(sim, state) - _down(feet, state).T @ force
+    _, up, share = _under(feet, state)
+    left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
     u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
     if np.abs(left[free]).max() > 1e-3 * weight:
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
@@ -125,4 +145,5 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
             f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
             f"weight: {left[k]:.3g} N or N m is left at {sim.mechanism.dof_names[k]!r}"
         )
+    _check_friction(mech.name, feet, share, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,13 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
+from dojo_opt.feet import Feet
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Sampled
+from dojo_opt.mpc.tick import OPTIONS
+from dojo_opt.options import PLANNED
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim import checks
 from sim.checks import nearest
 from sim.simulator import Simulator
+from sim.terrain import Terrain
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -23,6 +28,7 @@ Matrix = NDArray[np.float64]
 __all__ = ["Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
+_HOPPER = replace(OPTIONS, shooting=1.0)  # after a push most rollouts are lost, and gaps would stay open for ticks
 
 
 class Hopping:
@@ -66,13 +72,16 @@ def hopper_mpc(
 ) -> MPC:
     """Raibert's hopper hops `height` [m] at a velocity [m/s]: 20 knots of 50 ms, each of `substeps` steps of the model.
 
-    Squares of position and leg weigh 10, attitude 1 (yaw .1), velocities .01, impulses .01 per (N s)^2; inputs are
-    limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
+    Squares of position weigh 10, attitude 1 (yaw .1), leg 1, velocities along x and y 1, the others .01, impulses .01
+    per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
+
+    What a push in flight costs grows until the foot is down: a light leg weight lets it reach down early. The weight on
+    the velocity keeps the body from leaning further than friction holds on the way back.
     """
     knot, horizon = 0.05, 20
-    sim = Simulator(models.raiberthopper(), time_step=knot / substeps)
+    sim = Simulator(models.raiberthopper(), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
-    weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 10.0] + [0.01] * 7)
+    weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0] + [0.01] * 5)
     limits = np.array([50.0, 50.0, 500.0])
     problem = Problem(
         sim,
@@ -83,7 +92,7 @@ def hopper_mpc(
         substeps=substeps,
         controls0=np.array([0.0, 0.0, 9.81 * sim.mechanism.bodies[0].mass]),
     )
-    return MPC(problem, reference=Hopping(start, velocity, height, stance), **settings)
+    return MPC(problem, reference=Hopping(start, velocity, height, stance), **{"options": _HOPPER, **settings})
 
 
 def quadruped_mpc(
@@ -92,6 +101,7 @@ def quadruped_mpc(
     *,
     step_height: float = 0.05,
     damper: float = 0.5,
+    terrain: Terrain | None = None,
     substeps: int = 1,
     **settings: Any,
 ) -> MPC:
@@ -101,21 +111,25 @@ def quadruped_mpc(
     10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2; torques are limited to 33.5 N m.
     damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of
     5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
+    terrain: that the model knows, whose height under the base is added to that of the reference; level ground without.
     settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it.
     """
     knot, horizon, limit = 0.04, 20, 33.5
-    sim = Simulator(models.quadruped(damper=damper), time_step=knot / substeps)
-    fine = gaits.trot(sim.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
+    sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps, kappa=PLANNED)
+    fine = gaits.trot(level.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
     advance = sim.difference(fine.x[-1], fine.x[0])
     advance[6:] = 0.0  # joints and velocities come round
-    reference = Sampled(fine.time, fine.x, sim, advance).over(sim.time_step)
-    torque = gaits.trot(sim, speed=speed, period=period, cycles=1, step_height=step_height).torques()
+    reference: Any = Sampled(fine.time, fine.x, sim, advance).over(sim.time_step)
+    if terrain is not None:
+        sim, reference = sim.replace(mechanism=sim.mechanism.on(terrain)), _OnTerrain(reference, terrain)
+    torque = gaits.trot(level, speed=speed, period=period, cycles=1, step_height=step_height).torques()
     held = Sampled(sim.time_step * np.arange(len(torque) + 1), np.vstack([torque, torque[:1]]), cycle=np.zeros(sim.nu))
     weight = np.array([10.0] * 6 + [1.0] * 12 + [0.1] * 6 + [0.01] * 12)
     times = knot * np.arange(horizon + 1)
+    start = reference([0.0])[0]
     problem = Problem(
         sim,
-        reference([0.0])[0],
+        start if terrain is None else Feet(sim).put_down(start),
         horizon,
         cost=[Tracking(reference(times), weight), Effort(1e-4)],
         control_limits=(-limit, limit),
@@ -124,6 +138,18 @@ def quadruped_mpc(
         states0=reference(times),
     )
     return MPC(problem, reference={0: reference, 1: held}, **{"learn_ground": True, "kappa": 1e-3, **settings})
+
+
+class _OnTerrain:
+    """A reference of states on level ground, raised by the height of the terrain under its base."""
+
+    def __init__(self, level: Sampled, terrain: Terrain) -> None:
+        self._level, self._terrain = level, terrain
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        x = self._level(times)
+        x[:, 2] += self._terrain.height(x[:, 0], x[:, 1])
+        return x
 
 
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:

@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.motion import Motion, motion
-from dojo_opt.solids import THICK, bones, place_of, solids_of
 from sim import shapes
 from sim.parts import WORLD
+from sim.polytope import Polytope
 from sim.simulator import Simulator
 from sim.terrain import Terrain
 
 __all__ = ["save_html"]
 
 FRAMES = 60  # per second of the animation
+_THICK = 0.002  # of a drawn plane [m]
 _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
@@ -123,9 +124,9 @@ def _ground(m: Motion) -> list[Any]:
         side /= np.linalg.norm(side)
         place = np.eye(4)
         place[:3, :3] = np.stack([side, np.cross(n, side), n], axis=1)
-        place[:3, 3] = (height - 0.5 * THICK) * n
+        place[:3, 3] = (height - 0.5 * _THICK) * n
         node = Node(("meshcat", "ground", str(k)))
-        commands += [SetObject(geometry.Box([10.0, 10.0, THICK]), earth, node), SetTransform(place, node)]
+        commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]
     return commands
 
 
@@ -143,8 +144,8 @@ def _floor() -> list[Any]:
     points = np.array([(a, b, 0.0) for a, b in ends] + [(b, a, 0.0) for a, b in ends]).T
     ink = geometry.LineBasicMaterial(color=_LINE)
     return [
-        SetObject(geometry.Box([_GRID, _GRID, THICK]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
-        SetTransform(place_of((0.0, 0.0, -2.0 * THICK)), plane),
+        SetObject(geometry.Box([_GRID, _GRID, _THICK]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
+        SetTransform(_place((0.0, 0.0, -2.0 * _THICK)), plane),
         SetObject(geometry.LineSegments(geometry.PointsGeometry(points.astype(np.float32)), ink), path=lines),
     ]
 
@@ -171,24 +172,58 @@ def _scene(m: Motion) -> list[Any]:
     steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
     for k, body in enumerate(m.mechanism.bodies):
         node = Node(("meshcat", "bodies", body.name))
-        solids = bones(m.mechanism, body.name) if body.shape is None else solids_of(body.shape)
-        for part, (solid, place) in enumerate(solids):
+        for part, (solid, place) in enumerate(_solids(body.shape)):
             commands.append(SetObject(solid, steel, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
         for contact in m.mechanism.contacts:
             if contact.body == body.name:
                 ball = node.append(f"contact {contact.name}")
                 commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), rubber, ball))
-                commands.append(SetTransform(place_of(contact.point), ball))
-        commands.append(SetTransform(place_of(m.position[0, k], m.quaternion[0, k]), node))
+                commands.append(SetTransform(_place(contact.point), ball))
+        commands.append(SetTransform(_place(m.position[0, k], m.quaternion[0, k]), node))
     earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
     for collision in m.mechanism.collisions:
         if collision.b != WORLD or isinstance(collision.shape_b, shapes.String):
             continue
-        for part, (solid, place) in enumerate(solids_of(collision.shape_b)):
+        for part, (solid, place) in enumerate(_solids(collision.shape_b)):
             node = Node(("meshcat", "obstacles", collision.name, f"part{part}"))
             commands += [SetObject(solid, earth, node), SetTransform(place, node)]
     return commands
+
+
+def _solids(shape: Any) -> list[tuple[Any, Any]]:
+    """(MeshCat geometry, placement in the body) of a shape; a body without one is a small ball."""
+    from meshcat import geometry
+
+    if shape is None:
+        return [(geometry.Sphere(0.02), np.eye(4))]
+    place = _place(shape.center, shape.orientation)
+    if isinstance(shape, shapes.Sphere):
+        return [(geometry.Sphere(shape.radius), place)]
+    if isinstance(shape, shapes.Box):
+        return [(geometry.Box([shape.x, shape.y, shape.z]), place)]
+    if isinstance(shape, shapes.HalfSpace):
+        return [(geometry.Box([10.0, 10.0, _THICK]), place @ _place((0, 0, -0.5 * _THICK)))]
+    if isinstance(shape, Polytope):
+        from scipy.spatial import ConvexHull
+
+        points = np.asarray(shape.vertices)
+        return [(geometry.TriangularMeshGeometry(points, ConvexHull(points).simplices), place)]
+    # MeshCat's cylinders stand along y, ours along z
+    upright = place @ _place((0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
+    solids = [(geometry.Cylinder(shape.length, shape.radius), upright)]
+    if isinstance(shape, shapes.Capsule):
+        ends = [place @ _place((0, 0, side * shape.length / 2)) for side in (-1, 1)]
+        solids += [(geometry.Sphere(shape.radius), end) for end in ends]
+    return solids
+
+
+def _place(position: Any, quaternion: Any = (1.0, 0.0, 0.0, 0.0)) -> Any:
+    """Homogeneous matrix (4, 4) of a pose."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = shapes.rotation_matrix(quaternion)
+    matrix[:3, 3] = position
+    return matrix
 
 
 def _animation(m: Motion) -> Any:

@@ -15,7 +15,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
 
 LENGTH = 0.2  # [m]
-sim = dojo.Simulator(dojo.models.atlas(damper=5.0), time_step=0.05)
+sim = dojo.Simulator(dojo.models.atlas(damper=5.0), time_step=0.05, kappa=1e-6)  # that of plans
 reference = dojo.gaits.step(sim, length=LENGTH)
 torques = reference.torques()
 # squares per second: place and attitude of the pelvis, hinges; their velocities; torques

@@ -75,6 +75,17 @@ class Calls(StateCalls):
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
 
+    def _path(self, knots: int, *, keep: bool) -> Path:
+        """What a rollout of so many knots fills in."""
+        kept = knots if keep else 0
+        return Path(
+            np.zeros((knots + 1, self.nx)),
+            np.zeros((knots, self.nu)),
+            np.zeros((kept, self.sizes.ncontact, CONE)),
+            np.zeros((kept, self.sizes.nlimit, BOUND)),
+            np.zeros(REPORT),
+        )
+
     def closed_loop(
         self,
         x: Vector,
@@ -87,18 +98,10 @@ class Calls(StateCalls):
         keep: bool = False,
     ) -> tuple[int, Path]:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
-        knots = len(policy.us)
-        kept = knots if keep else 0
-        path = Path(
-            np.empty((knots + 1, self.nx)),
-            np.empty((knots, self.nu)),
-            np.empty((kept, self.sizes.ncontact, CONE)),
-            np.empty((kept, self.sizes.nlimit, BOUND)),
-            np.zeros(REPORT),
-        )
+        path = self._path(len(policy.us), keep=keep)
         model, settings = self._table(bind_step), self.settings.array(kappa)
         knot = closed_loop(model, self._scratch.table(), settings, x, policy, alpha, limits, substeps, path)
-        if knot < knots:
+        if knot < len(policy.us):
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), path
 

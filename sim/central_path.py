@@ -66,7 +66,7 @@ def first_attempt(
     if guess.impulses:
         move_inequalities(model, work, 0.0)
         last = residuals(model, work, options.h, q, v, u)
-        if last[0] < min(hard[0], soft):
+        if last[0] < min(hard[0], _AT_REST * soft):
             return 0, last
         if first == 0:
             start_inequalities(model, work, options.h, options.kappa, 0.0)

@@ -166,16 +166,16 @@ class Derivatives(States):
         the trajectory. An unsolved step raises SimulationError.
         """
         call = "Simulator.vjp"
-        self._check_order(call)
         xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
         inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
         asked = _names(f"{call}(wrt=...)", wrt)
+        if _parameters(asked):
+            self._check_order(f"{call}(wrt=...)")
         found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
-        level = self._border.kappa("vjp", kappa)
-        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, level)
+        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, self._border.kappa("vjp", kappa))
         if knot >= 0:
             raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
         blocks = {"state": line.costate[0], "input": line.inputs}
@@ -205,16 +205,16 @@ class Derivatives(States):
         return self._select(call, tuple(p.name for p in self._known) if wrt is None else _names(call, wrt))[0]
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
-        """The same with other values of parameters; a ValueError names what no body, joint or shape can have."""
+        """The same, also its kappa, with other values of parameters; a ValueError names what nothing can have."""
         mech, time_step = with_values("Simulator.with_parameters(...)", self.mechanism, self.time_step, values)
-        return self.replace(mechanism=mech, time_step=time_step)
+        return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
 
     def replace(self, **settings: Any) -> Any:
         """See Simulator."""
         raise NotImplementedError
 
     def _check_order(self, call: str) -> None:
-        """Steps of a higher order are another scheme, with derivatives by state and input only."""
+        """Derivatives by parameters are those of steps of order 2."""
         if self.order != 2:
             raise ValueError(f"{call}: expected a simulator of order 2, got order {self.order}")
 

@@ -139,7 +139,10 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if points or nlimit else "Newton's method; interior point left out"
     if order > 2:
-        solver = f"none: {len(tableau(order)[1])} evaluations of the equations of motion"
+        far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
+        solver = (
+            f"{solver}; while contacts and limits are far none: {far}" if mech.contacts or nlimit else f"none: {far}"
+        )
     counts = (
         ("contacts", len(points), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
         ("joint limits", nlimit, _count(nlimit, "bound", "bounds")),

@@ -179,32 +179,32 @@ def momentum_balance_jacobian(model: Model, work: Work, h: float, out: Matrix) -
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         J = angular_momentum_jacobian(work.inertia_world, i, h, c, x, y, z)
-        body_jacobian(model, work, h, i, J, out[i])
+        body_jacobian(model, work, h, i, work.pos3, J, out[i])
 
 
 @kernel
-def body_jacobian(model: Model, work: Work, h: float, i: int, J: Mat3, A: Vector) -> None:
-    """A = the block of body i, with J = dP/dphi:
+def body_jacobian(model: Model, work: Work, h: float, i: int, pos: Matrix, J: Mat3, A: Vector) -> None:
+    """A = the block of body i by its pose at configuration k, 1 or 3, whose positions are `pos`; J = dP/dphi:
 
-    [ m/h I       -m/h [d3]         ]
-    [ m/h [d2]    J - m/h [d2] [d3] ]     d2, d3: from O to the centre of mass at 2 and 3
+    [ m/h I       -m/h [dk]         ]
+    [ m/h [d2]    J - m/h [d2] [dk] ]     d2, dk: from O to the centre of mass at 2 and k
     """
     m = model.body_mass[i] / h
     o = work.origin
     x2, y2, z2 = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
-    x3, y3, z3 = work.pos3[i, 0] - o[0], work.pos3[i, 1] - o[1], work.pos3[i, 2] - o[2]
+    x, y, z = pos[i, 0] - o[0], pos[i, 1] - o[1], pos[i, 2] - o[2]
     for k in range(3):
         for j in range(3):
             A[6 * k + j] = 0.0
         A[7 * k] = m
-    A[3], A[4], A[5] = 0.0, m * z3, -m * y3
-    A[9], A[10], A[11] = -m * z3, 0.0, m * x3
-    A[15], A[16], A[17] = m * y3, -m * x3, 0.0
+    A[3], A[4], A[5] = 0.0, m * z, -m * y
+    A[9], A[10], A[11] = -m * z, 0.0, m * x
+    A[15], A[16], A[17] = m * y, -m * x, 0.0
     A[18], A[19], A[20] = 0.0, -m * z2, m * y2
     A[24], A[25], A[26] = m * z2, 0.0, -m * x2
     A[30], A[31], A[32] = -m * y2, m * x2, 0.0
-    # -[d2] [d3] = (d2.d3) I - d3 d2^T
-    s = x2 * x3 + y2 * y3 + z2 * z3
-    A[21], A[22], A[23] = J[0] + m * (s - x3 * x2), J[1] - m * x3 * y2, J[2] - m * x3 * z2
-    A[27], A[28], A[29] = J[3] - m * y3 * x2, J[4] + m * (s - y3 * y2), J[5] - m * y3 * z2
-    A[33], A[34], A[35] = J[6] - m * z3 * x2, J[7] - m * z3 * y2, J[8] + m * (s - z3 * z2)
+    # -[d2] [dk] = (d2.dk) I - dk d2^T
+    s = x2 * x + y2 * y + z2 * z
+    A[21], A[22], A[23] = J[0] + m * (s - x * x2), J[1] - m * x * y2, J[2] - m * x * z2
+    A[27], A[28], A[29] = J[3] - m * y * x2, J[4] + m * (s - y * y2), J[5] - m * y * z2
+    A[33], A[34], A[35] = J[6] - m * z * x2, J[7] - m * z * y2, J[8] + m * (s - z * z2)

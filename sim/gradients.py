@@ -66,26 +66,20 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
 def _joint_columns(model: Model, work: Work, h: float, v: Vector) -> None:
     """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T)."""
     nv = v.shape[0]
-    R = work.dR_dv
-    for i in range(model.body_parent.shape[0]):
-        e = model.body_vadr[i]
-        end = model.body_vadr[i + 1]
-        if model.joint_nrot[i] == 3:
-            end -= 3
-            J = left_jacobian(h * v[end], h * v[end + 1], h * v[end + 2])
-            for d in range(nv):
-                a, b, c = R[d, end], R[d, end + 1], R[d, end + 2]
-                R[d, end] = -h * (a * J[0] + b * J[1] + c * J[2])
-                R[d, end + 1] = -h * (a * J[3] + b * J[4] + c * J[5])
-                R[d, end + 2] = -h * (a * J[6] + b * J[7] + c * J[8])
-        for k in range(e, end):
-            for d in range(nv):
-                R[d, k] *= -h
     add_limit_derivatives(model, work, h)
     for d in range(nv):
         for k in range(nv):
             work.columns[d, k] = -work.dR_dq[d, k]
-            work.columns[d, nv + k] = -R[d, k]
+            work.columns[d, nv + k] = h * work.dR_dv[d, k]
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] == 3:
+            e = model.body_vadr[i + 1] - 3
+            J = left_jacobian(h * v[e], h * v[e + 1], h * v[e + 2])
+            for d in range(nv):
+                x = work.columns[d, nv + e : nv + e + 3]
+                a, b, c = x[0], x[1], x[2]
+                for r in range(3):
+                    x[r] = a * J[3 * r] + b * J[3 * r + 1] + c * J[3 * r + 2]
 
 
 @kernel

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.ball_spring import relative_to_rest
-from sim.elimination import factor
+from sim.elimination import add_children, factor
 from sim.elimination_panel import solve_panel
 from sim.energy import armature_blocks, spatial_inertia
 from sim.hamilton import column_rate
@@ -159,11 +159,7 @@ def slopes_at(model: Model, work: Work, free: Integers, u: Vector, out: Slopes) 
     """All derivatives at the evaluation that is in `work`, and the factors of M; False when that is singular."""
     spatial_inertia(model, work, work.A1)
     spatial_inertia(model, work, work.A)
-    for i in range(model.body_parent.shape[0] - 1, -1, -1):
-        p = model.body_parent[i]
-        if p >= 0:
-            for k in range(36):
-                work.A1[p, k] += work.A1[i, k]
+    add_children(model, work.A1)
     outer_slopes(model, work, u, work.A2)
     _columns(model, work, out.column)
     for d in range(out.p_q.shape[0]):

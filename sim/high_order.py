@@ -8,7 +8,7 @@ import numpy as np
 
 from sim import bodies, coordinates, runge_kutta
 from sim.bind import bind_smooth
-from sim.calls import BOUND, CONE, REPORT, Calls, Floats
+from sim.calls import REPORT, Calls, Floats
 from sim.hamilton_gradient import Slopes
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
@@ -121,12 +121,7 @@ class HighOrder(Calls):
         self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
     ) -> tuple[Floats, ...]:
         """As Calls.linearize, on one core; there is no kappa and nothing to guess."""
-        swings = np.flatnonzero(self.model.joint_nrot == 2)
-        if len(swings):
-            raise ValueError(
-                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
-                "(orbital), are those of order 2; use replace(order=2)"
-            )
+        self._check_swings()
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
@@ -137,6 +132,15 @@ class HighOrder(Calls):
         for array in (A, B, x_next):
             array[unsolved] = 0.0
         return A, B, x_next, reports
+
+    def _check_swings(self) -> None:
+        """Refuse derivatives through joints with two rotations."""
+        swings = np.flatnonzero(self.model.joint_nrot == 2)
+        if len(swings):
+            raise ValueError(
+                f"Simulator of order {self.settings.order}: derivatives through joint {swings[0]}, with two rotations "
+                "(orbital), are those of order 2; use replace(order=2)"
+            )
 
     def roll_linear(self, x: Vector, us: Floats, kappa: float | None) -> tuple[int, Floats, Floats, Floats, Floats]:
         """As Calls.roll_linear, in two passes."""
@@ -156,9 +160,7 @@ class HighOrder(Calls):
         keep: bool = False,
     ) -> tuple[int, Path]:
         """As Calls.closed_loop."""
-        knots = len(policy.us)
-        kept = np.zeros((knots if keep else 0, 0, CONE)), np.zeros((knots if keep else 0, 0, BOUND))
-        path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
+        path = self._path(len(policy.us), keep=keep)
         h = self.settings.time_step
         knot = runge_kutta.closed_loop(
             self._table(bind_smooth), self._scratch.table(), h, self._scheme(), x, policy, alpha, limits, substeps, path
@@ -200,18 +202,13 @@ class HighOrder(Calls):
 
 
 def check(mechanism: Mechanism, settings: Settings) -> None:
-    """Refuse mechanisms whose motion is not smooth."""
-    limited = [
-        j.name
-        for j in mechanism.joints
-        if j.cone is not None or any(np.isfinite(b) for pair in j.limits or () for b in pair)
-    ]
+    """Refuse mechanisms that only steps of order 2 can move."""
+    collisions = [c.name for c in mechanism.collisions]
     loops, gears = [j.name for j in mechanism.loops], [g.name for g in mechanism.gears]
-    parts = (("contact", mechanism.contact_names), ("limits of joint", limited), ("loop joint", loops), ("gear", gears))
-    for what, names in parts:
+    for what, names in (("collision", collisions), ("loop joint", loops), ("gear", gears)):
         if names:
             more = f" and {len(names) - 1} more" if len(names) > 1 else ""
             raise ValueError(
-                f"Simulator(order={settings.order}): {mechanism.name!r} has the {what} {names[0]!r}{more}; which are "
-                f"not smooth; steps of higher order are for smooth motion: use order=2, or leave them out"
+                f"Simulator(order={settings.order}): {mechanism.name!r} has the {what} {names[0]!r}{more}; steps of "
+                f"higher order are for trees without collisions of their bodies: use order=2, or leave them out"
             )

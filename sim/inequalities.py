@@ -12,7 +12,7 @@ from sim.contact import (
     contact_jacobian,
     contact_kinematics,
 )
-from sim.elimination import subtree_sums
+from sim.elimination import dot_six, subtree_sums
 from sim.far_impulses import add_far_wrenches, far_impulses
 from sim.friction import (
     condense_contact,
@@ -35,7 +35,7 @@ from sim.terrain_contact import add_frame_matrix
 from solvers.jit import kernel
 from solvers.late import late
 
-_KAPPA_START = 1e-2  # [N s m]
+_KAPPA_START, _KAPPA_AGAIN = 1e-3, 1e-2  # [N s m] at first, and of later attempts
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
 
@@ -56,10 +56,10 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     """All cone variables on the central path of one kappa0, at the present gaps and slips; returns kappa0.
 
     growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h
-    (the impulse m d/h that stops it, over the distance), at least 0.01 N s m and kappa; slacks start at the gaps, at
-    least d/2 and sqrt(kappa0)/10.
+    (the impulse m d/h that stops it, over the distance), at least kappa and 0.001 N s m, or 0.01 N s m where an attempt
+    has failed; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
     """
-    k0 = max(kappa, _KAPPA_START * growth)
+    k0 = max(kappa, (_KAPPA_START if growth == 1.0 else _KAPPA_AGAIN) * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
@@ -160,9 +160,7 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
     pair_constants(model, work, goal)
     subtree_sums(model, work.wrench, work.subtree)
     for d in range(work.dnu.shape[0]):
-        a = work.S2[d]
-        f = work.subtree[model.dof_body[d]]
-        work.dnu[d] -= a[0] * f[0] + a[1] * f[1] + a[2] * f[2] + a[3] * f[3] + a[4] * f[4] + a[5] * f[5]
+        work.dnu[d] -= dot_six(work.S2[d], work.subtree[model.dof_body[d]])
     limit_constants(model, work, goal)
 
 

@@ -41,6 +41,7 @@ _SINGULAR = int(Status.SINGULAR)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
+_WORSE, _WORSE_LED = 10.0, 2.0  # times the residual before: what smaller violations may cost, before _LED and after
 _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
@@ -76,6 +77,7 @@ def try_from(
     kappa = options.kappa
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
+    worse = _WORSE if attempt < _LED else _WORSE_LED
     smoothing = kappa
     if attempt != 0:
         smoothing = start(model, work, options, q, v, attempt)
@@ -109,7 +111,7 @@ def try_from(
         if not linearize_step(model, work, h, q, v, smoothing):
             return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
         boundary = direction(model, work, h, kappa, merit.mean)
-        merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit)
+        merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 

@@ -44,12 +44,13 @@ def search(
     smoothing: float,
     boundary: float,
     last: Merit,
+    worse: float,
 ) -> tuple[Merit, int]:
     """Merit after a step along the Newton direction, halved until it is better than `last`; and the halvings.
 
     A step that the boundary of the cones would cut short is not: its pairs that leave their cones return to the
     central path of the present mean. Better is a smaller residual, or one within the noise of the products that it
-    belongs to; or smaller violations at a residual that did not double.
+    belongs to; or smaller violations at a residual that grew less than `worse` times.
     """
     q, v, u = inputs
     h = options.h
@@ -73,7 +74,7 @@ def search(
         if inside and now.residual <= max(last.residual, options.tolerance, 0.1 * now.mean**0.5):
             return now, halvings
         fits = now.violation <= last.violation and last.violation > options.kappa
-        if inside and fits and now.residual < 2.0 * last.residual:
+        if inside and fits and now.residual < worse * last.residual:
             return now, halvings
         alpha *= 0.5
     return now, _HALVINGS + 1

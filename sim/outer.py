@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sim.elimination import add_children
 from sim.model import InputKind, Integers, Matrix, Model, Vector, Work
 from sim.rotation import cross, rotate
 from solvers.dense import dot
@@ -46,11 +47,7 @@ def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
             input_wrench(model, work, j, w)
             for k in range(6):
                 out[model.input_index[j], k] += u[j] * w[k]
-    for i in range(n - 1, -1, -1):
-        p = model.body_parent[i]
-        if p >= 0:
-            for k in range(6):
-                out[p, k] += out[i, k]
+    add_children(model, out)
 
 
 @kernel
@@ -96,11 +93,7 @@ def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
             N[18 + 6 * r + 3 + b] -= w[3 + a]
             N[18 + 6 * r + a] += w[b]
             N[18 + 6 * r + b] -= w[a]
-    for i in range(n - 1, -1, -1):
-        p = model.body_parent[i]
-        if p >= 0:
-            for k in range(36):
-                out[p, k] += out[i, k]
+    add_children(model, out)
 
 
 @kernel

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics import body_jacobian
-from sim.model import Matrix, Model, Vector, Work
-from sim.rotation import Vec3, cross, transposed_times
+from sim.elimination import add_children
+from sim.model import Model, Vector, Work
+from sim.rotation import cross, transposed_times
 from solvers.jit import kernel
 
 
@@ -47,11 +48,6 @@ def columns_to_origin(A: Vector, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def _arm(work: Work, pos: Matrix, i: int) -> Vec3:
-    return pos[i, 0] - work.origin[0], pos[i, 1] - work.origin[1], pos[i, 2] - work.origin[2]
-
-
-@kernel
 def inertial_jacobians(model: Model, work: Work, h: float) -> None:
     """A1, A2, A3 of the bodies without contacts; A2 still in rows and columns at the centre of mass.
 
@@ -63,30 +59,22 @@ def inertial_jacobians(model: Model, work: Work, h: float) -> None:
         c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         e, u, v, w = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
         plus = angular_momentum_jacobian(J, i, h, c, x, y, z)
-        body_jacobian(model, work, h, i, plus, work.A3[i])
         minus = angular_momentum_jacobian(J, i, h, e, -u, -v, -w)
         px, py, pz = angular_momentum(J, i, h, c, x, y, z)
         mx, my, mz = angular_momentum(J, i, h, e, -u, -v, -w)  # -P-
-        m = model.body_mass[i] / h
-        A1 = work.A1[i]
+        body_jacobian(model, work, h, i, work.pos3, plus, work.A3[i])
+        body_jacobian(model, work, h, i, work.pos1, minus, work.A1[i])
         A2 = work.A2[i]
         for k in range(36):
-            A1[k] = 0.0
             A2[k] = 0.0
+        m = -2.0 * model.body_mass[i] / h
         for k in range(3):
-            A1[7 * k] = m
-            A2[7 * k] = -2.0 * m
+            A2[7 * k] = m
             for j in range(3):
-                A1[6 * (3 + k) + 3 + j] = minus[3 * k + j]
-                A2[6 * (3 + k) + 3 + j] = -plus[3 * k + j] - minus[3 * k + j]
-        add_skew(A2, 3, 3, -(px + mx), -(py + my), -(pz + mz))
+                A2[21 + 6 * k + j] = -plus[3 * k + j] - minus[3 * k + j]
         b = work.body_impulse[i]
         add_skew(A2, 0, 3, b[0], b[1], b[2])
-        add_skew(A2, 3, 3, b[3], b[4], b[5])
-        x, y, z = _arm(work, work.pos2, i)
-        rows_to_origin(A1, x, y, z)
-        x, y, z = _arm(work, work.pos1, i)
-        columns_to_origin(A1, x, y, z)
+        add_skew(A2, 3, 3, b[3] - px - mx, b[4] - py - my, b[5] - pz - mz)
 
 
 @kernel
@@ -124,8 +112,9 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
 @kernel
 def pose2_to_origin(work: Work) -> None:
     """A2 from the centre of mass to O; the arm of the force moves with pose 2: torque rows -= [f] for dx2."""
+    o = work.origin
     for i in range(work.A2.shape[0]):
-        x, y, z = _arm(work, work.pos2, i)
+        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
         A = work.A2[i]
         rows_to_origin(A, x, y, z)
         f = work.wrench[i]
@@ -136,10 +125,6 @@ def pose2_to_origin(work: Work) -> None:
 @kernel
 def sum_composites(model: Model, work: Work) -> None:
     """A1, A2, A3 of each body become the sums over its subtree."""
-    for i in range(model.body_parent.shape[0] - 1, -1, -1):
-        p = model.body_parent[i]
-        if p >= 0:
-            for k in range(36):
-                work.A1[p, k] += work.A1[i, k]
-                work.A2[p, k] += work.A2[i, k]
-                work.A3[p, k] += work.A3[i, k]
+    add_children(model, work.A1)
+    add_children(model, work.A2)
+    add_children(model, work.A3)

@@ -19,6 +19,7 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 _TWISTS = 12  # rows of scratch for twists at three configurations
+_PIECE = 64  # steps whose (A, B) are kept at once
 
 
 def parameter_columns(calls: Calls, mech: Mechanism, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
@@ -36,6 +37,25 @@ def parameter_columns(calls: Calls, mech: Mechanism, step: tuple[Vector, Vector]
         height_jacobian(model, work, at, places, coefficients)
         _add_heights(mech, plan, coefficients, out)
     return out
+
+
+def adjoint_products(calls: Calls, line: Sweep, kappa: float | None) -> int:
+    """The sweep by state and input from the (A, B) of a piece of the trajectory at a time, for orders above 2:
+
+    l_T = dL/dx_T,    l_t = A_t^T l_t+1 + dL/dx_t,    dL/du_t = B_t^T l_t+1;  the step that was not solved, or -1.
+    """
+    costate = line.loss[-1]
+    for last in range(len(line.us), 0, -_PIECE):
+        first = max(last - _PIECE, 0)
+        A, B, _, reports = calls.linearize(line.xs[first : last + 1], line.us[first:last], 1, kappa)
+        for t in range(last - 1, first - 1, -1):
+            line.report[0] = reports[t - first]
+            if reports[t - first, 0] != Status.SOLVED:
+                return t
+            line.inputs[t] = B[t - first].T @ costate
+            costate = A[t - first].T @ costate + line.loss[t]
+    line.costate[0] = costate
+    return -1
 
 
 def roll_parameters(
@@ -86,6 +106,8 @@ def adjoint_sweep(
         places=np.zeros((1, 3 * (sizes.ncontact - sizes.npair))),
         heights=np.zeros((1, sizes.nheight if len(plan.heights) else 0)),
     )
+    if calls.settings.order > 2:
+        return adjoint_products(calls, line, kappa), line
     needs = (bind_parameters, bind_heights) if len(plan.heights) else (bind_parameters,)
     model, work = calls.tables(*needs[: 2 if plan.size else 0])
     settings = calls.settings.array(kappa)

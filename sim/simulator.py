@@ -20,7 +20,7 @@ from sim.policies import Feedback, roll
 from sim.reactions import Reactions, reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of, fastest
 from sim.scene import with_contacts
-from sim.settings import Settings
+from sim.settings import Settings, default_kappa
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
 
@@ -33,25 +33,25 @@ _ORDERS = (2, 4, 6, 8)
 class Simulator(Derivatives):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
-    kappa           central-path parameter [N s m]: every contact presses with kappa / gap, so a resting body floats by
-                    kappa / impulse; smaller is harder. 1e-10 to simulate: creep is proportional to it, run time is
-                    not. Derivatives of a contact that carries m are within 1 % of those of hard contact up to
-                    .01 m g^2 h^3
+    kappa           central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa over
+                    its impulse. By default 1e-9 m/s * m |g| h, m the lightest part that no joint holds to another,
+                    |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions 1e-6. See `default_kappa`
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
-    order           of a step; 4, 6, 8 for mechanisms without contacts and limits: explicit, with 4, 7, 12 evaluations
-                    of the equations of motion. Momentum is exact with all; order 2 bounds the energy over any time,
-                    the others keep it to a much smaller error that grows with time
+    order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum
+                    is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
+                    grows. Steps that might leave out impulses kappa / gap beyond the tolerance are of order 2
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
-    With order 2, v is the mean velocity over the interval that led to q; with a higher order the velocity at the node.
+    With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
+    before what the ground does in the step to come: standing still, g h/2.
     """
 
     def __init__(
         self,
         mechanism: Mechanism,
         time_step: float = 0.02,
-        kappa: float = 1e-6,
+        kappa: float | None = None,
         tolerance: float = 1e-8,
         max_iterations: int = 500,
         order: int = 2,
@@ -62,19 +62,18 @@ class Simulator(Derivatives):
             raise ValueError(f"Simulator(max_iterations=...): expected a whole number >= 1, got {max_iterations!r}")
         if order not in _ORDERS:
             raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
-        super().__init__(
-            mechanism,
-            Settings(
-                checks.number("Simulator(time_step=...)", time_step, above=0.0),
-                checks.number("Simulator(kappa=...)", kappa, above=0.0),
-                checks.number("Simulator(tolerance=...)", tolerance, above=0.0),
-                int(max_iterations),
-                int(order),
-            ),
-        )
+        h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
+        self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
+        level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
+        accuracy = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
+        super().__init__(mechanism, Settings(h, level, accuracy, int(max_iterations), int(order)))
 
     def __reduce__(self) -> Any:
-        return Simulator, (self.mechanism, *self._calls.settings)
+        return Simulator, (self.mechanism, *self._given().values())
+
+    def _given(self) -> dict[str, Any]:
+        """The settings as they were given: kappa None where it is the default."""
+        return {**self._calls.settings._asdict(), "kappa": self._kappa}
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value:g}" for name, value in self._calls.settings._asdict().items())
@@ -83,7 +82,7 @@ class Simulator(Derivatives):
     def replace(self, **settings: Any) -> Simulator:
         """The same with other settings: those of Simulator(...), and `friction`, `law`, `gravity`, `mechanism`.
 
-        friction, law: for all contacts, or {contact name: value}. Compiled code is shared.
+        friction, law: for all contacts, or {contact name: value}. A default kappa stays one. Compiled code is shared.
         """
         known = ("mechanism", *_SETTINGS, "friction", "law", "gravity")
         for key in settings:
@@ -94,7 +93,7 @@ class Simulator(Derivatives):
                 mech = with_contacts(mech, field, settings.pop(field))
         if "gravity" in settings:
             mech = changed(mech, gravity=settings.pop("gravity"))
-        return Simulator(mech, **{**self._calls.settings._asdict(), **settings})
+        return Simulator(mech, **{**self._given(), **settings})
 
     def describe(self) -> str:
         """What the scene consists of, what a step computes, and what is left out because nothing needs it."""

@@ -27,6 +27,10 @@ def _high_order(model: Model, mechanism: Mechanism, settings: Settings) -> Calls
 
     check(mechanism, settings)
     calls = HighOrder(model, settings)
+    if len(model.contact_body) + len(model.limit_dof):
+        from sim.phased import Phased
+
+        calls = Phased(model, settings)
     calls.check_stiffness(mechanism)
     return calls
 

@@ -6,13 +6,12 @@ import json
 import os
 import subprocess
 import sys
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from programs import HOME
-from urdf_files import branched, joint, link, write
+from urdf_files import branched
 
 import dojo_opt as dojo
 from dojo_opt import cli
@@ -127,14 +126,3 @@ def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, caps
 def test_show_refuses_by_name(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", *arguments]) == 2
     assert message in capsys.readouterr().err
-
-
-def test_a_warning_is_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = write(tmp_path, link("base"), link("arm"), joint("elbow", "base", "arm"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        assert cli.main(["show", str(path), "--seconds", "0.05"]) == 0
-    lines = capsys.readouterr().err.splitlines()
-    assert lines == [
-        "dojo-opt: load_urdf: robot.urdf: nothing of the robot makes contact with the ground: it falls through"
-    ]

@@ -15,10 +15,10 @@ from solvers.status import Status
 Vector = NDArray[np.float64]
 
 # penalties that grew with every tick would never stop; a second line search would take its time
-_OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
+OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
 GUESSES = ("states", "feedback", "open loop")
 
-__all__ = ["GUESSES", "Settings", "Tick", "milliseconds"]
+__all__ = ["GUESSES", "OPTIONS", "Settings", "Tick", "milliseconds"]
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Settings:
 
     def planner(self, iterations: int) -> Options:
         """Options of the planner for the iterations of one tick."""
-        base = self.options or _OPTIONS
+        base = self.options or OPTIONS
         stage = Stage(self.kappa, self.kappa_grad or self.kappa, base.tolerance, iterations)
         settings = {name: getattr(base, name) for name in base.__dataclass_fields__}
         return Options(**(settings | {"stages": (stage,), "time_limit": self.time_limit}))

@@ -95,46 +95,59 @@ def closed_loop(
         raise ValueError(
             f"closed_loop(control_step=...): expected a multiple of the plant's step {h:g} s, got {control_step}"
         )
-    lies = plant.fallen if fallen is None else fallen
     plant.reset()
     if hasattr(controller, "reset"):
         controller.reset()
-    xs, us = [plant.x], []
-    touches: list[Contacts] = []
-    status: list[int] = []
-    message, survived = "Ran to the end.", True
-    command = np.zeros(plant.sim.nu)
+    run = _drive(controller, plant, steps, every, plant.fallen if fallen is None else fallen)
+    if reference is None:
+        reference = getattr(getattr(controller, "references", None), "state", None)
+    return ClosedLoop(
+        simulator=plant.simulator,
+        time=h * np.arange(len(run.x), dtype=np.float64),
+        x=np.array(run.x),
+        u=np.array(run.u).reshape(len(run.u), plant.simulator.nu),
+        status=np.array(run.status, dtype=np.int64),
+        contacts=_stacked(plant.simulator, run.contacts),
+        survived=run.survived,
+        message=run.message,
+        softened=plant.softened,
+        log=tuple(getattr(controller, "log", ())),
+        reference=reference,
+    )
+
+
+@dataclass
+class _Run:
+    """What is kept of every step."""
+
+    x: list[Vector]
+    u: list[Vector] = field(default_factory=list)
+    contacts: list[Contacts] = field(default_factory=list)
+    status: list[int] = field(default_factory=list)
+    survived: bool = True
+    message: str = "Ran to the end."
+
+
+def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]) -> _Run:
+    """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
+    run, command = _Run([plant.x]), np.zeros(plant.sim.nu)
     for k in range(steps):
         if k % every == 0:
             command = checks.array(
                 "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
             )
         u, result = plant.step(command)
-        status.append(int(result.status))
+        run.status.append(int(result.status))
         if result.status != Status.SOLVED:
-            message, survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
+            run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
             break
-        xs.append(plant.x)
-        us.append(u)
-        touches.append(result.contacts)
+        run.x.append(plant.x)
+        run.u.append(u)
+        run.contacts.append(result.contacts)
         if lies(plant.x):
-            message, survived = f"Fell at {plant.time:.3f} s.", False
+            run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
-    if reference is None:
-        reference = getattr(getattr(controller, "references", None), "state", None)
-    return ClosedLoop(
-        simulator=plant.simulator,
-        time=h * np.arange(len(xs), dtype=np.float64),
-        x=np.array(xs),
-        u=np.array(us).reshape(len(us), plant.simulator.nu),
-        status=np.array(status, dtype=np.int64),
-        contacts=_stacked(plant.simulator, touches),
-        survived=survived,
-        message=message,
-        softened=plant.softened,
-        log=tuple(getattr(controller, "log", ())),
-        reference=reference,
-    )
+    return run
 
 
 def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:

@@ -13,6 +13,7 @@ from sim import checks
 from sim.mechanism import Mechanism
 from sim.parts import Input
 from sim.scene import with_contacts
+from sim.terrain import Terrain
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -52,6 +53,7 @@ class Perturbation:
     slope: float = 0.0  # the ground rises by this angle [rad]
     slope_heading: float = 0.0  # towards this direction, from x to y [rad]
     ground_height: float = 0.0  # [m]
+    terrain: Terrain | None = None  # the ground under all contacts, instead of what the model has
     delay: float = 0.0  # from a command to the moment it acts [s]
     noise: ArrayLike = 0.0  # standard deviation of the measured state: a number or (ndx,) [m, rad, m/s, rad/s]
     control_limits: tuple[ArrayLike, ArrayLike] | None = None  # of what the actuators do with a command
@@ -65,6 +67,8 @@ class Perturbation:
             checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
         if not abs(checks.number(f"{call}(slope=...)", self.slope)) < 0.5 * np.pi:
             raise ValueError(f"{call}(slope=...): expected less than a right angle, got {self.slope:g} rad")
+        if self.terrain is not None and (self.slope or self.ground_height):
+            raise ValueError(f"{call}(terrain=...): give either it or a slope or ground_height")
         for push in self.pushes:
             if not isinstance(push, Push):
                 raise TypeError(f"{call}(pushes=...): expected a sequence of Push, got {push!r}")
@@ -110,6 +114,7 @@ class Perturbation:
             for axis, force in zip("xyz", np.eye(3), strict=True):
                 inputs.append(Input(body=name, force=force, name=f"push {name} {axis}"))
         changed = replace(mechanism, bodies=bodies, joints=joints, contacts=contacts, inputs=inputs)
+        changed = changed if self.terrain is None else changed.on(self.terrain)
         return changed if self.friction is None else with_contacts(changed, "friction", self.friction)
 
     def push_forces(self, mechanism: Mechanism, begin: float, end: float) -> Vector:

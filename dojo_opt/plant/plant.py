@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
 from sim import checks
 from sim.mechanism import Mechanism
@@ -22,8 +23,9 @@ __all__ = ["Plant"]
 
 _SOFTER = (10.0, 100.0, 1000.0)  # times the smoothing of a step that is not solved at its own
 _LOW = 0.5  # fallen: below this share of the first height,
-_LEVEL = 1e-6  # vertical part of a level axis
 _TILTED = 0.5  # or with less than this cosine between the base's axis and the normal of the ground
+_FLOOR = 0.1  # a plane with a normal that points up by more than this can be the floor
+_LEVEL = 1e-6  # vertical part of a level axis
 
 
 class Plant:
@@ -55,6 +57,8 @@ class Plant:
         self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation
         self.simulator = sim.replace(mechanism=p.mechanism(sim.mechanism))
         self.normal = p.normal
+        contacts = self.simulator.mechanism.contacts
+        self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
         self._noise = np.array(np.broadcast_to(np.asarray(p.noise, dtype=float), (sim.ndx,)))
         lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
         self._limits = tuple(np.broadcast_to(np.asarray(b, dtype=float), (sim.nu,)) for b in (lo, hi))
@@ -65,6 +69,8 @@ class Plant:
             )
         x = self.start if len(np.atleast_1d(p.offset)) == 0 else sim.integrate(self.start, p.offset)
         self._x0 = p.on_ground(sim.mechanism, x)
+        if p.terrain is not None:
+            self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
         self.reset()
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
@@ -126,10 +132,19 @@ class Plant:
         if not stands_free(self.sim.mechanism):
             return False
         now, first = self._base(x), self._base(self._x0)
-        floor = self.perturbation.ground_height
-        low = self.normal @ now[:3] - floor < _LOW * (self.normal @ first[:3] - floor)
+        low = self._above(now[:3]) < _LOW * self._above(first[:3])
         up = rotation_matrix(now[6:10]) @ rotation_matrix(first[6:10]).T @ self.normal
         return bool(low or up @ self.normal < _TILTED)
+
+    def _above(self, place: Vector) -> float:
+        """Height of a place (3,) above the ground below it [m]."""
+        contact, z = self._floor, float(place[2])
+        if contact is None:
+            return z
+        if contact.terrain is not None:
+            return z - contact.height - float(contact.terrain.height(place[0], place[1]))
+        normal = np.asarray(contact.normal)
+        return float((normal @ place - contact.height) / normal[2])
 
     def _base(self, x: Vector) -> Vector:
         """Maximal state (13,) of the first body."""

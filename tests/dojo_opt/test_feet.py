@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from hills import WAVES
 
-from dojo_opt import models
+from dojo_opt import Terrain, models
 from dojo_opt.feet import Feet
 from dojo_opt.rest import equilibrium, potential_gradient
 from sim.simulator import Simulator
@@ -110,5 +111,42 @@ def test_no_equilibrium_is_said(sim):
     lifted[0, :2, 2] += 0.05  # both front feet off the ground
     with pytest.raises(ValueError, match="no vertical forces at 'FR_foot'.* balance the weight"):
         equilibrium(sim, feet.place(x, lifted)[0])
-    with pytest.raises(ValueError, match="acts on a body, not on a joint"):
-        equilibrium(Simulator(models.block(), time_step=0.02))
+    steep = Simulator(models.quadruped(friction=0.1).on(Terrain.slope(0.2)), time_step=0.02)
+    x = steep.neutral()
+    with pytest.raises(ValueError, match="stands on ground of slope 0.203 with friction 0.1, and would slide"):
+        equilibrium(steep, on_its_feet(steep, x))
+
+
+def on_its_feet(robot, x):
+    """The neutral pose with every foot on the terrain below it."""
+    feet = Feet(robot)
+    targets = feet.positions(x)
+    for k, contact in enumerate(feet.contacts):
+        targets[k, 2] = (
+            contact.terrain.surface(contact.radius).height(*targets[k, :2])
+            if contact.terrain
+            else (
+                (contact.height + contact.radius - np.asarray(contact.normal)[:2] @ targets[k, :2]) / contact.normal[2]
+            )
+        )
+    x = x.copy()
+    x[2] += targets[:, 2].mean() - feet.positions(x)[:, 2].mean()
+    return feet.place(x, targets[None])[0]
+
+
+@pytest.mark.parametrize("ground", [Terrain.slope(0.1, (1.0, 0.5)), WAVES])
+def test_equilibrium_on_terrain(ground):
+    """Friction carries what a slope leaves: the whole weight, upwards; what is left creeps with kappa."""
+    robot = Simulator(models.quadruped(damper=0.5).on(ground), time_step=0.02, kappa=1e-8)
+    x, u = equilibrium(robot, on_its_feet(robot, robot.neutral()))
+    step = robot.step(x, u)
+    assert np.abs(step.x[robot.nq :]).max() < 1e-7
+    mass = sum(body.mass for body in robot.mechanism.bodies)
+    np.testing.assert_allclose(step.contacts.force.sum(axis=0), [0.0, 0.0, 9.81 * mass], atol=1e-3)
+
+
+def test_pushes_are_zero_at_rest():
+    block = Simulator(models.block(), time_step=0.02)
+    x, u = equilibrium(block)
+    assert np.all(u == 0.0)
+    assert np.abs(block.step(x, u).x[block.nq :]).max() < 1e-7

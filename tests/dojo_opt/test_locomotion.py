@@ -131,13 +131,12 @@ def test_jump_up():
 
 @pytest.mark.parametrize("height", [0.2, 0.25])
 def test_leap_is_found_from_standing_and_a_goal(height):
-    """With steps of 20 ms it may stumble when it is replayed with shorter ones; cut into five, it holds at 1 ms."""
+    """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms."""
     problem = problems.leap(distance=0.3, height=height)
     assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
-    coarse = ilqr(problem)
-    assert coarse.success and coarse.nit <= 90, coarse.summary()
-    plan = ilqr(problem.refined(5), warm_start=coarse)
-    assert plan.success and plan.nit <= 50, plan.summary()
+    plan = ilqr(problem)
+    assert plan.success and plan.nit <= 140, plan.summary()
+    assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
     assert plan.x[:, 2].max() - plan.x[0, 2] > 0.2
     assert lowest_foot(problem, plan).max() > 0.1
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.3, abs=2e-3)

@@ -56,6 +56,21 @@ def test_quadruped_learns_the_slope_it_walks_up():
         assert worst < 0.015 if learn else worst > 0.015
 
 
+@pytest.mark.parametrize("knows", [False, True])
+def test_quadruped_trots_over_a_bump(knows):
+    """Blind, it learns the height from the feet that stand; its trunk follows the ground either way."""
+    bump = dojo.Terrain.from_function(
+        lambda x, y: 0.04 * np.exp(-(((x - 0.45) / 0.2) ** 2)) + 0.0 * y, np.arange(-1.0, 1.5, 0.05), [0.0]
+    )
+    mpc = dojo.tasks.quadruped_mpc(terrain=bump if knows else None)
+    plant = dojo.tasks.plant(mpc, 4e-3, **({} if knows else {"terrain": bump}))
+    loop = dojo.closed_loop(mpc, plant, 1.6)
+    assert loop.survived, loop.message
+    assert loop.rms() < 0.06
+    assert loop.x[-1, 2] - loop.x[0, 2] > 0.01
+    assert loop.contacts.gap.min() > -1e-4
+
+
 def test_command_line_runs_a_task(tmp_path, capsys):
     out, html = tmp_path / "loop.png", tmp_path / "loop.html"
     arguments = ["run", "hopper_mpc", "--seconds", "0.3", "--perturb", "payload=1.0", "--set", "substeps=2"]

@@ -56,6 +56,17 @@ def test_a_plant_stands_on_terrain_and_refuses_a_slope_of_its_own():
     assert Perturbation(friction=0.1).mechanism(mech).contacts[0].terrain is WAVES
     with pytest.raises(ValueError, match="not on terrain"):
         Perturbation(slope=0.1).mechanism(mech)
+    with pytest.raises(ValueError, match="either it or a slope"):
+        Perturbation(slope=0.1, terrain=WAVES)
+    hill = dojo.Terrain.slope(0.2, height=1.0)
+    plant = dojo.Plant(dojo.Simulator(ball(radius=0.1), time_step=0.02), terrain=hill)
+    assert plant.simulator.mechanism.contacts[0].height == pytest.approx(np.cos(0.2))
+    assert plant.x[2] == pytest.approx(hill.height(*plant.start[:2]) + 0.1 / np.cos(0.2))  # it touches
+    far = plant.x.copy()
+    far[[0, 2]] += 5.0, 5.0 * np.tan(0.2)
+    assert not plant.fallen(far)
+    far[2] = plant.x[2]  # below the ground there
+    assert plant.fallen(far)
 
 
 def test_other_engines_refuse_what_they_would_get_wrong():

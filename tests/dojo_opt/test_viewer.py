@@ -10,7 +10,6 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt import viewer
 from dojo_opt.motion import motion
-from dojo_opt.solids import bones
 
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [
@@ -127,20 +126,3 @@ def test_obstacles_are_drawn():
     commands = viewer._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
     drawn = [command.path.lower() for command in commands if "obstacles" in command.path.lower()]
     assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
-
-
-def test_a_body_without_a_shape_is_drawn_by_its_joints():
-    links = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in ("upper", "lower")]
-    joints = [
-        dojo.Joint("revolute", None, "upper", child_point=(0.1, 0.2, 0.4), axis=(0, 1, 0)),
-        dojo.Joint(
-            "revolute", "upper", "lower", parent_point=(0.1, -0.1, -0.4), child_point=(0, 0, 0.3), axis=(0, 1, 0)
-        ),
-    ]
-    mech = dojo.Mechanism(links, joints)
-    for name, start, end in (("upper", (0.1, 0.2, 0.4), (0.1, -0.1, -0.4)), ("lower", (0, 0, 0.3), (0, 0, 0))):
-        _, (rod, place), *_ = bones(mech, name)
-        along = place[:3, :3] @ [0.0, rod.height, 0.0]  # MeshCat's cylinders stand along y
-        np.testing.assert_allclose(np.abs(along), np.abs(np.subtract(end, start)), atol=1e-12)
-        np.testing.assert_allclose(place[:3, 3], 0.5 * np.add(start, end), atol=1e-12)
-        np.testing.assert_allclose(abs(along @ np.subtract(end, start)), rod.height**2, rtol=1e-12)

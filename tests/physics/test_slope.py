@@ -18,6 +18,16 @@ def test_no_creep_in_ten_seconds(law):
     assert np.linalg.norm(xs[-1, :2] - xs[0, :2]) < 1e-6
 
 
+@pytest.mark.parametrize("time_step", [1e-3, 0.01, 0.05])
+@pytest.mark.parametrize("mass", [0.1, 100.0])
+def test_no_creep_in_ten_seconds_by_default(time_step, mass):
+    """The same at the default kappa and tolerance, at every time step and weight."""
+    mech = block(mass=mass, friction=0.5, gravity=tilted(np.deg2rad(20.0)))
+    sim = dojo.Simulator(mech, time_step=time_step)
+    xs = run(sim, REST, round(10.0 / time_step))
+    assert np.linalg.norm(xs[-1, :2] - xs[0, :2]) < 1e-6
+
+
 def test_creep_is_that_of_the_central_path():
     """mu gamma v / (a + sqrt(a^2 + v^2)) = tangential load: v = 2 a r / (1 - r^2), a = gap/(2 mu), r = tan/mu."""
     angle, kappa, h = np.deg2rad(15.0), 1e-6, 0.01

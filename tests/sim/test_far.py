@@ -90,7 +90,8 @@ def test_what_comes_near_within_the_step_is_solved_for(height):
     """Shot at the ground with 2 km/s, far and at rest before: balance and contact law hold at the solution."""
     push = dojo.Input(body="ball", force=(0.0, 0.0, 1.0))
     mech = dataclasses.replace(ball(radius=0.1, friction=0.5), inputs=[push])
-    sim, h, kappa = dojo.Simulator(mech, time_step=0.02), 0.02, 1e-6
+    h, kappa = 0.02, 1e-6
+    sim = dojo.Simulator(mech, time_step=h, kappa=kappa)
     x = np.r_[0.0, 0.0, height, 1.0, np.zeros(9)]
     assert sim.step(x).success and far(sim) == 1
     result = sim.step(x, [-1e5])

@@ -107,7 +107,7 @@ def test_what_is_wrong_with_a_gear_is_said() -> None:
             replace(mech, gears=[gear])
     with pytest.raises(ValueError, match=r"Gear\('left', ratio=\.\.\.\)"):
         Gear("left", "right", float("nan"))
-    with pytest.raises(ValueError, match="has the gear 'left' and 1 more; which are not smooth"):
+    with pytest.raises(ValueError, match="has the gear 'left' and 1 more; steps of higher order are for trees"):
         dojo.Simulator(replace(mech, joints=[replace(j, limits=None) for j in mech.joints]), order=4)
     twice = replace(mech, gears=[Gear("left", "right", -1.0), Gear("right", "left", -1.0, name="again")])
     sim = dojo.Simulator(twice, time_step=0.01)

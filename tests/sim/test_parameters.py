@@ -203,7 +203,7 @@ def test_every_value_can_be_put_in_its_place() -> None:
 @pytest.mark.parametrize(
     ("wrt", "message"),
     [
-        (("weight",), r"wrt=.*parameter.*'weight'"),
+        (("weight",), r"wrt=.*kind.*'weight'"),
         (("friction:hand",), r"no parameter 'friction:hand'.*friction:body1"),
         (("cone",), r"no parameter 'cone'.*none"),
         (("mass", "mass"), "mass"),
@@ -216,12 +216,12 @@ def test_bad_names(wrt: tuple[str, ...], message: str) -> None:
         case.sim.linearize(case.x, case.u, wrt=wrt)
 
 
-def test_orders_above_two_are_refused() -> None:
+def test_parameters_of_orders_above_two_are_refused() -> None:
     sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=4)
     with pytest.raises(ValueError, match=r"linearize\(wrt=...\): expected a simulator of order 2, got order 4"):
         sim.linearize(sim.neutral(), wrt=("mass",))
-    with pytest.raises(ValueError, match=r"vjp: expected a simulator of order 2"):
-        sim.vjp((np.tile(sim.neutral(), (2, 1)), np.zeros((1, sim.nu))), np.ones((2, sim.ndx)))
+    with pytest.raises(ValueError, match=r"vjp\(wrt=...\): expected a simulator of order 2"):
+        sim.vjp((np.tile(sim.neutral(), (2, 1)), np.zeros((1, sim.nu))), np.ones((2, sim.ndx)), wrt=("mass",))
 
 
 def test_bad_values_and_shapes() -> None:

@@ -35,7 +35,8 @@ def maximal(**changes: float) -> np.ndarray:
 
 def test_sizes() -> None:
     assert (SIM.nbody, SIM.nq, SIM.nv, SIM.nx, SIM.ndx, SIM.nu, SIM.ncontact) == (2, 8, 7, 15, 14, 3, 2)
-    assert (SIM.time_step, SIM.kappa, SIM.tolerance) == (0.01, 1e-6, 1e-8)
+    weight = 9.81 * sum(body.mass for body in SIM.mechanism.bodies)
+    assert (SIM.time_step, SIM.kappa, SIM.tolerance) == (0.01, pytest.approx(1e-11 * weight), 1e-8)
 
 
 def test_settings_are_fixed() -> None:

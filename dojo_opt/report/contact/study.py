@@ -15,7 +15,7 @@ from dojo_opt.report.engines import Engine, Ours, installed
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
 
-KAPPA = 1e-10  # [N s m] recommended for simulation: hard, and solved as reliably as larger ones
+KAPPA = 1e-10  # [N s m] the default of 1 kg at 10 ms: hard, and solved as reliably as larger ones
 KAPPAS = (1e-6, 1e-8, KAPPA, 1e-11)
 CURVE = tuple(10.0 ** -np.arange(4.0, 13.5))  # of creep against kappa
 RATES = (20, 50, 100, 200, 500)  # [Hz]
@@ -33,9 +33,10 @@ SUMMARY = (
     "time step."
 )
 NOTES = [
-    f"kappa {KAPPA:g} is the one to simulate with: creep and the gap at rest are proportional to kappa, run time is "
-    "not. The gap is kappa over the impulse m g h, so light bodies and small time steps ask for a smaller one. The "
-    "default of 1e-6 is meant for planning: at 1 ms it lets the block of 1 kg float at 0.4 mm and creep at 1.3 mm/s.",
+    f"kappa {KAPPA:g} is the one to simulate these with: creep and the gap at rest are proportional to kappa, run time "
+    "is not. The gap is kappa over the impulse m g h, so light bodies and small time steps ask for a smaller one: the "
+    "default is 1e-9 m/s * m g h. That of plans, 1e-6, lets the block of 1 kg float at 0.4 mm and creep at 1.3 mm/s "
+    "at 1 ms.",
     "MuJoCo: elliptic cones, its defaults otherwise; 'stiff contacts' are solref .001 1, solimp .99 .999 .0001. Drake: "
     "point contact, 1 mm penetration allowance. PyBullet: 50 iterations. Points are balls of a tenth of a millimetre "
     "there. The sliding block starts from where it rests in each engine.",

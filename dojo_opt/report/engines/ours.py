@@ -22,7 +22,7 @@ class Ours:
     """The variational step; order, kappa and tolerance as in Simulator."""
 
     order: int = 2
-    kappa: float = 1e-6
+    kappa: float | None = None  # by default that of Simulator
     tolerance: float = 1e-8
     rounds: int = 3  # a run shorter than a second is clocked so many times
 

@@ -1,0 +1,119 @@
+"""How iLQR ends: every status, with a plan that fits it."""
+
+import numpy as np
+from doubles import DoubleIntegrator, Pendulum, SmoothedWall
+from small_problems import gaps, lqr, swingup
+
+from dojo_opt.constraint import Goal
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.options import Options
+from dojo_opt.planner import Solver, ilqr
+from dojo_opt.problem import Problem
+from solvers.status import MESSAGES, Status
+
+
+def test_start_at_the_optimum():
+    problem = lqr()
+    plan = ilqr(problem, controls=ilqr(problem).u)
+    assert plan.success and plan.nit == 0
+
+
+def test_iteration_limit():
+    plan = ilqr(swingup(), max_iterations=2, tolerance=1e-9)
+    assert not plan.success and plan.status == Status.MAX_ITERATIONS and plan.nit == 2
+    assert ilqr(swingup(), tolerance=1e-9).success
+
+
+def test_time_limit():
+    plan = ilqr(swingup(), time_limit=0.0)
+    assert plan.status == Status.TIME_LIMIT and plan.nit == 0 and np.all(np.isfinite(plan.x))
+
+
+def test_time_limit_returns_a_consistent_plan():
+    problem = Problem(SmoothedWall(), [1.0, 0.0], 20, cost=[Tracking([-1.0, 0.0], 1.0), Effort(0.01)])
+    plan = ilqr(problem, states=np.tile([1.0, 0.0], (21, 1)), max_iterations=1)
+    assert plan.status == Status.MAX_ITERATIONS
+    assert plan.gap == 0.0 and gaps(problem, plan, 1e-6) < 1e-12
+
+
+def test_callback_stops():
+    seen = []
+
+    def stop(record):
+        seen.append(record["merit"])
+        if len(seen) == 2:
+            raise StopIteration
+
+    plan = ilqr(swingup(), callback=stop, tolerance=1e-9)
+    assert plan.status == Status.STOPPED and plan.nit == 2 == len(seen)
+
+
+class Contrary(DoubleIntegrator):
+    """Its derivatives have the wrong sign."""
+
+    def linearize_trajectory(self, xs, us, substeps=1, kappa=None):
+        lin = super().linearize_trajectory(xs, us, substeps, kappa)
+        return lin._replace(B=-lin.B)
+
+
+def test_line_search_failure():
+    problem = Problem(Contrary(), [1.0, 0.0], 10, cost=[Tracking(np.zeros(2), 1.0), Effort(1e-3)])
+    plan = ilqr(problem)
+    assert not plan.success and plan.status == Status.LINE_SEARCH
+    assert all(r["alpha"] == 0.0 for r in plan.history) and plan.nit >= 1
+
+
+def test_a_last_stage_that_stays_stuck_ends_the_solve():
+    goal = Goal(np.zeros(2))
+    problem = Problem(Contrary(), [1.0, 0.0], 10, cost=[Tracking(np.zeros(2), 1.0), Effort(1e-3)], constraints=[goal])
+    plan = ilqr(problem)
+    assert not plan.success and plan.status == Status.LINE_SEARCH
+    assert plan.nit <= 100
+
+
+def test_simulation_failure_names_the_knot():
+    problem = swingup(controls0=np.full((30, 1), 50.0))
+    problem.sim.too_fast = 12.0
+    plan = ilqr(problem)
+    assert plan.status == Status.SIMULATION_FAILED and not plan.success
+    assert "Knot 2, MAX_ITERATIONS" in plan.message
+
+
+def test_trials_that_cannot_be_simulated_are_rejected():
+    problem = Problem(Pendulum(), np.zeros(2), 30, cost=[Tracking([np.pi, 0.0], 1.0), Effort(1e-4)])
+    problem.sim.too_fast = 8.0
+    plan = ilqr(problem)
+    assert np.all(np.isfinite(plan.x)) and np.abs(plan.x[:, 1]).max() < 8.0
+    assert plan.fun < ilqr(problem, max_iterations=0).fun
+    assert any(r["alpha"] < 1.0 for r in plan.history)
+
+
+def test_no_positive_definite_hessian():
+    problem = lqr()
+    problem.costs[1].weight[:] = -1e3  # cannot be built through the public interface
+    plan = ilqr(problem, regularization_max=1e2)
+    assert plan.status == Status.MAX_REGULARIZATION and not plan.success
+
+
+def test_gains_of_a_plan_have_no_more_regularization_than_they_need():
+    exact = ilqr(lqr())
+    held_back = ilqr(lqr(), regularization=1e3, max_iterations=1)
+    assert held_back.history[-1]["mu"] == 1e3 and not held_back.success
+    np.testing.assert_allclose(held_back.K, exact.K, rtol=1e-6)
+    problem = lqr()
+    problem.costs[1].weight[:] = -1.0  # needs some, and gets the first of the schedule that is enough
+    solver = Solver(problem, Options(regularization=1e3, max_iterations=1))
+    concave = solver.solve()
+    assert concave.history[-1]["mu"] == 1e3
+    assert 1.0 <= solver.descent.mu <= 4.0
+    assert np.all(np.isfinite(concave.K)) and np.abs(concave.K).max() > 0.0
+
+
+def test_infeasible_constraints():
+    problem = lqr(horizon=5, constraints=[Goal([0.0, 0.0]), Goal([1.0, 0.0])])
+    plan = ilqr(problem, max_updates=4)
+    assert plan.status == Status.INFEASIBLE and not plan.success and plan.violation > 0.1
+
+
+def test_every_status_has_a_sentence():
+    assert set(MESSAGES) == set(Status)

@@ -1,0 +1,49 @@
+"""Measurement: the state of the model that measured states amount to, and its prediction over a delay."""
+
+import numpy as np
+import pytest
+from standing_hopper import HOPPER, standing_problem
+
+import dojo_opt as dojo
+from dojo_opt.mpc.measurement import Measurement
+
+
+def test_measured_velocity_becomes_the_mean_one_of_a_model_step():
+    """In free fall the mean velocity of the last 50 ms is g/2 (50 ms) above the present one."""
+    plant = HOPPER.replace(time_step=1e-3, kappa=1e-8)
+    x = HOPPER.neutral()
+    x[2] += 2.0
+    fall = plant.rollout(plant.start(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
+    measured = Measurement(HOPPER)
+    for t, state in zip(fall.time, fall.x, strict=True):
+        measured.add(float(t), state)
+    now = measured.state()
+    assert now[10] == pytest.approx(-9.81 * 0.075, abs=1e-6)
+    assert fall.x[-1, 10] == pytest.approx(-9.81 * 0.0995, abs=1e-6)
+    np.testing.assert_array_equal(now[:8], fall.x[-1, :8])
+    assert Measurement(HOPPER, mean=False)._mean is False
+
+
+def test_measured_velocity_is_left_alone_when_no_sample_is_a_model_step_old():
+    measured = Measurement(HOPPER)
+    x = HOPPER.neutral()
+    x[8] = 0.7
+    measured.add(0.0, x)
+    assert measured.state()[8] == 0.7
+    measured.add(0.2, x)
+    assert measured.state()[8] == 0.7
+
+
+def test_prediction_over_the_delay_ends_a_free_fall_where_it_ends():
+    problem = standing_problem()
+    mpc = dojo.MPC(problem, delay=0.02)
+    plant = HOPPER.replace(time_step=1e-3, kappa=1e-8)
+    x = HOPPER.neutral()
+    x[2] += 2.0
+    fall = plant.rollout(plant.start(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
+    for t, state in zip(fall.time[:81], fall.x[:81], strict=True):
+        mpc._measured.add(float(t), state)
+    mpc._first_input = np.zeros(3)
+    ahead = mpc._ahead(0.08)
+    assert ahead[2] == pytest.approx(fall.x[-1, 2], abs=1e-6)
+    assert ahead[10] == pytest.approx(-9.81 * 0.075, abs=1e-4)
