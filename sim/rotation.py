@@ -45,6 +45,18 @@ def quat_mul(a0: float, a1: float, a2: float, a3: float, b0: float, b1: float, b
 
 
 @kernel
+def quat_turn(a0: float, a1: float, a2: float, a3: float, b0: float, b1: float, b2: float, b3: float) -> Quat:
+    """b a^*, the rotation from a to b in world axes, with nonnegative scalar part."""
+    w = b0 * a0 + b1 * a1 + b2 * a2 + b3 * a3
+    x = -b0 * a1 + b1 * a0 - b2 * a3 + b3 * a2
+    y = -b0 * a2 + b1 * a3 + b2 * a0 - b3 * a1
+    z = -b0 * a3 - b1 * a2 + b2 * a1 + b3 * a0
+    if w < 0.0:
+        return -w, -x, -y, -z
+    return w, x, y, z
+
+
+@kernel
 def quat_matrix(w: float, x: float, y: float, z: float) -> Mat3:
     """Rotation matrix R(q), row-major."""
     return (
