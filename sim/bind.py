@@ -117,7 +117,7 @@ def _has_ball_springs(model: Model) -> bool:
 def bind_poses(model: Model) -> None:
     """What every call of a mechanism may need."""
     if np.any(model.joint_nrot == 2):
-        _bind(model, (swing.swing_pose,))
+        _bind(model, (swing.swing_pose, swing.swing_turn))
     if _has_ball_springs(model):
         _bind(model, (ball_spring.add_spring_block,))
 

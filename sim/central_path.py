@@ -7,6 +7,7 @@ from sim.inequalities import inequality_kinematics, keep_inequalities, move_ineq
 from sim.line_search import largest_turn
 from sim.merit import residuals
 from sim.model import Guess, Model, Options, Vector, Work
+from sim.moves import turn_bodies
 from sim.pair_choice import choose_pairs
 from solvers.jit import inlined, kernel
 
@@ -26,6 +27,7 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
             work.nu[d] = share * v[d]
             work.nu_trial[d] = work.nu[d]
         if momentum_balance(model, work, h, q):
+            turn_bodies(work, work.rot3)
             choose_pairs(model, work)
             inequality_kinematics(model, work, h)
             return True

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from math import atan2, pi
 
-from sim.kinematics import displace, tree_poses
+from sim.kinematics import tree_poses
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
-from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate
+from sim.moves import move_back
+from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate, transposed_times
 from sim.swing_coordinates import swing_component, swing_of
 from solvers.jit import kernel
 from solvers.record import Table
@@ -20,23 +21,21 @@ from solvers.record import Table
 
 @kernel
 def node_poses(model: Model, work: Work, h: float, x: Vector) -> None:
-    """Poses and joint columns at configurations 2 and 1 of a state, about the origin of the world."""
+    """Poses and joint columns at configurations 2 and 1 of a state, about the origin of the world, and moves."""
     nv = model.dof_body.shape[0]
     nq = x.shape[0] - nv
     for k in range(3):
         work.origin[k] = 0.0
-    displace(model, x[:nq], x[nq:], -h, work.theta1)
-    tree_poses(model, x[:nq], x[:nq], work.origin, work.pos2, work.quat2, work.rot2, work.S2)
-    tree_poses(model, work.theta1, x[:nq], work.origin, work.pos1, work.quat1, work.rot1, work.S1)
+    tree_poses(model, work, x[:nq])
+    move_back(model, work, h, x[:nq], x[nq:])
 
 
 @kernel
 def body_turn(work: Work, i: int) -> Vec3:
     """log(q1^* q2) of body i: its rotation over the last interval, body axes [rad]."""
-    a = work.quat1[i]
-    b = work.quat2[i]
-    t = quat_mul(a[0], -a[1], -a[2], -a[3], b[0], b[1], b[2], b[3])
-    return quat_log(t[0], t[1], t[2], t[3])
+    t = work.turn_in[i]
+    x, y, z = quat_log(t[0], t[1], t[2], t[3])
+    return transposed_times(work.rot2[i], x, y, z)
 
 
 @kernel
@@ -47,7 +46,7 @@ def maximal_state(model: Model, work: Work, h: float, x: Vector, out: Matrix) ->
         w = body_turn(work, i)
         for k in range(3):
             out[i, k] = work.pos2[i, k]
-            out[i, 3 + k] = (work.pos2[i, k] - work.pos1[i, k]) / h
+            out[i, 3 + k] = work.move_in[i, k] / h
             out[i, 10 + k] = w[k] / h
         for k in range(4):
             out[i, 6 + k] = work.quat2[i, k]

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from sim.advance import advance, follows_on
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
-from sim.kinematics import displace, tree_poses
+from sim.kinematics import tree_poses
 from sim.model import InputKind, Matrix, Model, Vector, Work
-from sim.rotation import Mat3, quat_turn, rotate
+from sim.moves import Increment, move_back, tree_moves
+from sim.rotation import Mat3, cross, rotate
 from solvers.jit import kernel
 
 _BODY = int(InputKind.BODY)
@@ -38,16 +39,11 @@ def world_inertia(model: Model, rot: Matrix, out: Matrix) -> None:
 
 
 @kernel
-def turns(first: Matrix, second: Matrix, out: Matrix) -> None:
-    """out[i] = (cos, sin * axis) of half the rotation from first[i] to second[i], world axes.  (nbody, 4)"""
-    for i in range(out.shape[0]):
-        a = first[i]
-        b = second[i]
-        c, x, y, z = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-        out[i, 0] = c
-        out[i, 1] = x
-        out[i, 2] = y
-        out[i, 3] = z
+def place_origin(model: Model, work: Work, q: Vector) -> None:
+    """O at body 0 where that can move freely, at its joint otherwise."""
+    free = model.body_parent.shape[0] > 0 and model.body_parent[0] < 0 and model.joint_ntrans[0] == 3
+    for k in range(3):
+        work.origin[k] = q[k] if free else model.joint_parent_point[0, k]
 
 
 @kernel
@@ -56,39 +52,43 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
 
     momentum_in = (m (x2 - x1)/h + h m g + h f,  -P(c', -s') + h tau)      at the centre of mass
 
+    -P(c', -s') is, in world axes, the P(c', s') with which the body left configuration 1: what a step hands on.
+
     False when a body turned by half a turn or more from 1 to 2: the state is not what it seems.
     """
     before = (work.origin[0], work.origin[1], work.origin[2])
-    if model.body_parent.shape[0] > 0 and model.body_parent[0] < 0 and model.joint_ntrans[0] == 3:
-        for k in range(3):
-            work.origin[k] = q[k]
-    else:
-        for k in range(3):
-            work.origin[k] = model.joint_parent_point[0, k]
+    place_origin(model, work, q)
     if follows_on(work, q, v):
-        advance(model, work, h, v, before)
+        advance(model, work, h, q, v, before)
+        world_inertia(model, work.rot2, work.inertia_world)
     else:
-        displace(model, q, v, -h, work.theta1)
-        tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
-        tree_poses(model, work.theta1, q, work.origin, work.pos1, work.quat1, work.rot1, work.S1)
-        turns(work.quat1, work.quat2, work.turn_in)
-    world_inertia(model, work.rot2, work.inertia_world)
-    representable = True
+        work.counts[3] = 0
+        tree_poses(model, work, q)
+        move_back(model, work, h, q, v)
+        world_inertia(model, work.rot2, work.inertia_world)
+        mean_momenta(model, work, h)
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
-        px, py, pz = angular_momentum(work.inertia_world, i, h, c, -x, -y, -z)
-        work.momentum_in[i, 3] = -px
-        work.momentum_in[i, 4] = -py
-        work.momentum_in[i, 5] = -pz
-        m = model.body_mass[i]
+        m = h * model.body_mass[i]
         for k in range(3):
-            work.momentum_in[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + h * model.gravity[k])
+            work.momentum_in[i, k] += m * model.gravity[k]
             work.body_impulse[i, k] = 0.0
             work.body_impulse[i, 3 + k] = 0.0
     representable = turns_below_half(model, work, h, v)
     for j in range(u.shape[0]):
         _apply_input(model, work, h, j, u[j])
     return representable
+
+
+@kernel
+def mean_momenta(model: Model, work: Work, h: float) -> None:
+    """momentum_in = (m (x2 - x1)/h, -P(c', -s')), from the moves of interval 1-2."""
+    for i in range(model.body_parent.shape[0]):
+        m = model.body_mass[i] / h
+        t = work.turn_in[i]
+        px, py, pz = angular_momentum(work.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
+        for k in range(3):
+            work.momentum_in[i, k] = m * work.move_in[i, k]
+        work.momentum_in[i, 3], work.momentum_in[i, 4], work.momentum_in[i, 5] = -px, -py, -pz
 
 
 @kernel
@@ -141,33 +141,35 @@ def joints_below_turn(model: Model, nu: Vector, h: float) -> bool:
 
 @kernel
 def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
-    """balance = (m (x3 - x2)/h, P(c, s)) - momentum_in, as a wrench about O, at the trial velocity work.nu.
+    """balance = momentum_out - momentum_in, as a wrench about O, at the trial velocity work.nu.
 
-    False when a body would turn by half a turn or more.   Fills configuration 3, turn, balance.
+    momentum_out = (m (x3 - x2)/h, P(c, s))      at the centre of mass
+
+    False when a body would turn by half a turn or more.   Fills configuration 3, move, turn, momentum_out, balance;
+    rotation matrices are left to `turn_bodies`, for the balance has no use for them.
     """
-    displace(model, q, work.nu, h, work.theta3)
-    tree_poses(model, work.theta3, q, work.origin, work.pos3, work.quat3, work.rot3, work.S3)
-    turns(work.quat2, work.quat3, work.turn)
+    tree_moves(model, work, Increment(q, work.nu, h), True)
     inside = joints_below_turn(model, work.nu, h)
     for i in range(model.body_parent.shape[0]):
         c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
         inside = inside and c > 1e-3
-        tx, ty, tz = angular_momentum(work.inertia_world, i, h, c, x, y, z)
+        p = work.momentum_out[i]
+        p[3], p[4], p[5] = angular_momentum(work.inertia_world, i, h, c, x, y, z)
         m = model.body_mass[i] / h
-        fx = m * (work.pos3[i, 0] - work.pos2[i, 0]) - work.momentum_in[i, 0]
-        fy = m * (work.pos3[i, 1] - work.pos2[i, 1]) - work.momentum_in[i, 1]
-        fz = m * (work.pos3[i, 2] - work.pos2[i, 2]) - work.momentum_in[i, 2]
-        dx, dy, dz = (
+        for k in range(3):
+            p[k] = m * work.move[i, k]
+        b = work.balance[i]
+        for k in range(6):
+            b[k] = p[k] - work.momentum_in[i, k]
+        tx, ty, tz = cross(
             work.pos2[i, 0] - work.origin[0],
             work.pos2[i, 1] - work.origin[1],
             work.pos2[i, 2] - work.origin[2],
+            b[0],
+            b[1],
+            b[2],
         )
-        work.balance[i, 0] = fx
-        work.balance[i, 1] = fy
-        work.balance[i, 2] = fz
-        work.balance[i, 3] = tx - work.momentum_in[i, 3] + dy * fz - dz * fy
-        work.balance[i, 4] = ty - work.momentum_in[i, 4] + dz * fx - dx * fz
-        work.balance[i, 5] = tz - work.momentum_in[i, 5] + dx * fy - dy * fx
+        b[3], b[4], b[5] = b[3] + tx, b[4] + ty, b[5] + tz
     return inside
 
 

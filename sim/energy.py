@@ -16,7 +16,7 @@ from sim.elimination import factor, project, solve, subtree_sums
 from sim.layout import model_view, work_view
 from sim.loop_velocity import close_velocity
 from sim.model import Matrix, Model, Vector, Work
-from sim.rotation import cross, quat_exp, quat_mul, quat_turn
+from sim.rotation import cross, quat_exp, quat_mul
 from solvers.jit import kernel
 from solvers.record import Table
 
@@ -33,12 +33,11 @@ def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) ->
     node_poses(model, work, h, x)
     world_inertia(model, work.rot2, work.inertia_world)
     for i in range(model.body_parent.shape[0]):
-        a, b = work.quat1[i], work.quat2[i]
-        c, x_, y_, z_ = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
-        Px, Py, Pz = angular_momentum(work.inertia_world, i, h, c, -x_, -y_, -z_)
+        t = work.turn_in[i]
+        Px, Py, Pz = angular_momentum(work.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
         m = model.body_mass[i]
         for k in range(3):
-            out[i, k] = m * ((work.pos2[i, k] - work.pos1[i, k]) / h + 0.5 * h * model.gravity[k])
+            out[i, k] = m * (work.move_in[i, k] / h + 0.5 * h * model.gravity[k])
         mx, my, mz = cross(work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2], out[i, 0], out[i, 1], out[i, 2])
         out[i, 3] = mx - Px
         out[i, 4] = my - Py

@@ -111,7 +111,7 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
     i = model.contact_body[c]
     travel = 0.0
     for k in range(3):
-        travel += abs(work.pos2[i, k] - work.pos1[i, k]) + 2.0 * model.cluster[c, 4] * abs(work.turn_in[i, 1 + k])
+        travel += abs(work.move_in[i, k]) + 2.0 * model.cluster[c, 4] * abs(work.turn_in[i, 1 + k])
     return 0.5 * (cluster_gap(model, work, c, False) - travel)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from sim.model import Model, Vector, Work
+from sim.moves import third_quaternion
 from solvers.jit import kernel
 
 ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
@@ -12,11 +13,12 @@ NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulse
 @kernel
 def keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
     """The motion of body i at which its far impulses are evaluated."""
-    row[7] = work.quat3[i, 0]
+    q = third_quaternion(work, i)
+    row[7] = q[0]
     for k in range(3):
         row[4 + k] = work.pos3[i, k]
-        row[8 + k] = work.quat3[i, 1 + k]
-        row[11 + k] = (work.pos3[i, k] - work.pos2[i, k]) / h
+        row[8 + k] = q[1 + k]
+        row[11 + k] = work.move[i, k] / h
         row[14 + k] = 2.0 / h * work.turn[i, 1 + k]
 
 

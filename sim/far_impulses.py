@@ -7,6 +7,7 @@ from math import sqrt
 from sim.far_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.friction import contact_impulse, start_contact
 from sim.model import Law, Model, Work
+from sim.moves import third_quaternion
 from sim.rotation import cross, rotate, transposed_times
 from sim.terrain_far import evaluate_on_terrain
 from solvers.jit import kernel
@@ -25,12 +26,13 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
     dv = 0.0
     dw = 0.0
     w = 0.0
-    dq = abs(work.quat3[i, 0] - row[7])
+    q = third_quaternion(work, i)
+    dq = abs(q[0] - row[7])
     for k in range(3):
         omega = 2.0 / h * work.turn[i, 1 + k]
         dx += abs(work.pos3[i, k] - row[4 + k])
-        dq += abs(work.quat3[i, 1 + k] - row[8 + k])
-        dv += abs((work.pos3[i, k] - work.pos2[i, k]) / h - row[11 + k])
+        dq += abs(q[1 + k] - row[8 + k])
+        dv += abs(work.move[i, k] / h - row[11 + k])
         dw += abs(omega - row[14 + k])
         w += abs(omega)
     arm = model.cluster[c, 4]

@@ -35,7 +35,7 @@ _JOINT = int(InputKind.JOINT)
 def place(model: Model, work: Work) -> None:
     """Configuration 2 at the coordinates work.theta1."""
     q = work.theta1
-    tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
+    tree_poses(model, work, q)
     world_inertia(model, work.rot2, work.inertia_world)
 
 

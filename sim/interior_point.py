@@ -26,9 +26,9 @@ from sim.friction import slip_noise
 from sim.line_search import search
 from sim.merit import Merit, follow, judge, residuals
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
-from sim.newton import residual_scale, rounding
 from sim.pair_choice import overlapping
 from sim.pair_far import begin_pairs
+from sim.residual import residual_scale, rounding
 from sim.restitution import find_impacts, gained_energy
 from solvers.jit import inlined, kernel
 from solvers.late import late

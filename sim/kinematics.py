@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model import Matrix, Model, Vector
-from sim.rotation import cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate
+from sim.model import Matrix, Model, Vector, Work
+from sim.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
 from sim.swing import swing_pose
 from solvers.jit import kernel
 
@@ -53,90 +53,98 @@ def axis_column(S: Matrix, d: int, a0: float, a1: float, a2: float, x: float, y:
 
 
 @kernel
-def tree_poses(
-    model: Model, q: Vector, q2: Vector, origin: Vector, pos: Matrix, quat: Matrix, rot: Matrix, S: Matrix
-) -> None:
-    """Poses of all bodies at the coordinates q, and unit joint columns S about `origin`.
+def translate(model: Model, q: Vector, i: int, o: Vec3, Q: Quat, S: Matrix) -> Vec3:
+    """o + sum_k q_k R(Q) t_k over the translations of joint i; S: their columns (R(Q) t_k, 0)."""
+    x, y, z = o
+    R = quat_matrix(Q[0], Q[1], Q[2], Q[3])
+    for k in range(model.joint_ntrans[i]):
+        a = q[model.body_qadr[i] + k]
+        s = S[model.body_vadr[i] + k]
+        t = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
+        s[0], s[1], s[2] = times(R, t[0], t[1], t[2])
+        s[3], s[4], s[5] = 0.0, 0.0, 0.0
+        x, y, z = x + a * s[0], y + a * s[1], z + a * s[2]
+    return x, y, z
+
+
+@kernel
+def joint_rotation(model: Model, q: Vector, i: int) -> Quat:
+    """Rotation of joint i at the coordinates q, in its frame on the parent."""
+    a = model.body_qadr[i] + model.joint_ntrans[i]
+    if model.joint_nrot[i] == 1:
+        c = cos(0.5 * q[a])
+        s = sin(0.5 * q[a])
+        t = model.joint_axis[i]
+        return c, s * t[0], s * t[1], s * t[2]
+    if model.joint_nrot[i] == 3:
+        return q[a], q[a + 1], q[a + 2], q[a + 3]
+    if model.joint_nrot[i] == 2:
+        return swing_pose(model, i, q[a], q[a + 1])[0]
+    return 1.0, 0.0, 0.0, 0.0
+
+
+@kernel
+def rotation_columns(model: Model, q: Vector, i: int, R: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of the rotations of joint i, through o from O, in axes of its body, whose rotation is R."""
+    n = model.joint_nrot[i]
+    d = model.body_vadr[i + 1] - n
+    if n == 1:  # the axis is the same before and after the rotation
+        t = model.joint_axis[i]
+        x, y, z = times(R, t[0], t[1], t[2])
+        axis_column(S, d, x, y, z, o[0], o[1], o[2])
+    elif n == 2:
+        a = model.body_qadr[i + 1] - 2
+        _, first, second = swing_pose(model, i, q[a], q[a + 1])
+        x, y, z = times(R, first[0], first[1], first[2])
+        axis_column(S, d, x, y, z, o[0], o[1], o[2])
+        x, y, z = times(R, second[0], second[1], second[2])
+        axis_column(S, d + 1, x, y, z, o[0], o[1], o[2])
+    elif n == 3:
+        for k in range(3):
+            axis_column(S, d + k, R[k], R[3 + k], R[6 + k], o[0], o[1], o[2])
+
+
+@kernel
+def tree_poses(model: Model, work: Work, q: Vector) -> None:
+    """Poses of all bodies at configuration 2, whose coordinates are q, and unit joint columns about O.
 
         joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
         body          quat = Q quat_joint(q),   pos = o - R p_child
         columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see swing.py;
-                      quaternion: the three axes of Q quat_joint(q2)
+                      quaternion: the axes of the body
 
-    q2 are the coordinates at configuration 2, always: so the columns are derivatives with respect to a right
-    perturbation of q2 at a constant increment (theory: the increment follows the perturbed quaternion).
-    pos: (nbody, 3), quat: (nbody, 4), rot: (nbody, 9), S: (nv, 6); all overwritten.
+    Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.
     """
+    pos, quat, rot, S, O = work.pos2, work.quat2, work.rot2, work.S2, work.origin
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
         b = model.joint_parent_point[i]
         f = model.joint_offset[i]
+        r = (b[0], b[1], b[2])
+        Q = (f[0], f[1], f[2], f[3])
+        o = r
         if p >= 0:
-            ox, oy, oz = rotate(rot, p, b[0], b[1], b[2])
-            ox += pos[p, 0]
-            oy += pos[p, 1]
-            oz += pos[p, 2]
-            f0, f1, f2, f3 = quat_mul(quat[p, 0], quat[p, 1], quat[p, 2], quat[p, 3], f[0], f[1], f[2], f[3])
-        else:
-            ox, oy, oz = b[0], b[1], b[2]
-            f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
-        a = model.body_qadr[i]
-        d = model.body_vadr[i]
+            r = rotate(rot, p, b[0], b[1], b[2])
+            Q = quat_mul(quat[p, 0], quat[p, 1], quat[p, 2], quat[p, 3], f[0], f[1], f[2], f[3])
+            o = (pos[p, 0] + r[0], pos[p, 1] + r[1], pos[p, 2] + r[2])
         if model.joint_ntrans[i] > 0:
-            r = quat_matrix(f0, f1, f2, f3)
-            for k in range(model.joint_ntrans[i]):
-                e = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
-                tx = r[0] * e[0] + r[1] * e[1] + r[2] * e[2]
-                ty = r[3] * e[0] + r[4] * e[1] + r[5] * e[2]
-                tz = r[6] * e[0] + r[7] * e[1] + r[8] * e[2]
-                ox += tx * q[a]
-                oy += ty * q[a]
-                oz += tz * q[a]
-                S[d, 0] = tx
-                S[d, 1] = ty
-                S[d, 2] = tz
-                S[d, 3] = 0.0
-                S[d, 4] = 0.0
-                S[d, 5] = 0.0
-                a += 1
-                d += 1
-        if model.joint_nrot[i] == 1:
-            cq = cos(0.5 * q[a])
-            sq = sin(0.5 * q[a])
-            t = model.joint_axis[i]
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, cq, sq * t[0], sq * t[1], sq * t[2])
-        elif model.joint_nrot[i] == 3:
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q[a], q[a + 1], q[a + 2], q[a + 3])
-        elif model.joint_nrot[i] == 2:
-            turn, first, second = swing_pose(model, i, q[a], q[a + 1])
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, turn[0], turn[1], turn[2], turn[3])
-        else:
-            g0, g1, g2, g3 = f0, f1, f2, f3
-        quat[i, 0] = g0
-        quat[i, 1] = g1
-        quat[i, 2] = g2
-        quat[i, 3] = g3
-        r = quat_matrix(g0, g1, g2, g3)
+            o = translate(model, q, i, o, Q, S)
+        g = Q
+        if model.joint_nrot[i] > 0:
+            t = joint_rotation(model, q, i)
+            g = quat_mul(Q[0], Q[1], Q[2], Q[3], t[0], t[1], t[2], t[3])
+        R = quat_matrix(g[0], g[1], g[2], g[3])
+        for k in range(4):
+            quat[i, k] = g[k]
         for k in range(9):
-            rot[i, k] = r[k]
-        if model.joint_nrot[i] == 1:  # the axis is the same before and after the rotation
-            ax, ay, az = rotate(rot, i, t[0], t[1], t[2])
-            axis_column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
-        elif model.joint_nrot[i] == 3:
-            g0, g1, g2, g3 = quat_mul(f0, f1, f2, f3, q2[a], q2[a + 1], q2[a + 2], q2[a + 3])
-            r = quat_matrix(g0, g1, g2, g3)
-            for k in range(3):
-                axis_column(S, d + k, r[k], r[3 + k], r[6 + k], ox - origin[0], oy - origin[1], oz - origin[2])
-        elif model.joint_nrot[i] == 2:
-            ax, ay, az = rotate(rot, i, first[0], first[1], first[2])
-            axis_column(S, d, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
-            ax, ay, az = rotate(rot, i, second[0], second[1], second[2])
-            axis_column(S, d + 1, ax, ay, az, ox - origin[0], oy - origin[1], oz - origin[2])
-        m = model.joint_child_point[i]
-        cx, cy, cz = rotate(rot, i, m[0], m[1], m[2])
-        pos[i, 0] = ox - cx
-        pos[i, 1] = oy - cy
-        pos[i, 2] = oz - cz
+            rot[i, k] = R[k]
+        rotation_columns(model, q, i, R, (o[0] - O[0], o[1] - O[1], o[2] - O[2]), S)
+        c = model.joint_child_point[i]
+        e = times(R, c[0], c[1], c[2])
+        for k in range(3):
+            work.arm[i, k] = r[k]
+            work.arm[i, 3 + k] = e[k]
+            pos[i, k] = o[k] - e[k]
 
 
 @kernel

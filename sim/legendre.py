@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.ball_spring import spring_turns, turn_product
-from sim.dynamics import turns
 from sim.elimination import subtree_sums
 from sim.energy import node_momentum, node_velocity
 from sim.hamilton import momenta_of_velocity, place
@@ -27,7 +26,6 @@ from solvers.record import Table
 def _momentum_jacobians(model: Model, work: Work, h: float) -> None:
     """A1, A2 = d(-W)/d(pose 1), d(-W)/d(pose 2) about O, the latter at the centre of mass; A3 = 0."""
     J = work.inertia_world
-    turns(work.quat1, work.quat2, work.turn_in)
     for i in range(model.body_parent.shape[0]):
         e, u, v, w = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
         minus = angular_momentum_jacobian(J, i, h, e, -u, -v, -w)

@@ -8,6 +8,7 @@ from sim.inequalities import LIMIT_INERTIA, inequality_kinematics, keep_inequali
 from sim.limits import return_limits
 from sim.merit import Merit, judge, residuals
 from sim.model import Model, Options, Vector, Work
+from sim.moves import turn_bodies
 from solvers.jit import inlined, kernel
 
 _WHOLE = 0.9  # a step to the boundary below this share of the Newton step is taken whole
@@ -64,6 +65,7 @@ def search(
         for d in range(v.shape[0]):
             work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
         inside = momentum_balance(model, work, h, q)
+        turn_bodies(work, work.rot3)
         inequality_kinematics(model, work, h)
         move_inequalities(model, work, alpha)
         if whole:

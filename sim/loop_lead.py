@@ -12,9 +12,9 @@ against it; of a constraint that says nothing anywhere, dw vanishes too. A force
 from __future__ import annotations
 
 from sim.coupling_rows import add_along_path
-from sim.kinematics import displace, tree_poses
 from sim.loops import loop_rows
 from sim.model import Matrix, Model, Vector, Work
+from sim.moves import Increment, tree_moves, turn_bodies
 from solvers.jit import kernel
 
 _MEETING = 0.02  # |w| / |dw|
@@ -84,8 +84,8 @@ def _set_rows(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
         for d in range(work.loop_lead.shape[1]):
             work.couple_Y[row, d] = 0.0
             work.loop_lead[row, d] = 0.0
-    displace(model, q, v, h, work.theta3)
-    tree_poses(model, work.theta3, q, work.origin, work.pos3, work.quat3, work.rot3, work.S3)
+    tree_moves(model, work, Increment(q, v, h), True)
+    turn_bodies(work, work.rot3)
     _add_directions(model, work, work.S2, work.couple_B, 1.0, work.couple_Y)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, work, m, work.pos3, work.rot3, work.couple_G)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.complementarity import products, slip_error
-from sim.elimination import project, subtree_sums
-from sim.gears import apply_gears
 from sim.inequalities import apply_inequalities, apply_limits
-from sim.joints import joint_impulses
 from sim.loops import apply_loops
 from sim.model import Model, Vector, Work
-from sim.newton import norm
+from sim.residual import balance_to_wrench, norm, project_wrench
 from solvers.jit import kernel
 
 
@@ -27,15 +24,10 @@ class Merit(NamedTuple):
 @kernel
 def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
     """Largest generalized residual, and largest |gap - slack|; fills residual, wrench, subtree."""
-    for i in range(work.balance.shape[0]):
-        for k in range(6):
-            work.wrench[i, k] = work.balance[i, k]
+    balance_to_wrench(work)
     e = max(apply_inequalities(model, work), apply_loops(model, work))
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    joint_impulses(model, work, h, q, v, u)
+    e = max(e, project_wrench(model, work, h, q, v, u))
     apply_limits(model, work)
-    e = max(e, apply_gears(model, work, h))
     return norm(work.residual), e
 
 

@@ -129,6 +129,8 @@ class Late(IntEnum):
     COLLIDE_CYLINDERS = 66
     CHOOSE_CYLINDERS = 67
     CYLINDER_BEFORE = 68
+    # joints with two rotations, over an interval
+    SWING_TURN = 69
 
 
 class Model(NamedTuple):
@@ -226,7 +228,12 @@ class Work(NamedTuple):
     S3nu: Matrix  # (nv, 6) d(pose 3)/d(v25)
     inertia_world: Matrix  # (nbody, 9) at configuration 2
     momentum_in: Matrix  # (nbody, 6) momentum of interval 1-2 at node 2 plus applied impulses, at the centre of mass
+    momentum_out: Matrix  # (nbody, 6) momentum of interval 2-3, likewise without impulses
     body_impulse: Matrix  # (nbody, 6) force and torque impulses of BODY inputs, world axes, at the centre of mass
+    arm: Matrix  # (nbody, 6) at configuration 2, world axes: joint frame from the parent, joint point from the body
+    turn_matrix: Matrix  # (nbody, 9) rotation matrix of the turn from configuration 2 to 1 or 3, less the identity
+    move_in: Matrix  # (nbody, 3) displacement of the centre of mass over interval 1-2
+    move: Matrix  # (nbody, 3) displacement over interval 2-3
     turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
     turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
     balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O
@@ -243,7 +250,7 @@ class Work(NamedTuple):
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
     # near and far contacts
-    counts: Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; whether advance.py may be used
+    counts: Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; steps handed on by advance.py
     near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
     far_first: Integers  # (nground,) first contacts of the far clusters
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from sim.coupling import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance, momentum_balance_jacobian
-from sim.elimination import factor, project, solve, subtree_sums
-from sim.gears import apply_gears
-from sim.joints import joint_blocks, joint_impulses
+from sim.elimination import factor, solve
+from sim.joints import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.loops import apply_loops, keep_loops, move_loops
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
-from solvers.jit import kernel
+from sim.moves import turn_bodies
+from sim.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
+from solvers.jit import inlined
 from solvers.late import late
 from solvers.status import Status
 
@@ -21,37 +22,39 @@ _SINGULAR = int(Status.SINGULAR)
 _ROUNDED = 1e-10
 
 
-@kernel
-def residual_scale(work: Work) -> float:
-    """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
-    s = 1.0
-    for i in range(work.momentum_in.shape[0]):
-        for k in range(6):
-            s = max(s, 1.0 + abs(work.momentum_in[i, k]))
-    return s
+@inlined
+def evaluate(
+    model: Model, work: Work, h: float, inputs: tuple[Vector, Vector, Vector], alpha: float
+) -> tuple[bool, float, float]:
+    """At nu = nu_trial + alpha dnu: whether it is inside the domain, the largest residual, and the largest gap."""
+    q, v, u = inputs
+    for d in range(v.shape[0]):
+        work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
+    inside = momentum_balance(model, work, h, q)
+    if model.loop_ntrans.shape[0] > 0:
+        turn_bodies(work, work.rot3)
+    balance_to_wrench(work)
+    move_loops(model, work, alpha)
+    gap = apply_loops(model, work)
+    gap = max(gap, project_wrench(model, work, h, q, v, u))
+    return inside, norm(work.residual), gap
 
 
-@kernel
-def rounding(model: Model, work: Work, h: float) -> float:
-    """Residual that cannot be told from zero: momenta are differences of rounded poses, divided by h."""
-    total = 0.0
-    o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
-    for i in range(model.body_parent.shape[0]):
-        x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
-        J = model.body_inertia[i]
-        total += model.body_mass[i] * x * (1.0 + x + o) + J[0] + J[4] + J[8]
-    return 1e-15 * total / abs(h)
-
-
-@kernel
-def norm(x: Vector) -> float:
-    """Largest absolute entry; NaN if any entry is NaN."""
-    r = 0.0
-    for d in range(x.shape[0]):
-        a = abs(x[d])
-        if not a <= r:
-            r = a
-    return r
+@inlined
+def newton_step(model: Model, work: Work, h: float, q: Vector, v: Vector) -> bool:
+    """H dnu = -R at nu, which becomes nu_trial; False when H is singular."""
+    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+    momentum_balance_jacobian(model, work, h, work.A)
+    joint_blocks(model, work, h, q, v)
+    if factor(model, work) == 0 or not factor_coupling(model, work):
+        return False
+    for d in range(v.shape[0]):
+        work.nu_trial[d] = work.nu[d]
+        work.rhs[d] = -work.residual[d]
+    solve(model, work, work.rhs, work.dnu)
+    solve_coupling(model, work, 1.0, work.dnu)
+    keep_loops(model, work)
+    return True
 
 
 @kernel
@@ -80,29 +83,14 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
     last = 1e300
     halvings = 0
     iterations = 0
-    r = 1e300
-    status = _MAX_ITERATIONS
     while True:
-        for d in range(v.shape[0]):
-            work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
-        inside = momentum_balance(model, work, h, q)
-        for i in range(work.balance.shape[0]):
-            for k in range(6):
-                work.wrench[i, k] = work.balance[i, k]
-        move_loops(model, work, alpha)
-        gap = apply_loops(model, work)
-        subtree_sums(model, work.wrench, work.subtree)
-        project(model, work.S2, work.subtree, work.residual)
-        joint_impulses(model, work, h, q, v, u)
-        gap = max(gap, apply_gears(model, work, h))
-        r = max(norm(work.residual) / scale, gap)
+        inside, r, gap = evaluate(model, work, h, (q, v, u), alpha)
+        r = max(r / scale, gap)
         if not (inside and r < max(last, options.tolerance)):
             if inside and iterations > 0 and r < floor:
-                status = _SOLVED
                 break
             if halvings > 40:
-                status = _NO_PROGRESS
-                break
+                return Outcome(_NO_PROGRESS, iterations, r, 0.0)
             halvings += 1
             if iterations == 0:  # the start itself lies outside: slow everything down
                 for d in range(v.shape[0]):
@@ -110,24 +98,15 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
             alpha *= 0.5
             continue
         if r < options.tolerance and (gap < closed_to(work, options) or r >= last):
-            status = _SOLVED
             break
         if iterations == options.max_iterations:
-            break
+            return Outcome(_MAX_ITERATIONS, iterations, r, 0.0)
         iterations += 1
         halvings = 0
         last = r
         alpha = 1.0
-        velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-        momentum_balance_jacobian(model, work, h, work.A)
-        joint_blocks(model, work, h, q, v)
-        if factor(model, work) == 0 or not factor_coupling(model, work):
-            status = _SINGULAR
-            break
-        for d in range(v.shape[0]):
-            work.nu_trial[d] = work.nu[d]
-            work.rhs[d] = -work.residual[d]
-        solve(model, work, work.rhs, work.dnu)
-        solve_coupling(model, work, 1.0, work.dnu)
-        keep_loops(model, work)
-    return Outcome(status, iterations, r, 0.0)
+        if not newton_step(model, work, h, q, v):
+            return Outcome(_SINGULAR, iterations, r, 0.0)
+    turn_bodies(work, work.rot3)
+    absorb_residual(model, work)
+    return Outcome(_SOLVED, iterations, r, 0.0)

@@ -24,6 +24,7 @@ from sim.collision.axes import OPEN
 from sim.far_bounds import ANGLE
 from sim.friction import contact_impulse, start_contact
 from sim.model import Late, Model, Options, Work
+from sim.moves import third_quaternion
 from sim.pair_choice import choose_shapes, open_pairs
 from sim.pair_pose import place_shapes
 from sim.pairs import add_pair_wrench, is_absent, point_kinematics
@@ -91,7 +92,7 @@ def _travel(model: Model, work: Work, j: int) -> float:
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
             for k in range(3):
-                d += abs(work.pos2[i, k] - work.pos1[i, k])
+                d += abs(work.move_in[i, k])
                 d += 2.0 * model.pair_far[j, 1 + side] * abs(work.turn_in[i, 1 + k])
     return d
 
@@ -131,10 +132,11 @@ def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
         return
     work.pair_far_state[1] = 1.0
     for i in range(work.far_wrench.shape[0]):
+        q = third_quaternion(work, i)
         for k in range(3):
             work.far_pose[i, k] = work.pos3[i, k]
         for k in range(4):
-            work.far_pose[i, 3 + k] = work.quat3[i, k]
+            work.far_pose[i, 3 + k] = q[k]
         for k in range(6):
             work.far_wrench[i, k] = 0.0
     j = 0
@@ -175,8 +177,9 @@ def _moved(model: Model, work: Work) -> bool:
         turn = 0.0
         for k in range(3):
             d += abs(work.pos3[i, k] - work.far_pose[i, k])
+        q = third_quaternion(work, i)
         for k in range(4):
-            turn += abs(work.quat3[i, k] - work.far_pose[i, 3 + k])
+            turn += abs(q[k] - work.far_pose[i, 3 + k])
         if not d + reach * ANGLE * turn <= work.pair_far_state[0]:
             return True
     return False

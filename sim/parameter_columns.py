@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from sim.effects import At, Effect
 from sim.model import IntegerMatrix, Model, Vector, Work
+from sim.moves import other_quaternions
 from sim.parameter_contacts import (
     add_friction,
     add_height,
@@ -128,6 +129,7 @@ def fill_columns(
 ) -> int:
     """columns = -dR/d(parameters from `first` on), as many as fit; returns the term after, `start` the term before."""
     clear_columns(work)
+    other_quaternions(work)
     end = first + work.columns.shape[1]
     t = start
     while t < weights.shape[0] and terms[t, 3] < end:

@@ -16,12 +16,11 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from sim.contact_report import report_contacts
-from sim.dynamics import turns
 from sim.far import cluster_gap
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work
 from sim.rollout import Cube
-from sim.rotation import cross, quat_matrix
+from sim.rotation import cross, quat_matrix, quat_turn
 from sim.runge_kutta import Scheme, advance, begin
 from solvers.dense import copy
 from solvers.jit import kernel
@@ -124,7 +123,12 @@ def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
     copy(work.quat2, work.quat3)
     copy(work.rot2, work.rot3)
     copy(work.pos1, work.pos2)
-    turns(work.quat1, work.quat3, work.turn)
+    copy(work.quat1, work.quat2)
+    for i in range(work.pos2.shape[0]):
+        a, b, t = work.quat2[i], work.quat3[i], work.turn[i]
+        t[0], t[1], t[2], t[3] = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+        for k in range(3):
+            work.move[i, k] = work.pos3[i, k] - work.pos2[i, k]
     work.counts[1] = 0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0:
@@ -135,6 +139,7 @@ def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
             work.cone[c, k] = 0.0
     report_contacts(model, work, h, out)
     copy(work.pos3, work.pos2)
+    copy(work.quat3, work.quat2)
 
 
 @kernel

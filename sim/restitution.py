@@ -131,10 +131,10 @@ def velocity_sum(work: Work, h: float, i: int, x: float, y: float, z: float) -> 
     if i < 0:
         return 0.0, 0.0, 0.0
     before, after = work.turn_in[i], work.turn[i]
-    a, b, c = work.pos1[i], work.pos2[i], work.pos3[i]
+    m, n, o = work.move_in[i], work.move[i], work.pos2[i]
     wx, wy, wz = before[1] + after[1], before[2] + after[2], before[3] + after[3]
-    vx, vy, vz = cross(wx, wy, wz, x - b[0], y - b[1], z - b[2])
-    return (c[0] - a[0] + 2.0 * vx) / h, (c[1] - a[1] + 2.0 * vy) / h, (c[2] - a[2] + 2.0 * vz) / h
+    vx, vy, vz = cross(wx, wy, wz, x - o[0], y - o[1], z - o[2])
+    return (m[0] + n[0] + 2.0 * vx) / h, (m[1] + n[1] + 2.0 * vy) / h, (m[2] + n[2] + 2.0 * vz) / h
 
 
 @kernel

@@ -73,17 +73,20 @@ def quat_matrix(w: float, x: float, y: float, z: float) -> Mat3:
 
 
 @kernel
-def quat_exp(x: float, y: float, z: float) -> Quat:
-    """Quaternion of the rotation vector (x, y, z): (cos |t|/2, sin(|t|/2)/|t| t)."""
-    t2 = x * x + y * y + z * z
+def half_angle(t2: float) -> tuple[float, float]:
+    """(cos t/2, sin(t/2)/t) at the squared angle t2."""
     if t2 < _SERIES:
         u = 0.25 * t2
-        w = 1 - u / 2 * (1 - u / 12 * (1 - u / 30 * (1 - u / 56)))
-        k = 0.5 * (1 - u / 6 * (1 - u / 20 * (1 - u / 42 * (1 - u / 72))))
-    else:
-        t = sqrt(t2)
-        w = cos(0.5 * t)
-        k = sin(0.5 * t) / t
+        w = 1.0 - u * (1 / 2 - u * (1 / 24 - u * (1 / 720 - u * (1 / 40320))))
+        return w, 1 / 2 - u * (1 / 12 - u * (1 / 240 - u * (1 / 10080 - u * (1 / 725760))))
+    t = sqrt(t2)
+    return cos(0.5 * t), sin(0.5 * t) / t
+
+
+@kernel
+def quat_exp(x: float, y: float, z: float) -> Quat:
+    """Quaternion of the rotation vector (x, y, z): (cos |t|/2, sin(|t|/2)/|t| t)."""
+    w, k = half_angle(x * x + y * y + z * z)
     return w, k * x, k * y, k * z
 
 

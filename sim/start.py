@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sim.dynamics import momentum_balance_jacobian, turns, turns_below_half
+from sim.dynamics import momentum_balance_jacobian, turns_below_half
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
-from sim.newton import rounding
+from sim.residual import rounding
 from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import Table
@@ -56,10 +56,10 @@ def momentum_error(model: Model, work: Work, h: float, x: Vector, target: Vector
 @kernel
 def _turn_back(work: Work) -> None:
     """The interval 1-2 read backwards, as `momentum_balance_jacobian` reads the interval 2-3."""
-    turns(work.quat1, work.quat2, work.turn_in)
-    turns(work.quat2, work.quat1, work.turn)
     for i in range(work.pos1.shape[0]):
+        work.turn[i, 0] = work.turn_in[i, 0]
         for k in range(3):
+            work.turn[i, 1 + k] = -work.turn_in[i, 1 + k]
             work.pos3[i, k] = work.pos1[i, k]
 
 

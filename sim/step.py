@@ -77,5 +77,5 @@ def step(
     if status != _SOLVED and r.iterations > 0:
         report[4] = worst_contact(model, work, options.kappa)
     report[0] = status
-    work.counts[3] = 1 if status == _SOLVED else 0
+    work.counts[3] = work.counts[3] + 1 if status == _SOLVED else 0
     return status

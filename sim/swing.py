@@ -12,14 +12,25 @@ Scenes without such joints do not compile these kernels.
 
 from __future__ import annotations
 
-from math import cos, sqrt
+from math import cos, sin, sqrt
 
 from sim.model import Late, Model, Vector, Work
-from sim.rotation import Quat, Vec3, cross, left_jacobian, quat_exp, rotate, so3_coefficients, transposed_times
+from sim.rotation import (
+    Quat,
+    Vec3,
+    cross,
+    half_angle,
+    left_jacobian,
+    quat_exp,
+    rotate,
+    so3_coefficients,
+    transposed_times,
+)
 from solvers.jit import kernel
 from solvers.late import late
 
 _STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+_SMALL = 0.1  # below this square of the half angle, its series are exact to rounding
 
 
 @kernel
@@ -40,6 +51,46 @@ def swing_pose(model: Model, i: int, p1: float, p2: float) -> tuple[Quat, Vec3, 
     x, y, z = V[3], V[4], V[5]
     second = J[0] * x + J[1] * y + J[2] * z, J[3] * x + J[4] * y + J[5] * z, J[6] * x + J[7] * y + J[8] * z
     return quat_exp(t[0], t[1], t[2]), first, second
+
+
+@kernel
+def half_angle_change(a: float, b: float, x: float) -> tuple[float, float]:
+    """Change of (cos a, sin(a)/(2 a)) to half the angle b, x = b^2 - a^2: without the rounding of a difference."""
+    s = a + b
+    if not s > 0.0:
+        return 0.0, 0.0
+    d = x / s
+    w = -2.0 * sin(0.5 * s) * sin(0.5 * d)
+    if s * s < _SMALL:
+        y, z = a * a, b * b
+        m2 = y * y + y * z + z * z
+        m3 = (y + z) * (y * y + z * z)
+        m4 = y * y * m2 + z * z * z * (y + z)
+        return w, 0.5 * x * (-1 / 6 + (y + z) / 120 - m2 / 5040 + m3 / 362880 - m4 / 39916800)
+    small, large = min(a, b), max(a, b)
+    return w, 0.5 * (2.0 * cos(0.5 * s) * sin(0.5 * d) - 2.0 * half_angle(4.0 * small * small)[1] * d) / large
+
+
+@late(Late.SWING_TURN, _STILL[0])
+def swing_turn(model: Model, i: int, p1: float, p2: float, d1: float, d2: float) -> Quat:
+    """exp(t)^* exp(t + d) of joint i at p, whose increment is d: in the child's axes, rounded to eps |d|.
+
+    With exp(t) = (w, k t) and the changes dw, dk of w and k, and e = k d + dk (t + d) that of k t:
+    (w (w + dw) + k t.(k t + e),  w e - dw k t - k t x e)
+    """
+    t = swing(model, i, p1, p2)
+    d = swing(model, i, d1, d2)
+    u = (t[0] + d[0], t[1] + d[1], t[2] + d[2])
+    t2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2]
+    u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
+    x = d[0] * (t[0] + u[0]) + d[1] * (t[1] + u[1]) + d[2] * (t[2] + u[2])
+    w, k = half_angle(t2)
+    dw, dk = half_angle_change(0.5 * sqrt(t2), 0.5 * sqrt(u2), 0.25 * x)
+    r = (k * t[0], k * t[1], k * t[2])
+    e = (k * d[0] + dk * u[0], k * d[1] + dk * u[1], k * d[2] + dk * u[2])
+    c = cross(r[0], r[1], r[2], e[0], e[1], e[2])
+    s = r[0] * (r[0] + e[0]) + r[1] * (r[1] + e[1]) + r[2] * (r[2] + e[2])
+    return w * (w + dw) + s, w * e[0] - dw * r[0] - c[0], w * e[1] - dw * r[1] - c[1], w * e[2] - dw * r[2] - c[2]
 
 
 @kernel

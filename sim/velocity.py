@@ -48,7 +48,7 @@ def body_states(model_at: Table, work_at: Table, xs: Matrix, out: Matrix) -> Non
         work.origin[k] = 0.0
     for t in range(xs.shape[0]):
         q = xs[t, :nq]
-        tree_poses(model, q, q, work.origin, work.pos2, work.quat2, work.rot2, work.S2)
+        tree_poses(model, work, q)
         joint_twists(model, work, xs[t, nq:])
         for i in range(nbody):
             V = work.twist[i]

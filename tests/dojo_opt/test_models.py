@@ -72,7 +72,7 @@ MASSES = {
 @kernel
 def _poses(model_at: Table, work_at: Table, q: Vector) -> None:
     w = work_view(work_at)
-    tree_poses(model_view(model_at), q, q, w.origin, w.pos2, w.quat2, w.rot2, w.S2)
+    tree_poses(model_view(model_at), w, q)
 
 
 def poses(mech: Mechanism, q: object = None) -> tuple[np.ndarray, np.ndarray]:

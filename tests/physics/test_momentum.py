@@ -36,6 +36,19 @@ def test_spinning_body_keeps_its_angular_momentum(time_step):
         np.testing.assert_allclose(sim.momentum(state)[1], angular, rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("tolerance", [1e-13, 1e-8])
+@pytest.mark.parametrize("kind", ["revolute", "spherical", "free_orbital", "planar"])
+def test_neither_rounding_nor_tolerance_add_up(kind, tolerance, rng):
+    """Five thousand steps of 0.1 ms, ten metres from the origin: momentum as good as one step is solved."""
+    sim = dojo.Simulator(chain(kind, 2), time_step=1e-4, tolerance=tolerance)
+    x = random_state(sim, rng, speed=2.0)
+    x[:3] += 10.0
+    linear, angular = sim.momentum(run(sim, x, 5000))
+    scale = np.linalg.norm(linear[0])
+    assert np.abs(linear - linear[0]).max() < max(1e-13, 10.0 * tolerance) * (1.0 + scale)
+    assert np.abs(angular - angular[0]).max() < max(1e-13, 10.0 * tolerance) * (1.0 + 10.0 * scale)
+
+
 def test_a_force_changes_momentum_by_its_impulse():
     sim = dojo.Simulator(chain("revolute", 2, gravity=(1.0, 2.0, -3.0)), time_step=0.02, tolerance=1e-12)
     x = random_state(sim, np.random.default_rng(1))

@@ -63,7 +63,8 @@ class Accuracy:
             f"errors count as equal below {curves.FLOOR:g}, or below what a change of the start by one rounding makes "
             "of the reference, if that is more (5e-10 rad after 10 s for the free body, which turns about its unstable "
             "axis); a step whose run would take longer than "
-            f"{'0.02' if self.quick else '0.2'} s is left out; inf: the engine was lost on the way"
+            f"{'0.02' if self.quick else '0.2'} s is left out, but not of ours of order 2 where momentum is conserved; "
+            "inf: the engine was lost on the way"
         )
         return report
 
@@ -105,7 +106,8 @@ def _compare(report: Report, scene: Scene, measured: Curves) -> None:
             if name.startswith("dojo-opt"):
                 good = [p.errors for p in points if np.isfinite(p.errors["energy"])]
                 drift = max(max(errors["momentum"], errors["angular"]) for errors in good)
-                report.rows.append(Row(f"{scene.name}: drift of momentum, {name}", drift, "", _MOMENTUM))
+                note = f"steps of {1e3 * points[0].time_step:g} to {1e3 * points[-1].time_step:g} ms"
+                report.rows.append(Row(f"{scene.name}: drift of momentum, {name}", drift, "", _MOMENTUM, note=note))
 
 
 def _ratio_table(report: Report) -> None:
