@@ -11,7 +11,7 @@ from sim.loops import apply_loops, keep_loops, move_loops
 from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
 from sim.moves import turn_bodies
 from sim.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
-from solvers.jit import inlined
+from solvers.jit import inlined, kernel
 from solvers.late import late
 from solvers.status import Status
 
