@@ -16,9 +16,9 @@ import numpy as np
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.parameters import check
 from dojo_opt.report.mechanics.situations import CASES
-from sim.parameters import KINDS, all_parameters
-from sim.selection import select
-from sim.sensitivity import parameter_columns
+from sim.parameters.parameters import KINDS, all_parameters
+from sim.parameters.selection import select
+from sim.parameters.sensitivity import parameter_columns
 
 REPEATS = 40
 

@@ -97,7 +97,7 @@ _HOME: dict[str, str | None] = {
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
     "ParameterSpace": "dojo_opt.parameter_space",
-    "Parameters": "sim.parameters",
+    "Parameters": "sim.parameters.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
     "Plant": "dojo_opt.plant.plant",
@@ -112,7 +112,7 @@ _HOME: dict[str, str | None] = {
     "Status": "solvers.status",
     "StepResult": "sim.results",
     "String": "sim.shapes",
-    "Terrain": "sim.terrain",
+    "Terrain": "sim.terrain.terrain",
     "Trajectory": "sim.results",
     "UrdfError": "sim.urdf",
     "UrdfMechanism": "sim.urdf",
@@ -157,14 +157,14 @@ if TYPE_CHECKING:
     from sim.gear import Gear
     from sim.mechanism import Mechanism
     from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
-    from sim.parameters import Parameters
+    from sim.parameters.parameters import Parameters
     from sim.parts import Body, Contact, Input, Joint
     from sim.polytope import Polytope
     from sim.reactions import Reactions
     from sim.results import Linearization, SimulationError, StepResult, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
-    from sim.terrain import Terrain
+    from sim.terrain.terrain import Terrain
     from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
     from solvers.status import Status
 

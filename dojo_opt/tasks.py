@@ -20,7 +20,7 @@ from dojo_opt.problem import Problem
 from sim import checks
 from sim.checks import nearest
 from sim.simulator import Simulator
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -18,7 +18,7 @@ from sim import shapes
 from sim.parts import WORLD
 from sim.polytope import Polytope
 from sim.simulator import Simulator
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 
 __all__ = ["save_html"]
 

@@ -7,40 +7,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim import (
-    ball_spring,
-    cone_limit,
-    coupling,
-    coupling_gradient,
-    gears,
-    loop_motion,
-    loop_velocity,
-    loop_work,
-    loops,
-    pair_choice,
-    pair_cylinders,
-    pair_far,
-    pair_jacobian,
-    pair_stiffness,
-    pairs,
-    parameter_surface,
-    parameter_terrain,
-    pyramid,
-    restitution,
-    restitution_gradient,
-    swing,
-    terrain_contact,
-)
 from sim.collision.kinds import SWAPPED, Pair
-from sim.contact_report import report_contacts, report_pairs, worst_contact
+from sim.contacts import pyramid, restitution, restitution_gradient
+from sim.contacts.report import report_contacts, report_pairs, worst_contact
+from sim.coupling import gears, loop_motion, loop_velocity, loop_work, loops
+from sim.coupling import gradient as coupling_gradient
+from sim.coupling import system as coupling
 from sim.gradients import gradient
-from sim.inequalities import add_stiffness
-from sim.interior_point import interior_point
-from sim.limits import add_limit_derivatives
+from sim.joints import ball_spring, cone_limit, swing
+from sim.joints.limits import add_limit_derivatives
 from sim.model import Law, Model
-from sim.newton import newton
+from sim.pairs import choice as pair_choice
+from sim.pairs import contact as pairs
+from sim.pairs import cylinders as pair_cylinders
+from sim.pairs import far as pair_far
+from sim.pairs import jacobian as pair_jacobian
+from sim.pairs import stiffness as pair_stiffness
+from sim.parameters import surface as parameter_surface
+from sim.parameters import terrain as parameter_terrain
+from sim.solve.inequalities import add_stiffness
+from sim.solve.interior_point import interior_point
+from sim.solve.newton import newton
 from sim.step import step
-from sim.terrain_far import evaluate_on_terrain
+from sim.terrain import contact as terrain_contact
+from sim.terrain.far import evaluate_on_terrain
 from solvers.late import LateKernel
 
 _LOOPS = (

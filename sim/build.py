@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.clusters import pack_clusters
 from sim.collisions import pack_collisions
+from sim.contacts.clusters import pack_clusters
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law, Model
+from sim.pairs.touch import couples
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
-from sim.terrain import Terrain
-from sim.touch import couples
+from sim.terrain.terrain import Terrain
 
 Floats = NDArray[np.float64]
 

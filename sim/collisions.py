@@ -12,9 +12,9 @@ import numpy as np
 from sim import checks
 from sim.collision import kinds
 from sim.model import Law, Model
+from sim.pairs.touch import Touch, couples
 from sim.parts import LAWS, WORLD
 from sim.shapes import Solid
-from sim.touch import Touch, couples
 
 if TYPE_CHECKING:
     from sim.mechanism import Mechanism

@@ -7,7 +7,7 @@ dz    per body [position, velocity, rotation, angular velocity], (12 nbody,): ro
 from __future__ import annotations
 
 from sim.coordinates import body_turn, joint_frame, node_poses, poses_of_maximal
-from sim.joint_rows import joint_rows
+from sim.joints.rows import joint_rows
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector, Work

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
+from sim.parameters.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
+from sim.parameters.selection import select, with_values
+from sim.parameters.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
 from sim.results import Linearization, Trajectory, error_of
-from sim.selection import select, with_values
-from sim.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
@@ -187,7 +187,7 @@ class Derivatives(States):
             kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
 
         A name without a component stands for all of them, one without a part for all parts; `kind:*` is a single one
-        that adds the same to all parts, at the mean of their values. Kinds (units: sim/parameter.py):
+        that adds the same to all parts, at the mean of their values. Kinds (units: sim/parameters/parameter.py):
 
             mass, inertia, com          of bodies; a mass changes alone; com is a displacement from where it is, and
                                         joints, contacts and shapes stay where they are on the body

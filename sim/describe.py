@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.build import mechanism_sizes
-from sim.left_out import reach
+from sim.contacts.left_out import reach
+from sim.high_order.tableau import tableau
 from sim.mechanism import Mechanism
+from sim.pairs.touch import Touch
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import Solid
-from sim.tableau import tableau
-from sim.touch import Touch
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator

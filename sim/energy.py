@@ -9,12 +9,12 @@ Contacts, dampers and inputs act between nodes and are not part of it.
 from __future__ import annotations
 
 from sim.angular_momentum import angular_momentum
-from sim.ball_spring import relative_to_rest
 from sim.coordinates import node_poses
+from sim.coupling.loop_velocity import close_velocity
 from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
+from sim.joints.ball_spring import relative_to_rest
 from sim.layout import model_view, work_view
-from sim.loop_velocity import close_velocity
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import cross, quat_exp, quat_mul
 from solvers.jit import kernel
@@ -137,7 +137,7 @@ def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
 
 @kernel
 def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
-    """work.dnu = P M^-1 p, P of loop_velocity.py; p = S2^T (momenta of the bodies) + springs left in work.residual."""
+    """work.dnu = P M^-1 p, P: coupling/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual."""
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)

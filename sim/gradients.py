@@ -6,21 +6,21 @@ central path the condensed contact matrices W are the exact derivatives of the i
 
 from __future__ import annotations
 
-from sim.coupling import factor_coupling, solve_coupling_panel
-from sim.coupling_gradient import add_coupling_composites, add_coupling_derivatives
+from sim.contacts.restitution_gradient import add_bounce_composites, add_bounce_derivatives
+from sim.coupling.gradient import add_coupling_composites, add_coupling_derivatives
+from sim.coupling.system import factor_coupling, solve_coupling_panel
 from sim.elimination import factor
 from sim.elimination_panel import solve_panel
-from sim.inequalities import add_stiffness
-from sim.joints import add_spring_derivatives, add_swing_curvature, joint_blocks
+from sim.joints.limits import add_limit_derivatives
+from sim.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
-from sim.limits import add_limit_derivatives
 from sim.model import InputKind, Late, Matrix, Model, Vector, Work
 from sim.outer import input_wrench
-from sim.pair_far import all_near
+from sim.pairs.far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
-from sim.restitution_gradient import add_bounce_composites, add_bounce_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix
+from sim.solve.inequalities import add_stiffness
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from sim.joints.swing import swing_pose
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
-from sim.swing import swing_pose
 from solvers.jit import kernel
 
 
@@ -110,7 +110,7 @@ def tree_poses(model: Model, work: Work, q: Vector) -> None:
 
         joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
         body          quat = Q quat_joint(q),   pos = o - R p_child
-        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see swing.py;
+        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see joints/swing.py;
                       quaternion: the axes of the body
 
     Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.closing import carried
 from sim.collisions import Collision
+from sim.coupling.closing import carried
 from sim.dofs import components, dof_names
 from sim.gear import Gear, check_gears
 from sim.naming import name_contacts, name_inputs
+from sim.pairs.touch import Touch, touches
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
-from sim.terrain import Terrain
-from sim.touch import Touch, touches
+from sim.terrain.terrain import Terrain
 from sim.tree import check_loops, check_masses, sort_tree
 
 

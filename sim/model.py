@@ -150,7 +150,9 @@ class Model(NamedTuple):
     late: Integers  # addresses of kernels, by `Late`; 0 where the scene has no use for one, or had none so far
     contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
     terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
-    cluster_end: Integers  # (nground,) of the cluster whose first contact this is, one past its last; see far.py
+    cluster_end: (
+        Integers  # (nground,) of the cluster whose first contact this is, one past its last; see contacts/far.py
+    )
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes
     pair_feature: Integers  # (npair,) which point of a pair of shapes with several
@@ -182,12 +184,12 @@ class Model(NamedTuple):
     contact_restitution: Vector  # (ncontact,) share of the normal velocity that an impact gives back
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
     contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
-    terrain_place: Matrix  # (nterrain, 8) see height_field.py
+    terrain_place: Matrix  # (nterrain, 8) see terrain/height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
-    cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see far.py
+    cluster: Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see contacts/far.py
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
-    pair_far: Matrix  # (npair, 7) what says that a collision is far (pair_far.py), at its first pair
+    pair_far: Matrix  # (npair, 7) what says that a collision is far (pairs/far.py), at its first pair
     hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/hull.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies
@@ -261,16 +263,16 @@ class Work(NamedTuple):
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     pair_free: Integers  # (1,) 1: elements are chosen anew at every pose; 2: those that press are kept beside new ones
-    far: Matrix  # (nground, 24) see far.py
+    far: Matrix  # (nground, 24) see contacts/far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
-    cone: Matrix  # (ncontact, 12) cone variables, see contact.py
+    cone: Matrix  # (ncontact, 12) cone variables, see contacts/contact.py
     cone_step: Matrix  # (ncontact, 12)
     cone_trial: Matrix  # (ncontact, 12)
     contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 22) see restitution.py
+    bounce: Matrix  # (ncontact, 22) see contacts/restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
     contact_w: Matrix  # (ncontact, 3) constant part of the same
@@ -282,7 +284,7 @@ class Work(NamedTuple):
     pair_out: Matrix  # (npair, 43) what `collide` says
     pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
     pair_apart: Vector  # (npair,) half the gap ahead of a far collision, 0 of a near one, at its first pair
-    pair_far_state: Vector  # (3,) see pair_far.py
+    pair_far_state: Vector  # (3,) see pairs/far.py
     far_pose: Matrix  # (nbody, 7) poses where the far collisions were evaluated
     far_wrench: Matrix  # (nbody, 6) their wrenches about O
     pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
@@ -318,7 +320,7 @@ class Work(NamedTuple):
     loop_start: Vector  # (nv,) where it looks for another one
     loop_kept: Vector  # (nv,) the first of them
     loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
-    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loop_lead.py
+    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see coupling/loop_lead.py
     loop_scale: Vector  # (nrow,) scratch
     loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both

@@ -3,7 +3,7 @@
 A velocity is a displacement over h. As a difference of two poses it would carry their rounding, eps |x|/h; here every
 displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
-    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  of a swing see swing.py
+    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  of a swing see joints/swing.py
     rotation   R = R2 + E R2,   E = R(T) - I
     joint      dx = dx_parent + E_parent (R_parent p_parent) + sum_k q_k E_parent t_k + h v_k (t_k + E_parent t_k)
     body       dx - E (R2 p_child)
@@ -13,10 +13,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.joints.swing import swing_pose, swing_turn
 from sim.kinematics import axis_column, displace
 from sim.model import Matrix, Model, Vector, Work
 from sim.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
-from sim.swing import swing_pose, swing_turn
 from solvers.jit import kernel
 
 

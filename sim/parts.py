@@ -14,7 +14,7 @@ from sim.inertia import inertia_of
 from sim.joint_settings import cone_of, limits_of, per_dof
 from sim.polytope import Polytope
 from sim.shapes import Shape, Solid
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 
 WORLD = "world"
 # free translations and free rotations of each kind of joint
@@ -71,7 +71,7 @@ class Joint:
         joint frame   at `parent_point` in the parent, turned by `orientation` (quaternion, joint to parent)
         coordinates   translations first, then rotations; at zero the child's axes are those of the joint frame
                       one rotation: its angle; two, of the orbital kinds: the rotation vector along the two directions
-                      of the plane across the axis (sim/swing.py); three: a quaternion
+                      of the plane across the axis (sim/joints/swing.py); three: a quaternion
         `axis`        in the joint frame; a plane across it has its coordinates along x, y, z in this order, without
                       the one nearest to the axis (axis y: x then z)
 
@@ -96,7 +96,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
-    close: bool = False  # closes a loop: child hangs on another joint already; see sim/closing.py
+    close: bool = False  # closes a loop: child hangs on another joint already; see sim/coupling/closing.py
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -140,7 +140,7 @@ class Contact:
 
     law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
     terrain: ground that is no half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
-    restitution: share of the normal velocity that an impact gives back, see sim/restitution.py.
+    restitution: share of the normal velocity that an impact gives back, see sim/contacts/restitution.py.
     """
 
     body: str

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
-from sim.closing import is_weld
+from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.model import Model, Work
 from sim.parts import WORLD, Joint

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.contact_report import report_contacts
+from sim.contacts.report import report_contacts
 from sim.gradients import gradient
 from sim.layout import model_view, work_view
 from sim.model import Guess, Integers, Matrix, Options, Vector, Work
@@ -41,7 +41,7 @@ class Linearized(NamedTuple):
 def begin(work: Work, settings: Vector) -> Options:
     """Settings of a motion that begins here."""
     work.counts[3] = 0
-    work.far_law[0] = 0.0  # what is known of far contacts (far.py) belongs to another motion
+    work.far_law[0] = 0.0  # what is known of far contacts (contacts/far.py) belongs to another motion
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 

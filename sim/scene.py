@@ -15,7 +15,7 @@ from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
 from sim.shape_contacts import shape_contacts
 from sim.shapes import Solid, Sphere, rotation_matrix
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 from sim.urdf.stance import poses
 
 Floats = NDArray[np.float64]

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
+from sim.contacts.left_out import left_out
 from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
-from sim.left_out import left_out
 from sim.mechanism import Mechanism
 from sim.policies import Feedback, roll
 from sim.reactions import Reactions, reactions

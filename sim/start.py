@@ -8,7 +8,7 @@ from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spat
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
 from sim.model import Model, Vector, Work
-from sim.residual import rounding
+from sim.solve.residual import rounding
 from sim.velocity import joint_twists
 from solvers.jit import kernel
 from solvers.record import Table

@@ -11,7 +11,7 @@ from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls
-from sim.closure import Closure, LoopRank
+from sim.coupling.closure import Closure, LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.settings import Settings
@@ -21,12 +21,12 @@ Floats = NDArray[np.float64]
 
 def _high_order(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
     """Calls of a higher order; their module is imported by those who ask for it."""
-    from sim.high_order import HighOrder, check
+    from sim.high_order.calls import HighOrder, check
 
     check(mechanism, settings)
     calls = HighOrder(model, settings)
     if len(model.contact_body) + len(model.limit_dof):
-        from sim.phased import Phased
+        from sim.high_order.phased import Phased
 
         calls = Phased(model, settings)
     calls.check_stiffness(mechanism)

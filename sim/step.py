@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sim.contact_report import worst_contact
+from sim.contacts.report import worst_contact
+from sim.coupling.loop_motion import is_farther, lead_again, meet_ahead, predict_loops
+from sim.coupling.loop_work import loops_gained
+from sim.coupling.loops import start_loops
 from sim.dynamics import begin_step
-from sim.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
-from sim.loop_motion import is_farther, lead_again, meet_ahead, predict_loops
-from sim.loop_work import loops_gained
-from sim.loops import start_loops
 from sim.model import Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.solve.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
 from solvers.jit import inlined
 from solvers.late import late
 from solvers.status import Status
@@ -24,7 +24,7 @@ _LEADS = 2  # times that directions of loops are found anew
 def solve_branch(
     model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
 ) -> Outcome:
-    """`solve` on the branch of the motion of closed loops (loop_motion.py, loop_lead.py).   inputs: (q, v, u)."""
+    """`solve` on the branch of the loops' motion (coupling/loop_motion.py and loop_lead.py).   inputs: (q, v, u)."""
     q, v, u = inputs
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)

@@ -95,13 +95,13 @@ print(json.dumps(compiled_signatures()))
 def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
     program = """
 import numpy as np, dojo_opt as dojo
-from sim.ball_spring import spring_impulse
-from sim.cone_limit import cone_gap
-from sim.coupling import factor_coupling
-from sim.interior_point import interior_point
-from sim.newton import newton
-from sim.pyramid import start_pyramid
-from sim.swing import swing_pose
+from sim.joints.ball_spring import spring_impulse
+from sim.joints.cone_limit import cone_gap
+from sim.coupling.system import factor_coupling
+from sim.solve.interior_point import interior_point
+from sim.solve.newton import newton
+from sim.contacts.pyramid import start_pyramid
+from sim.joints.swing import swing_pose
 late = (newton, interior_point, swing_pose, cone_gap, spring_impulse, start_pyramid, factor_coupling)
 body = dojo.Body("b", 1.0, (1, 1, 1))
 scenes = (

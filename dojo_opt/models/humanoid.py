@@ -89,8 +89,9 @@ def humanoid(
            (quaternion), knee, ankle, shoulder (2), elbow [rad]
         u  (19,) torques in the same order [N m]: 2, 1, then 3, 1, 1, 2, 1 for each side
 
-    Joints written with (2) are orbital: the rotation vector across their axis, see sim/swing.py. spring [N m/rad] and
-    damper [N m s/rad] of all joints; friction of the four contacts, a heel and a toe per foot; law: see Contact.
+    Joints written with (2) are orbital: the rotation vector across their axis, see sim/joints/swing.py. spring
+    [N m/rad] and damper [N m s/rad] of all joints; friction of the four contacts, a heel and a toe per foot; law: see
+    Contact.
     40.84 kg; masses, inertias and dimensions are those of the model in Dojo, after gym's.
     """
     links = {**_trunk(), **_side(1.0), **_side(-1.0)}

@@ -13,7 +13,7 @@ from sim import checks
 from sim.mechanism import Mechanism
 from sim.parts import Input
 from sim.scene import with_contacts
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -30,7 +30,7 @@ from dojo_opt.report.lean_scenes import (
 )
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
-from sim.left_out import reach
+from sim.contacts.left_out import reach
 from sim.mechanism import Mechanism
 from solvers.jit import threads
 
@@ -187,7 +187,7 @@ def _by_module(kernels: list[str]) -> str:
 CONTACT_KERNELS = tuple(
     f"sim.{name}."
     for name in ("contact", "contact_report", "friction", "cone", "pyramid", "limits", "far", "far_impulses")
-) + ("sim.interior_point.", "sim.inequalities.", "sim.central_path.", "solvers.cones.")
+) + ("sim.solve.interior_point.", "sim.solve.inequalities.", "sim.solve.central_path.", "solvers.cones.")
 
 
 def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:

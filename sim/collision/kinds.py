@@ -80,5 +80,5 @@ def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
 
 
 def count(kind: Pair) -> int:
-    """How many contact points the pair may have: features 0 to count - 1 of `collide`; of polytopes see touch.py."""
+    """How many contact points the pair may have: features 0 to count - 1 of `collide`; polytopes: pairs/touch.py."""
     return _COUNT.get(kind, 1)

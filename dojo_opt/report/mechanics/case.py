@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.parameters import KINDS
+from sim.parameters.parameters import KINDS
 from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ from sim.parts import KINDS as JOINTS
 from sim.parts import Body, Contact, Input, Joint
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
 from sim.simulator import Simulator
-from sim.terrain import Terrain
+from sim.terrain.terrain import Terrain
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from dojo_opt.report.mechanics.situations import CASES
 from dojo_opt.report.mechanics.solids import PAIRS
 from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.report.study import Progress
-from sim.parameters import KINDS as PARAMETERS
+from sim.parameters.parameters import KINDS as PARAMETERS
 from sim.parts import KINDS
 
 QUICK_PAIRS = ("sphere_capsule", "box_halfspace", "cylinder_halfspace")

@@ -1,0 +1,1 @@
+"""What couples branches of the tree: closed loops, gears, and the dense system they share with pairs."""

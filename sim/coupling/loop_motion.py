@@ -1,0 +1,98 @@
+"""Motion of closed loops: where a step begins to look for its velocity, so that it stays on its branch.
+
+Where two branches of a loop's motion meet, the links of a parallelogram in one line, the equations of a step have a
+solution on each, as near to one another as configuration 3 to the place where they meet. The solution is that of the
+branch of configurations 1 and 2, which Newton's method finds from a start closer to it than that: the leapfrog start
+2 P v - v (loop_velocity.py), off by O(h^3), where the incoming velocity is off by O(h^2). Of two solutions the one that
+is closer to it is taken.
+"""
+
+from __future__ import annotations
+
+from sim.coupling.loop_lead import lead_loops
+from sim.coupling.loop_velocity import close_velocity
+from sim.coupling.loops import direct_loops
+from sim.energy import factor_mass_matrix
+from sim.model import Late, Model, Vector, Work
+from solvers.jit import kernel
+from solvers.late import late
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_CLOSER = 0.5  # share of a least pivot
+_ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
+
+
+@late(Late.PREDICT_LOOPS, False)
+def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
+    """loop_velocity = 2 P v - v, and the directions of forces that it leads (loop_lead.py); False if a guess is not v.
+
+    q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2. Where loops are open v need not be along them; then
+    the start is P v.
+    """
+    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, work):
+        return False
+    given = False
+    for d in range(v.shape[0]):
+        given = given or guess[d] != v[d]
+        work.loop_velocity[d] = v[d]
+    close_velocity(model, work, h, q, v, work.loop_velocity)
+    across = 0.0
+    whole = 0.0
+    for d in range(v.shape[0]):
+        across = max(across, abs(v[d] - work.loop_velocity[d]))
+        whole = max(whole, abs(v[d]))
+    for d in range(v.shape[0]):
+        if across < _ACROSS * whole:
+            work.loop_velocity[d] += work.loop_velocity[d] - v[d]
+    work.loop_pivot[0] = work.couple_rank[2]
+    _no_step(work)
+    return not given
+
+
+@late(Late.LEAD_AGAIN, False)
+def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
+    """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
+    if work.loop_led[0] == 0:
+        return False
+    for d in range(work.nu.shape[0]):
+        work.loop_velocity[d] = work.nu[d]
+    _no_step(work)
+    direct_loops(model, work)
+    lead_loops(model, work, h, q, work.loop_velocity)
+    return True
+
+
+@late(Late.MEET_AHEAD, False)
+def meet_ahead(model: Model, work: Work) -> bool:
+    """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
+
+    Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
+    """
+    if work.loop_led[0] > 0 or not work.couple_rank[2] < _CLOSER * work.loop_pivot[0]:
+        return False
+    for d in range(work.nu.shape[0]):
+        work.loop_kept[d] = work.nu[d]
+        work.loop_start[d] = 2.0 * work.loop_velocity[d] - work.nu[d]
+    _no_step(work)
+    return True
+
+
+@late(Late.FARTHER, False)
+def is_farther(model: Model, work: Work, status: int) -> bool:
+    """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
+    kept = 0.0
+    found = 0.0
+    for d in range(work.nu.shape[0]):
+        kept += (work.loop_kept[d] - work.loop_velocity[d]) ** 2
+        found += (work.nu[d] - work.loop_velocity[d]) ** 2
+        work.loop_start[d] = work.loop_kept[d]
+    _no_step(work)
+    return status != _SOLVED or found > (1.0 + 1e-6) * kept
+
+
+@kernel
+def _no_step(work: Work) -> None:
+    """The forces of loops are those that a solve begins with."""
+    for row in range(work.couple_step.shape[0]):
+        work.couple_step[row] = 0.0

@@ -1,0 +1,209 @@
+"""Steps of higher order: explicit Runge-Kutta methods for Hamilton's equations of a tree (hamilton.py).
+
+    Y_i = y + h sum_j a_ij f(Y_j),    y+ = y + h sum_i b_i f(Y_i),       y = (r, momenta)
+
+r is the shift of the coordinates from the node, q (+) r; for quaternions a rotation vector, so that their length is no
+variable and rotation about a fixed axis is exact (Munthe-Kaas, Appl. Numer. Math. 29, 1999).
+The momentum of a tree that floats freely is part of y, so it is exact; energy is as good as the order. The evaluation
+at the end of a step, which its velocity needs, is the first one of the next: s stages cost s evaluations.
+
+    state    x = [q; v], v at the node: p = M(q) v
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.dynamics import joints_below_turn
+from sim.high_order.hamilton import coordinate_rates, momenta_of_velocity, momentum_rates, place, velocity_of_momenta
+from sim.high_order.tangents import Tangents, first_tangents, keep_tangents, last_tangents, move_tangents, tangent_rates
+from sim.kinematics import displace
+from sim.layout import model_view, work_view
+from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.policy import Path, Policy
+from sim.rollout import Linearized
+from sim.state import integrate_state, state_difference
+from solvers.dense import dot
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_NOT_FINITE = int(Status.NOT_FINITE)
+_SINGULAR = int(Status.SINGULAR)
+_ANGULAR_STEP = int(Status.ANGULAR_STEP)
+
+
+class Scheme(NamedTuple):
+    """A method of s stages, and the scratch of a step."""
+
+    a: Matrix  # (s, s), strictly lower
+    b: Vector  # (s,)
+    free: Integers  # (nbody,) 1 for roots that float without springs, dampers and inputs on their coordinates
+    momenta: Vector  # (nv,) at the node
+    shift: Vector  # (nv,) of the stage
+    stage_p: Vector  # (nv,)
+    rates_r: Matrix  # (s, nv)
+    rates_p: Matrix  # (s, nv)
+
+
+@kernel
+def begin(model: Model, work: Work, scheme: Scheme, x: Vector) -> None:
+    """Momenta and poses of the state x, about the place of its first body."""
+    nq = work.theta1.shape[0]
+    for k in range(3):
+        work.origin[k] = x[k] if model.joint_ntrans[0] == 3 else model.joint_parent_point[0, k]
+    for k in range(nq):
+        work.theta1[k] = x[k]
+    place(model, work)
+    momenta_of_velocity(model, work, scheme.free, x[nq:], scheme.momenta)
+    for d in range(work.nu.shape[0]):
+        work.nu[d] = x[nq + d]
+
+
+@kernel
+def _add_rates(h: float, weights: Vector, count: int, rates: Matrix, out: Vector) -> None:
+    """out += h sum of weights[j] rates[j], j < count."""
+    for j in range(count):
+        c = h * weights[j]
+        if c != 0.0:
+            row = rates[j]
+            for k in range(out.shape[0]):
+                out[k] += c * row[k]
+
+
+@kernel
+def _evaluate(model: Model, work: Work, scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> bool:
+    """Velocity and momenta of the bodies at the node + h sum of weights[j] times the rates of stage j, j < count."""
+    for d in range(scheme.momenta.shape[0]):
+        scheme.shift[d] = 0.0
+        scheme.stage_p[d] = scheme.momenta[d]
+    _add_rates(h, weights, count, scheme.rates_r, scheme.shift)
+    _add_rates(h, weights, count, scheme.rates_p, scheme.stage_p)
+    displace(model, q, scheme.shift, 1.0, work.theta1)
+    place(model, work)
+    return velocity_of_momenta(model, work, scheme.free, scheme.stage_p)
+
+
+@kernel
+def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Vector, tangents: Tangents | None) -> int:
+    """x one step later, in place, with its evaluation in `work` before and after; returns the Status.
+
+    tangents: of the node, moved along; without them nothing of them is compiled.
+    """
+    nq = work.theta1.shape[0]
+    q, v = x[:nq], x[nq:]
+    s = scheme.b.shape[0]
+    if not joints_below_turn(model, v, h):
+        return _ANGULAR_STEP
+    for d in range(v.shape[0]):
+        scheme.shift[d] = 0.0
+    for i in range(s):
+        if i > 0 and not _evaluate(model, work, scheme, h, scheme.a[i], i, q):
+            return _SINGULAR
+        momentum_rates(model, work, scheme.free, u, scheme.rates_p[i])
+        coordinate_rates(model, scheme.shift, work.nu, scheme.rates_r[i])
+        if tangents is not None:
+            move_tangents(model, scheme.shift, tangents, h, scheme.a[i], i)
+            if not tangent_rates(model, work, scheme.free, u, scheme.shift, tangents, i):
+                return _SINGULAR
+    if not _evaluate(model, work, scheme, h, scheme.b, s, q):
+        return _SINGULAR
+    if tangents is not None:
+        move_tangents(model, scheme.shift, tangents, h, scheme.b, s)
+        keep_tangents(tangents)
+    total = 0.0
+    for k in range(nq):
+        q[k] = work.theta1[k]
+        total += q[k]
+    for d in range(v.shape[0]):
+        v[d] = work.nu[d]
+        scheme.momenta[d] = scheme.stage_p[d]
+        total += v[d]
+    return _SOLVED if abs(total) < 1e300 else _NOT_FINITE
+
+
+@kernel
+def roll(
+    model_at: Table, work_at: Table, h: float, scheme: Scheme, us: Matrix, xs: Matrix, reports: Matrix
+) -> int:  # fmt: skip
+    """xs[t + 1] = step(xs[t], us[t]) from xs[0]; returns the number of steps that were possible.
+
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 5).
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    begin(model, work, scheme, xs[0])
+    for t in range(us.shape[0]):
+        for k in range(xs.shape[1]):
+            xs[t + 1, k] = xs[t, k]
+        status = advance(model, work, scheme, h, us[t], xs[t + 1], None)
+        reports[t, 0] = status
+        reports[t, 1] = scheme.b.shape[0]
+        reports[t, 4] = -1.0
+        if status != _SOLVED:
+            return t
+    return us.shape[0]
+
+
+@kernel
+def linearize(
+    model_at: Table, work_at: Table, h: float, scheme: Scheme, substeps: int, line: Linearized, tangents: Tangents
+) -> None:
+    """Derivatives of all knots of `substeps` steps each, carried through every stage."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    for t in range(line.us.shape[0]):
+        x, report = line.x_next[t], line.reports[t]
+        for k in range(x.shape[0]):
+            x[k] = line.xs[t, k]
+        begin(model, work, scheme, x)
+        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
+        for _ in range(substeps):
+            if status == _SOLVED:
+                status = advance(model, work, scheme, h, line.us[t], x, tangents)
+        if status == _SOLVED and not last_tangents(model, work, scheme.free, line.us[t], tangents):
+            status = _SINGULAR
+        report[0], report[1], report[4] = status, substeps * scheme.b.shape[0], -1.0
+        nv = work.nu.shape[0]
+        for d in range(nv):
+            for k in range(2 * nv):
+                line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], work.columns[d, k]
+            for k in range(line.us.shape[1]):
+                line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], work.columns[d, 2 * nv + k]
+
+
+@kernel
+def closed_loop(
+    model_at: Table, work_at: Table, h: float, scheme: Scheme, x: Vector, policy: Policy, alpha: float,
+    limits: tuple[Vector, Vector], substeps: int, path: Path,
+) -> int:  # fmt: skip
+    """As sim/policy.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    low, high = limits
+    ndx = policy.gaps.shape[1]
+    dx = work.chain[0][:ndx]
+    for k in range(x.shape[0]):
+        path.xs[0, k] = x[k]
+    for t in range(path.us.shape[0]):
+        u, b = path.us[t], path.xs[t + 1]
+        state_difference(model, policy.xs[t], path.xs[t], dx)
+        for j in range(u.shape[0]):
+            f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
+            u[j] = min(max(f, low[j]), high[j])
+        for k in range(x.shape[0]):
+            b[k] = path.xs[t, k]
+        begin(model, work, scheme, b)
+        for _ in range(substeps):
+            path.report[0] = advance(model, work, scheme, h, u, b, None)
+            path.report[1] += scheme.b.shape[0]
+            if path.report[0] != _SOLVED:
+                return t
+        if alpha < 1.0:
+            for k in range(ndx):
+                dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
+            for k in range(x.shape[0]):
+                work.step_x[0, k] = b[k]
+            integrate_state(model, work.step_x[0], dx, b)
+    return path.us.shape[0]

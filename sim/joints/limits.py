@@ -1,0 +1,98 @@
+"""Joint limits on the central path: s = gap, s gamma = kappa, generalized impulse d(gap)/d(coordinates) gamma.
+
+    bound    gap = sign (theta3 - bound)    of one coordinate
+    cone     of a quaternion joint, see cone_limit.py
+
+Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
+"""
+
+from __future__ import annotations
+
+from sim.joints.cone_limit import cone_block, cone_derivative, cone_gap
+from sim.model import Goal, Late, Model, Vector, Work
+from solvers.cones import return_pair
+from solvers.jit import kernel
+from solvers.late import late
+
+
+@kernel
+def limit_gaps(model: Model, work: Work, h: float) -> None:
+    """bound_gap, and p of cones."""
+    for k in range(model.limit_dof.shape[0]):
+        if model.limit_cone[k]:
+            cone_gap(model, work, h, k)
+            continue
+        a = model.dof_qadr[model.limit_dof[k]]
+        work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
+
+
+@kernel
+def add_limit_impulse(model: Model, work: Work, k: int, size: float, out: Vector) -> None:
+    """out += the generalized impulse of limit k.   out: (nv,)."""
+    d = model.limit_dof[k]
+    if model.limit_cone[k]:
+        for j in range(3):
+            out[d + j] += work.bound_row[k, j] * size
+    else:
+        out[d] += model.limit_sign[k] * size
+
+
+@kernel
+def add_limit_blocks(model: Model, work: Work, h: float) -> None:
+    """joint_block += h gamma/s on the diagonal, and what a cone has in its place."""
+    for k in range(model.limit_dof.shape[0]):
+        d = model.limit_dof[k]
+        i = model.dof_body[d]
+        n = model.body_vadr[i + 1] - model.body_vadr[i]
+        a = d - model.body_vadr[i]
+        if model.limit_cone[k]:
+            cone_block(model, work, h, k)
+        else:
+            work.joint_block[i, a * n + a] += h * work.bound[k, 1] / work.bound[k, 0]
+
+
+@late(Late.LIMIT_DERIVATIVES)
+def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
+    """dR_dq += gamma/s, and what a cone has in its place."""
+    for k in range(model.limit_dof.shape[0]):
+        if model.limit_cone[k]:
+            cone_derivative(model, work, h, k)
+        else:
+            d = model.limit_dof[k]
+            work.dR_dq[d, d] += work.bound[k, 1] / work.bound[k, 0]
+
+
+@kernel
+def limit_constants(model: Model, work: Work, goal: Goal) -> None:
+    """dnu += (impulse of size w), with d gamma = w - (gamma/s) d gap; w kept in bound_w."""
+    for k in range(model.limit_dof.shape[0]):
+        s = work.bound[k, 0]
+        g = work.bound[k, 1]
+        r = goal.kappa - s * g
+        if goal.corrected:
+            r -= work.bound_step[k, 0] * work.bound_step[k, 1]
+        w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
+        work.bound_w[k] = w
+        add_limit_impulse(model, work, k, w, work.dnu)
+
+
+@kernel
+def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+    """The pairs that left their cones put back onto the central path of kappa."""
+    for k in range(model.limit_dof.shape[0]):
+        return_pair(work.bound[k], work.bound_trial[k], 0, 1, weight, kappa)
+
+
+@kernel
+def recover_limits(model: Model, work: Work, h: float, share: float) -> None:
+    """bound_step from dnu."""
+    for k in range(model.limit_dof.shape[0]):
+        s = work.bound[k, 0]
+        d = model.limit_dof[k]
+        if model.limit_cone[k]:
+            c = work.bound_row[k]
+            t = c[3] * work.dnu[d] + c[4] * work.dnu[d + 1] + c[5] * work.dnu[d + 2]
+        else:
+            t = model.limit_sign[k] * h * work.dnu[d]
+        work.bound_step[k, 0] = t + share * (work.bound_gap[k] - s)
+        work.bound_step[k, 1] = work.bound_w[k] - work.bound[k, 1] / s * t

@@ -1,0 +1,99 @@
+"""Collisions of cylinders with polytopes and cylinders (sim/collision/cylinders.py): what choice.py and contact.py
+do for the others. Scenes without such collisions do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from sim.collision.cylinders import (
+    choose_on_cylinder,
+    collide_with_cylinder,
+    instead_on_cylinder,
+    separation_of_cylinder,
+)
+from sim.collision.kinds import SWAPPED, Pair
+from sim.model import Late, Model, Work
+from sim.pairs.memory import gap_before, keep, last_point
+from solvers.jit import inner_kernel
+from solvers.late import late
+
+
+@inner_kernel
+def on_cylinder(kind: int) -> bool:
+    """Whether a kind of pair is one of these."""
+    return kind % SWAPPED >= Pair.POLYTOPE_CYLINDER
+
+
+@late(Late.CYLINDER_DISTANCE, 0.0)
+def cylinder_distance(model: Model, work: Work, first: int) -> float:
+    """Distance of the shapes of a collision at pair_relative."""
+    pose = work.pair_relative[first]
+    return separation_of_cylinder(
+        model.pair_kind[first],
+        model.pair_sizes[first],
+        model.hull,
+        pose[:9],
+        pose[9:],
+        work.pair_scratch[:12],
+        work.pair_code,
+        work.pair_trial[0],
+    )
+
+
+@inner_kernel
+def put_all(model: Model, work: Work, first: int) -> None:
+    """pair_out of all points of a collision at pair_relative, with the elements that were chosen."""
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
+    turned = work.pair_scratch[:12]
+    for j in range(first, last_point(model, first)):
+        code = work.pair_code[j]
+        collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_out[j])
+
+
+@late(Late.COLLIDE_CYLINDERS)
+def collide_cylinders(model: Model, work: Work, first: int) -> None:
+    """`put_all`"""
+    put_all(model, work, first)
+
+
+@late(Late.CHOOSE_CYLINDERS)
+def choose_cylinders(model: Model, work: Work, first: int) -> None:
+    """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
+    the step began.
+    """
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
+    before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
+    R, r = before[:9], before[9:12]
+    choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
+    for j in range(first, last_point(model, first)):
+        k = j - first
+        code = work.pair_code[j]
+        collide_with_cylinder(kind, k, code, sizes, model.hull, R, r, turned, g)
+        lost = g[0] < before[12]
+        if lost:
+            collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
+            lost = gap_before(kind, g, pose, before) < before[12]
+        if lost:
+            work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
+            collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
+            if g[0] < before[12]:
+                work.pair_code[j] = 0
+    if work.pair_free[0] == 2:
+        keep(model, work, first)
+    put_all(model, work, first)
+
+
+@late(Late.CYLINDER_BEFORE)
+def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
+    """pair_trial: the elements of point j where the step began."""
+    before = work.pair_before[first]
+    collide_with_cylinder(
+        model.pair_kind[first],
+        j - first,
+        work.pair_code[j],
+        model.pair_sizes[first],
+        model.hull,
+        before[:9],
+        before[9:12],
+        work.pair_scratch[:12],
+        work.pair_trial[0],
+    )

@@ -1,0 +1,72 @@
+"""The Newton direction of the interior point."""
+
+from __future__ import annotations
+
+from sim.coupling.system import factor_coupling, solve_coupling
+from sim.dynamics import momentum_balance_jacobian
+from sim.elimination import factor, solve
+from sim.joints.terms import joint_blocks
+from sim.kinematics import velocity_columns
+from sim.model import Goal, Model, Vector, Work
+from sim.solve.complementarity import boundary_step, products_ahead
+from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
+from solvers.jit import inlined
+
+_SHORT = 0.1  # a step below this share of the Newton step is short
+_SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
+
+
+@inlined
+def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float) -> bool:
+    """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular.
+
+    Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
+    growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
+    without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
+    """
+    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+    share = 1.0
+    sign = 0
+    for _ in range(_SHARES):
+        momentum_balance_jacobian(model, work, h, work.A)
+        joint_blocks(model, work, h, q, v)
+        condense_inequalities(model, work, h, smoothing, share)
+        sign = factor(model, work)
+        if sign >= 0:
+            break
+        share *= 0.5
+    return sign != 0 and factor_coupling(model, work)
+
+
+@inlined
+def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> float:
+    """Newton step dnu and the steps of all cones; returns the step to their boundary.
+
+    predictor     full residual, products to kappa                      -> sigma = (mean ahead / mean)^3
+    corrector     full residual, products to max(kappa, sigma mean), second-order term        (Mehrotra 1992);
+                  left out where the predictor already lands on kappa
+    if short      half the residual, products to half the mean; then a tenth, to nine tenths
+    """
+    sigma = 0.0
+    share = 1.0
+    alpha = 0.0
+    for phase in range(4):
+        if phase >= 2:
+            if alpha > _SHORT:
+                break
+            share = 0.5 if phase == 2 else 0.1
+            sigma = 1.0 - share
+        goal = Goal(max(kappa, sigma * mean), share, phase == 1)
+        for d in range(work.dnu.shape[0]):
+            work.dnu[d] = -share * work.residual[d]
+        inequality_rhs(model, work, goal)
+        solve(model, work, work.dnu, work.dnu)
+        solve_coupling(model, work, share, work.dnu)
+        recover_inequalities(model, work, h, share)
+        alpha = boundary_step(model, work)
+        if phase == 0:
+            ahead = products_ahead(model, work, min(1.0, 0.95 * alpha))
+            if alpha > 1.06 and abs(ahead - kappa) < 0.1 * kappa:
+                break
+            sigma = min(max(ahead / mean, 0.0), 1.0) ** 3
+    return alpha

@@ -1,0 +1,200 @@
+"""All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
+
+Their complementarity products are in complementarity.py. Far contacts (contacts/far.py) have no part in its variables
+and its matrix.
+"""
+
+from __future__ import annotations
+
+from sim.contacts.contact import (
+    add_contact_matrix,
+    add_contact_wrench,
+    contact_jacobian,
+    contact_kinematics,
+)
+from sim.contacts.far_impulses import add_far_wrenches, far_impulses
+from sim.contacts.friction import (
+    condense_contact,
+    contact_constant,
+    contact_error,
+    contact_impulse,
+    keep_in_cone,
+    recover_contact,
+    start_contact,
+)
+from sim.contacts.restitution import subtract_floors
+from sim.coupling.loops import keep_loops, move_loops
+from sim.elimination import dot_six, subtree_sums
+from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
+from sim.model import Goal, Late, Matrix, Model, Work
+from sim.pairs.contact import pair_kinematics
+from sim.pairs.far import far_pair_impulses
+from sim.pairs.stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.pose_jacobians import add_slip_jacobian
+from sim.terrain.contact import add_frame_matrix
+from solvers.jit import kernel
+from solvers.late import late
+
+_KAPPA_START, _KAPPA_AGAIN = 1e-3, 1e-2  # [N s m] at first, and of later attempts
+LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
+
+
+@kernel
+def inequality_kinematics(model: Model, work: Work, h: float) -> None:
+    """Gaps and slips of near contacts, impulses of far ones, gaps of limits, at configuration 3."""
+    for m in range(work.counts[0]):
+        contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
+    far_impulses(model, work, h)
+    pair_kinematics(model, work, h)
+    far_pair_impulses(model, work, h, work.far_law[0])
+    subtract_floors(model, work)
+    limit_gaps(model, work, h)
+
+
+@kernel
+def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth: float) -> float:
+    """All cone variables on the central path of one kappa0, at the present gaps and slips; returns kappa0.
+
+    growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h
+    (the impulse m d/h that stops it, over the distance), at least kappa and 0.001 N s m, or 0.01 N s m where an attempt
+    has failed; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
+    """
+    k0 = max(kappa, (_KAPPA_START if growth == 1.0 else _KAPPA_AGAIN) * growth)
+    floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            d = -work.contact_kin[c, 0]
+            if d > 0.0:
+                k0 = max(k0, growth * 0.3 * model.body_mass[model.contact_body[c]] * d * d / h)
+                floor = max(floor, 0.5 * d)
+    for j in range(model.limit_dof.shape[0]):
+        d = -work.bound_gap[j]
+        if d > 0.0:
+            k0 = max(k0, growth * LIMIT_INERTIA * d * d / h)
+            floor = max(floor, 0.5 * d)
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            start_contact(model, work, c, k0, floor)
+    for j in range(model.limit_dof.shape[0]):
+        s = max(work.bound_gap[j], floor)
+        work.bound[j, 0] = s
+        work.bound[j, 1] = k0 / s
+    return k0
+
+
+@kernel
+def apply_inequalities(model: Model, work: Work) -> float:
+    """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
+    r = 0.0
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            fn, f1, f2 = contact_impulse(model, work, c)
+            add_contact_wrench(model, work, c, fn, f1, f2, work.wrench)
+            r = max(r, contact_error(model, work, c))
+    add_far_wrenches(model, work)
+    r = max(r, apply_pairs(model, work))
+    for k in range(model.limit_dof.shape[0]):
+        r = max(r, abs(work.bound_gap[k] - work.bound[k, 0]))
+    return r
+
+
+@kernel
+def apply_limits(model: Model, work: Work) -> None:
+    """residual -= sign gamma, and p gamma of a cone."""
+    for k in range(model.limit_dof.shape[0]):
+        add_limit_impulse(model, work, k, -work.bound[k, 1], work.residual)
+
+
+@kernel
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
+    """A += contacts, joint_block += limits: their slacks and impulses eliminated.  share: see `condense_into`."""
+    condense_into(model, work, h, kappa, share, work.A)
+    add_limit_blocks(model, work, h)
+
+
+@kernel
+def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, out: Matrix) -> None:
+    """out += contacts, condensed at kappa.  (nbody, 36)
+
+    share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
+    turning of the arms of the impulses; 1 for the derivative.
+    """
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_jacobian(model, work, h, c)
+            condense_contact(model, work, c, kappa, share)
+            fn, f1, f2 = contact_impulse(model, work, c)
+            add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+            if model.contact_terrain[c] > 0:
+                add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+    condense_pairs(model, work, h, kappa, share)
+
+
+@late(Late.STIFFNESS)
+def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
+    """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
+    condense_into(model, work, h, kappa, 1.0, work.A3)
+    add_slip_jacobians(model, work, h)
+    add_limit_blocks(model, work, h)
+
+
+@kernel
+def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
+    """A2 -= contacts: slips depend on pose 2."""
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            add_slip_jacobian(model, work, h, c)
+
+
+@kernel
+def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
+    """dnu += S2^T B^T w + limits, for the goal of this Newton step."""
+    for i in range(work.wrench.shape[0]):
+        for k in range(6):
+            work.wrench[i, k] = 0.0
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_constant(model, work, c, goal)
+            w = work.contact_w[c]
+            add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
+    pair_constants(model, work, goal)
+    subtree_sums(model, work.wrench, work.subtree)
+    for d in range(work.dnu.shape[0]):
+        work.dnu[d] -= dot_six(work.S2[d], work.subtree[model.dof_body[d]])
+    limit_constants(model, work, goal)
+
+
+@kernel
+def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
+    """Steps of all cone variables from the twists and rates of the last solve."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            recover_contact(model, work, c, share)
+    recover_limits(model, work, h, share)
+
+
+@kernel
+def keep_inequalities(model: Model, work: Work) -> None:
+    """Remember the cone variables from which the line search starts."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            for k in range(12):
+                work.cone_trial[c, k] = work.cone[c, k]
+    for k in range(model.limit_dof.shape[0]):
+        work.bound_trial[k, 0] = work.bound[k, 0]
+        work.bound_trial[k, 1] = work.bound[k, 1]
+    keep_loops(model, work)
+
+
+@kernel
+def move_inequalities(model: Model, work: Work, alpha: float) -> None:
+    """cone = kept + alpha step."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            for k in range(12):
+                work.cone[c, k] = work.cone_trial[c, k] + alpha * work.cone_step[c, k]
+            keep_in_cone(model, work, c)
+    for k in range(model.limit_dof.shape[0]):
+        work.bound[k, 0] = work.bound_trial[k, 0] + alpha * work.bound_step[k, 0]
+        work.bound[k, 1] = work.bound_trial[k, 1] + alpha * work.bound_step[k, 1]
+    move_loops(model, work, alpha)

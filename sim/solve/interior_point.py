@@ -1,0 +1,151 @@
+"""The interior point of a step: Newton's method on the joint velocities, contacts and limits held on the central path.
+
+Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
+
+* The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
+  beta by Newton, at a `smoothing` that follows down to kappa (contacts/friction.py); only gaps and normal impulses have
+  to stay positive. Conic scalings jam on thin cones.
+* The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
+  the impulses of kappa itself, a robot at rest or a good guess, starts there (central_path.py).
+* The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
+* No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
+* Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
+* Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
+  overlap is none (pairs/choice.py).
+* An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
+  velocity, or beyond the fold; at another kappa0.
+"""
+
+from __future__ import annotations
+
+from sim.contacts.far import came_near, choose_far
+from sim.contacts.friction import slip_noise
+from sim.contacts.restitution import find_impacts, gained_energy
+from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.pairs.choice import overlapping
+from sim.pairs.far import begin_pairs
+from sim.solve.central_path import AGAIN, first_attempt, start
+from sim.solve.complementarity import products, slip_error
+from sim.solve.direction import direction, linearize_step
+from sim.solve.line_search import search
+from sim.solve.merit import Merit, follow, judge, residuals
+from sim.solve.residual import residual_scale, rounding
+from solvers.jit import inlined, kernel
+from solvers.late import late
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
+_SINGULAR = int(Status.SINGULAR)
+
+_ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
+_LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
+_WORSE, _WORSE_LED = 10.0, 2.0  # times the residual before: what smaller violations may cost, before _LED and after
+_ATTEMPTS = 60
+_PATIENCE = 30  # iterations of an attempt
+_CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
+_REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
+_FEW = 4  # halvings; an attempt that needs more is given up
+
+
+@inlined
+def on_path(model: Model, work: Work, h: float, kappa: float, spread: float, violation: float) -> bool:
+    """Whether products and friction laws hold to `spread`; friction laws to their rounding, where that is coarser."""
+    if violation < spread:
+        return True
+    if not violation < spread + slip_noise(model, work, h):
+        return False
+    return products(model, work, kappa)[1] < spread
+
+
+@kernel
+def try_from(
+    model: Model,
+    work: Work,
+    options: Options,
+    inputs: tuple[Vector, Vector, Vector],
+    attempt: int,
+    iterations: int,
+    balance: tuple[float, float],
+) -> Outcome:
+    """One attempt; NO_PROGRESS when it is given up.
+
+    inputs: (q, v, u);  iterations: those of the attempts before;  balance: residuals of the start of attempt 0.
+    """
+    q, v, u = inputs
+    h = options.h
+    kappa = options.kappa
+    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
+    scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
+    worse = _WORSE if attempt < _LED else _WORSE_LED
+    smoothing = kappa
+    if attempt != 0:
+        smoothing = start(model, work, options, q, v, attempt)
+        balance = residuals(model, work, h, q, v, u)
+    ratio = 1e-2
+    patience = iterations + _PATIENCE
+    halvings = 0
+    merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)
+    while smoothing > 0.0 and merit.residual < 1e300:
+        slip = merit.slip
+        if attempt < _LED:
+            if merit.mean < smoothing and smoothing > kappa:
+                smoothing = max(kappa, merit.mean)
+                slip = slip_error(model, work, smoothing)
+            smoothing, slip, ratio = follow(model, work, kappa, smoothing, ratio, slip)
+        else:
+            before = smoothing
+            smoothing, slip, ratio = follow(model, work, max(kappa, 0.1 * merit.mean), smoothing, ratio, slip)
+            if smoothing < before:
+                patience = max(patience, iterations + _PATIENCE // 2)
+        merit = Merit(merit.residual, max(merit.violation, slip), slip, merit.mean)
+        solved = merit.residual < options.tolerance and smoothing <= kappa
+        # a guess within the tolerance gets one step too: the error is squared
+        if solved and iterations > 0 and on_path(model, work, h, kappa, spread, merit.violation):
+            return Outcome(_SOLVED, iterations, merit.residual, merit.violation)
+        if iterations >= options.max_iterations:
+            return Outcome(_MAX_ITERATIONS, iterations, merit.residual, merit.violation)
+        if iterations >= patience or halvings > _FEW:
+            break
+        iterations += 1
+        if not linearize_step(model, work, h, q, v, smoothing):
+            return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
+        boundary = direction(model, work, h, kappa, merit.mean)
+        merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)
+    return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
+
+
+@late(Late.SOLVE, FAILED)
+def interior_point(
+    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
+) -> Outcome:
+    """Solve the step for v25 with all complementarity products at kappa; the guess may be far off.
+
+    Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
+    """
+    out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    begin_pairs(model, work, options)
+    choose_far(model, work, options)
+    find_impacts(model, work, options.h)
+    while True:
+        work.pair_free[0] = 0
+        first, balance = first_attempt(model, work, options, (q, v, u), guess)
+        for attempt in range(first, _ATTEMPTS):
+            out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
+            misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+            for choice in range(_CHOICES):
+                if misplaced != 1 or work.pair_free[0] == 1:
+                    break
+                if choice > 0 or attempt > _REPLACED:
+                    work.pair_free[0] = 2
+                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
+                misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+            if misplaced == 0 and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
+                break
+            out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
+            work.pair_free[0] = (attempt + 1) // 2 % 2
+        if came_near(model, work):
+            continue
+        if out.status != _SOLVED or not gained_energy(model, work, options.h):
+            return out

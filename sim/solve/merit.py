@@ -1,0 +1,64 @@
+"""How far an iterate of the interior point is from the solution."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.coupling.loops import apply_loops
+from sim.model import Model, Vector, Work
+from sim.solve.complementarity import products, slip_error
+from sim.solve.inequalities import apply_inequalities, apply_limits
+from sim.solve.residual import balance_to_wrench, norm, project_wrench
+from solvers.jit import kernel
+
+
+class Merit(NamedTuple):
+    """Distance from the solution; everything infinite where a body turns by half a turn."""
+
+    residual: float  # largest equality residual, momenta relative to their scale
+    violation: float  # largest |product - kappa|, or violation of the friction law at the present smoothing
+    slip: float  # the violation of the friction law alone
+    mean: float  # of the complementarity products
+
+
+@kernel
+def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
+    """Largest generalized residual, and largest |gap - slack|; fills residual, wrench, subtree."""
+    balance_to_wrench(work)
+    e = max(apply_inequalities(model, work), apply_loops(model, work))
+    e = max(e, project_wrench(model, work, h, q, v, u))
+    apply_limits(model, work)
+    return norm(work.residual), e
+
+
+@kernel
+def judge(
+    model: Model, work: Work, kappa: float, scale: float, smoothing: float, balance: tuple[float, float]
+) -> Merit:
+    """Merit of the present iterate, whose residuals are `balance`."""
+    mean, violation = products(model, work, kappa)
+    slip = slip_error(model, work, smoothing)
+    violation = max(violation, slip)
+    r = max(balance[0] / scale, balance[1])
+    if r < 1e300 and violation < 1e300:
+        return Merit(r, violation, slip, mean)
+    return Merit(1e301, 1e301, 1e301, 1e301)
+
+
+@kernel
+def follow(
+    model: Model, work: Work, least: float, smoothing: float, ratio: float, slip: float
+) -> tuple[float, float, float]:
+    """The smoothing brought down to `least` as far as the friction law holds on the way, and its violation there.
+
+    ratio: of one smoothing to the next; it shrinks where Newton's method lands well within the law.
+    slip: the violation at the smoothing it comes with.
+    """
+    if slip < 0.03 * smoothing:
+        ratio = max(1e-4, ratio * ratio)
+    elif slip > 0.3 * smoothing:
+        ratio = min(1e-2, ratio**0.5)
+    while smoothing > least and slip < 0.3 * smoothing:
+        smoothing = max(least, ratio * smoothing)
+        slip = slip_error(model, work, smoothing)
+    return smoothing, slip, ratio

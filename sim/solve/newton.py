@@ -1,0 +1,112 @@
+"""The step of a scene without contacts and limits: Newton's method on the momentum balance, nothing else compiled."""
+
+from __future__ import annotations
+
+from sim.coupling.loops import apply_loops, keep_loops, move_loops
+from sim.coupling.system import factor_coupling, solve_coupling
+from sim.dynamics import momentum_balance, momentum_balance_jacobian
+from sim.elimination import factor, solve
+from sim.joints.terms import joint_blocks
+from sim.kinematics import velocity_columns
+from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.moves import turn_bodies
+from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
+from solvers.jit import inlined, kernel
+from solvers.late import late
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
+_NO_PROGRESS = int(Status.NO_PROGRESS)
+_SINGULAR = int(Status.SINGULAR)
+_ROUNDED = 1e-10
+
+
+@inlined
+def evaluate(
+    model: Model, work: Work, h: float, inputs: tuple[Vector, Vector, Vector], alpha: float
+) -> tuple[bool, float, float]:
+    """At nu = nu_trial + alpha dnu: whether it is inside the domain, the largest residual, and the largest gap."""
+    q, v, u = inputs
+    for d in range(v.shape[0]):
+        work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
+    inside = momentum_balance(model, work, h, q)
+    if model.loop_ntrans.shape[0] > 0:
+        turn_bodies(work, work.rot3)
+    balance_to_wrench(work)
+    move_loops(model, work, alpha)
+    gap = apply_loops(model, work)
+    gap = max(gap, project_wrench(model, work, h, q, v, u))
+    return inside, norm(work.residual), gap
+
+
+@inlined
+def newton_step(model: Model, work: Work, h: float, q: Vector, v: Vector) -> bool:
+    """H dnu = -R at nu, which becomes nu_trial; False when H is singular."""
+    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
+    momentum_balance_jacobian(model, work, h, work.A)
+    joint_blocks(model, work, h, q, v)
+    if factor(model, work) == 0 or not factor_coupling(model, work):
+        return False
+    for d in range(v.shape[0]):
+        work.nu_trial[d] = work.nu[d]
+        work.rhs[d] = -work.residual[d]
+    solve(model, work, work.rhs, work.dnu)
+    solve_coupling(model, work, 1.0, work.dnu)
+    keep_loops(model, work)
+    return True
+
+
+@kernel
+def closed_to(work: Work, options: Options) -> float:
+    """How far loops may be open: near where two branches of their motion meet, gaps grow slowly away from either.
+
+    Least pivot: the product of the distances of configurations 2 and 3 from there.
+    """
+    return options.tolerance * max(work.couple_rank[2], _ROUNDED) ** 0.5 if work.couple_rank[1] > 0.0 else 1e300
+
+
+@late(Late.SOLVE, FAILED)
+def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+    """Solve R(v25) = 0 from the guess of v25; halve steps that leave the domain or let the residual grow.
+
+    Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
+    """
+    h = options.h
+    scale = residual_scale(work)
+    floor = rounding(model, work, h) / scale
+    keep_loops(model, work)
+    for d in range(v.shape[0]):
+        work.nu_trial[d] = guess.velocity[d]
+        work.dnu[d] = 0.0
+    alpha = 1.0
+    last = 1e300
+    halvings = 0
+    iterations = 0
+    while True:
+        inside, r, gap = evaluate(model, work, h, (q, v, u), alpha)
+        r = max(r / scale, gap)
+        if not (inside and r < max(last, options.tolerance)):
+            if inside and iterations > 0 and r < floor:
+                break
+            if halvings > 40:
+                return Outcome(_NO_PROGRESS, iterations, r, 0.0)
+            halvings += 1
+            if iterations == 0:  # the start itself lies outside: slow everything down
+                for d in range(v.shape[0]):
+                    work.nu_trial[d] *= 0.7
+            alpha *= 0.5
+            continue
+        if r < options.tolerance and (gap < closed_to(work, options) or r >= last):
+            break
+        if iterations == options.max_iterations:
+            return Outcome(_MAX_ITERATIONS, iterations, r, 0.0)
+        iterations += 1
+        halvings = 0
+        last = r
+        alpha = 1.0
+        if not newton_step(model, work, h, q, v):
+            return Outcome(_SINGULAR, iterations, r, 0.0)
+    turn_bodies(work, work.rot3)
+    absorb_residual(model, work)
+    return Outcome(_SOLVED, iterations, r, 0.0)

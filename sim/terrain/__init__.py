@@ -1,0 +1,1 @@
+"""Ground that is no level plane."""
