@@ -35,7 +35,7 @@ from sim.terrain.contact import add_frame_matrix
 from solvers.jit import kernel
 from solvers.late import late
 
-_KAPPA_START, _KAPPA_AGAIN = 1e-3, 1e-2  # [N s m] at first, and of later attempts
+_KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
 
@@ -56,10 +56,10 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     """All cone variables on the central path of one kappa0, at the present gaps and slips; returns kappa0.
 
     growth = 0 stands for kappa itself. Otherwise kappa0 is the action of the largest predicted overlap d, 0.3 m d^2/h
-    (the impulse m d/h that stops it, over the distance), at least kappa and 0.001 N s m, or 0.01 N s m where an attempt
-    has failed; slacks start at the gaps, at least d/2 and sqrt(kappa0)/10.
+    (the impulse m d/h that stops it, over the distance), at least 0.01 N s m and kappa; slacks start at the gaps, at
+    least d/2 and sqrt(kappa0)/10.
     """
-    k0 = max(kappa, (_KAPPA_START if growth == 1.0 else _KAPPA_AGAIN) * growth)
+    k0 = max(kappa, _KAPPA_START * growth)
     floor = 0.1 * k0**0.5 if growth > 0.0 else 0.0
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):

@@ -58,7 +58,7 @@ def test_conservation_in_free_flight(name: str) -> None:
             for p in sim.momentum(t.x):
                 np.testing.assert_allclose(p, np.tile(p[0], (len(p), 1)), atol=1e-9 * (1.0 + np.abs(p).max()))
     assert error[0] < 0.02
-    assert error[1] < 0.35 * error[0] or error[1] < 1e-9
+    assert error[1] < 0.35 * error[0] or error[1] < 3e-8  # closed loops to their tolerance
 
 
 @pytest.mark.parametrize("name", NAMES)
