@@ -225,7 +225,7 @@ def test_a_wheel_rolls_on_the_lowest_points_of_its_rims() -> None:
         np.testing.assert_allclose(outs[:, 7:25], 0.0, atol=0.0)
 
 
-# pairs whose elements are chosen once per pose, by `arrange`, have tests of their own: test_polytopes.py, test_cylinders.py
+# pairs whose elements are chosen once per pose, by `arrange`, have tests of their own: test_polytope_steps.py, test_cylinders.py
 _ARRANGED = (Pair.POLYTOPE_POLYTOPE, Pair.POLYTOPE_CYLINDER, Pair.CYLINDER_CYLINDER)
 
 
