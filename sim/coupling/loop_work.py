@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import is_loop
-from sim.model import Late, Model, Options, Vector, Work
+from sim.model import Late, Matrix, Model, Options, Vector, Work
 from sim.rotation import Vec3, cross
 from solvers.jit import kernel
 from solvers.late import late
@@ -13,20 +13,17 @@ _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that 
 
 
 @kernel
-def _twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
-    """p.v of the intervals 1-2 and 2-3 together [J], rotations by their sines."""
+def _momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: Matrix, v: Vector) -> float:
+    """p.v of an interval [J], twice its kinetic energy; rotations by their sines."""
     energy = 0.0
     for i in range(model.body_parent.shape[0]):
         J = work.inertia_world[i]
-        for k in range(3):
-            x, y = work.pos2[i, k] - work.pos1[i, k], work.pos3[i, k] - work.pos2[i, k]
-            energy += model.body_mass[i] * (x * x + y * y) / (h * h)
-        for t in (work.turn_in[i], work.turn[i]):
-            for r in range(3):
-                for k in range(3):
-                    energy += 4.0 * t[1 + r] * J[3 * r + k] * t[1 + k] / (h * h)
+        for r in range(3):
+            energy += model.body_mass[i] * move[i, r] * move[i, r] / (h * h)
+            for k in range(3):
+                energy += 4.0 * turn[i, 1 + r] * J[3 * r + k] * turn[i, 1 + k] / (h * h)
     for d in range(v.shape[0]):
-        energy += model.dof_armature[d] * (v[d] * v[d] + work.nu[d] * work.nu[d])
+        energy += model.dof_armature[d] * v[d] * v[d]
     return energy
 
 
@@ -82,10 +79,14 @@ def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the forces of loops did work on the way 1-2-3, which those of a motion do to O(h^3) only.
 
     They do where a loop passes a singular configuration faster than steps can follow: there the equations of a step
-    have solutions that lead anywhere, and to any energy. Loops that were open are closed by work.
+    have solutions that lead anywhere, and to any energy. Loops that were open are closed by work. A step that slows the
+    bodies down, as an impact does, has given nothing.
     """
-    gain = 0.5 * _loop_work(model, work) / options.h
-    most = _SHARE * 0.5 * _twice_kinetic(model, work, options.h, v)
-    if not gain > most:
+    h = options.h
+    before = _momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
+    after = _momentum_velocity(model, work, h, work.move, work.turn, work.nu)
+    gain = 0.5 * _loop_work(model, work) / h
+    most = _SHARE * 0.5 * (before + after)
+    if not (gain > most and after > before):
         return False
-    return gain - 0.5 * _closing_work(model, work, options.tolerance) / options.h > most
+    return gain - 0.5 * _closing_work(model, work, options.tolerance) / h > most
