@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from sim import linear_rollout, rollout
 from sim.bind import bind_gradient, bind_step
 from sim.layout import work_view
-from sim.model import Integers, Model, Vector, Work
+from sim.model import Integers, Model, Vector
 from sim.policy import Path, Policy, closed_loop
 from sim.settings import Settings
 from sim.state_calls import StateCalls
+from sim.work import Work
 from solvers.status import Status
 
 Floats = NDArray[np.float64]

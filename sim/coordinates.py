@@ -12,9 +12,10 @@ from math import atan2, pi
 from sim.joints.swing_coordinates import swing_component, swing_of
 from sim.kinematics import tree_poses
 from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.moves import move_back
 from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate, transposed_times
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

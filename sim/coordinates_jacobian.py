@@ -10,7 +10,7 @@ from sim.coordinates import body_turn, joint_frame, node_poses, poses_of_maximal
 from sim.joints.rows import joint_rows
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.rotation import (
     Mat3,
     Vec3,
@@ -25,6 +25,7 @@ from sim.rotation import (
     times,
     transposed_times,
 )
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -14,9 +14,10 @@ from __future__ import annotations
 from sim.advance import advance, follows_on
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.kinematics import tree_poses
-from sim.model import InputKind, Matrix, Model, Vector, Work
+from sim.model import InputKind, Matrix, Model, Vector
 from sim.moves import Increment, move_back, tree_moves
 from sim.rotation import Mat3, cross, rotate
+from sim.work import Work
 from solvers.jit import kernel
 
 _BODY = int(InputKind.BODY)

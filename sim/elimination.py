@@ -8,7 +8,8 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 
 from __future__ import annotations
 
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
+from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_rows
 

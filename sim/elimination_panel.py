@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sim.model import Matrix, Model, Work
+from sim.model import Matrix, Model
+from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.lu import lu_solve_rows
 

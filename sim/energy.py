@@ -15,8 +15,9 @@ from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints.ball_spring import relative_to_rest
 from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.rotation import cross, quat_exp, quat_mul
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -14,13 +14,15 @@ from sim.elimination_panel import solve_panel
 from sim.joints.limits import add_limit_derivatives
 from sim.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
-from sim.model import InputKind, Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import InputKind, Matrix, Model, Vector
 from sim.outer import input_wrench
 from sim.pairs.far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix
 from sim.solve.inequalities import add_stiffness
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

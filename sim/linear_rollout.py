@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sim.gradients import gradient
 from sim.layout import model_view, work_view
-from sim.model import Guess, Vector
+from sim.model import Vector
+from sim.options import Guess
 from sim.rollout import Linearized, begin
 from sim.step import step
 from solvers.jit import kernel

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sim.energy import spatial_inertia
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
+from sim.work import Work
 from solvers.jit import kernel
 
 

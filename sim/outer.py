@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from sim.elimination import add_children
-from sim.model import InputKind, Integers, Matrix, Model, Vector, Work
+from sim.model import InputKind, Integers, Matrix, Model, Vector
 from sim.rotation import cross, rotate
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics import body_jacobian
 from sim.elimination import add_children
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.rotation import cross, transposed_times
+from sim.work import Work
 from solvers.jit import kernel
 
 

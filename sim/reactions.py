@@ -24,9 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
-from sim.model import Model, Work
+from sim.model import Model
 from sim.parts import WORLD, Joint
 from sim.shapes import rotation_matrix
+from sim.work import Work
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from sim.elimination import column_and_row, dot_six
-from sim.model import Model, Work
+from sim.model import Model
 from sim.rotation import cross
+from sim.work import Work
 from solvers.jit import kernel
 
 

@@ -15,8 +15,10 @@ from typing import NamedTuple
 from sim.contacts.report import report_contacts
 from sim.gradients import gradient
 from sim.layout import model_view, work_view
-from sim.model import Guess, Integers, Matrix, Options, Vector, Work
+from sim.model import Integers, Matrix, Vector
+from sim.options import Guess, Options
 from sim.step import step
+from sim.work import Work
 from solvers.jit import kernel, parallel_kernel, prange
 from solvers.record import Table
 from solvers.status import Status

@@ -7,9 +7,10 @@ from sim.elimination import factor, project, solve, subtree_sums
 from sim.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.kinematics import velocity_columns
 from sim.layout import model_view, work_view
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.solve.residual import rounding
 from sim.velocity import joint_twists
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status

@@ -7,8 +7,11 @@ from sim.coupling.loop_motion import is_farther, lead_again, meet_ahead, predict
 from sim.coupling.loop_work import loops_gained
 from sim.coupling.loops import start_loops
 from sim.dynamics import begin_step
-from sim.model import Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
+from sim.options import Guess, Options, Outcome
 from sim.solve.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
+from sim.work import Work
 from solvers.jit import inlined
 from solvers.late import late
 from solvers.status import Status

@@ -5,8 +5,9 @@ from __future__ import annotations
 from sim.energy import node_velocity
 from sim.kinematics import tree_poses
 from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.rotation import cross
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -44,33 +44,30 @@ def delta(
     the platform its three translations. Lengths and radii [m], `gap` between the rods of an arm; masses [kg] of one
     part; angle [rad] of the arms in the neutral state; damper [N m s/rad] and limits [rad] of each motor.
     """
-    out = base_radius + arm * np.cos(angle) - platform_radius
-    drop = arm * np.sin(angle) + float(np.sqrt(forearm**2 - out**2))
+    out = base_radius + arm * np.cos(angle) - platform_radius  # from the end of an arm to the platform
+    drop = float(np.sqrt(forearm**2 - out**2))
     bodies, joints, balls = [], [], []
     for k in range(3):
         yaw = 2.0 * np.pi * k / 3
         radial, tangent = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (yaw, yaw + np.pi / 2))
-        turned = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
         bodies.append(Body(f"arm_{k}", arm_mass, shape=Box(arm, 0.04, 0.04)))
-        pivot = base_radius * radial + np.array([0.0, 0.0, height])
-        start: dict[str, Any] = {"child_point": (-arm / 2, 0.0, 0.0), "axis": (0.0, 1.0, 0.0), "orientation": turned}
-        joints.append(Joint("revolute", None, f"arm_{k}", f"motor_{k}", pivot, damper=damper, limits=limits, **start))
-        # axes of the arm in the neutral state, and the rods from it to the platform
-        frame = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])
-        world = np.array([radial, tangent, [0.0, 0.0, 1.0]]).T @ frame
-        along = (-out * radial - np.array([0.0, 0.0, drop - arm * np.sin(angle)])) / forearm
-        rod_axes = _frame(along)
+        mount: dict[str, Any] = {
+            "parent_point": base_radius * radial + np.array([0.0, 0.0, height]),
+            "child_point": (-arm / 2, 0.0, 0.0),
+            "axis": (0.0, 1.0, 0.0),
+            "orientation": np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]),
+        }
+        joints.append(Joint("revolute", None, f"arm_{k}", f"motor_{k}", damper=damper, limits=limits, **mount))
+        lowered = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])
+        arm_axes = np.array([radial, tangent, [0.0, 0.0, 1.0]]).T @ lowered
+        rod_axes = rotation_matrix(from_z((-out * radial - np.array([0.0, 0.0, drop])) / forearm))
         for side in (-0.5, 0.5):
             name = f"rod_{k}_{'l' if side < 0 else 'r'}"
             bodies.append(Body(name, rod_mass, shape=Cylinder(0.008, forearm)))
-            at = (arm / 2, side * gap, 0.0)
-            turn = quaternion(world.T @ rod_axes)
-            low = (0.0, 0.0, -forearm / 2)
-            joints.append(Joint("orbital", f"arm_{k}", name, "", at, low, orientation=turn))
             corner = platform_radius * radial + side * gap * tangent
-            end = (0.0, 0.0, forearm / 2)
-            level = quaternion(rod_axes.T)
-            balls.append(Joint("spherical", name, "platform", f"ball{name[3:]}", end, corner, orientation=level))
+            pair = _rod_joints(f"arm_{k}", name, (arm / 2, side * gap, 0.0), corner, forearm, arm_axes, rod_axes)
+            joints.append(pair[0])
+            balls.append(pair[1])
     bodies.append(Body("platform", platform_mass, shape=Cylinder(platform_radius + gap / 2, 0.02)))
     return Mechanism(
         bodies,
@@ -82,6 +79,14 @@ def delta(
     )
 
 
-def _frame(along: Floats) -> Floats:
-    """Rotation (3, 3) that takes z to a unit vector, the shortest way."""
-    return rotation_matrix(from_z(along))
+def _rod_joints(
+    arm: str, rod: str, at: ArrayLike, corner: Floats, length: float, arm_axes: Floats, rod_axes: Floats
+) -> tuple[Joint, Joint]:
+    """The universal joint of a rod at its arm and the ball joint at the platform, which stands level.
+
+    at, corner: (3,) where they are in arm and platform [m]; arm_axes, rod_axes: (3, 3) of the neutral state.
+    """
+    low, end = (0.0, 0.0, -length / 2), (0.0, 0.0, length / 2)
+    universal = Joint("orbital", arm, rod, "", at, low, orientation=quaternion(arm_axes.T @ rod_axes))
+    ball = Joint("spherical", rod, "platform", f"ball{rod[3:]}", end, corner, orientation=quaternion(rod_axes.T))
+    return universal, ball

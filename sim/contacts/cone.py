@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Model, Work
+from sim.model import Model
+from sim.work import Work
 from solvers.jit import kernel
 
 

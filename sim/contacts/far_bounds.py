@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.moves import third_quaternion
+from sim.work import Work
 from solvers.jit import kernel
 
 ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions

@@ -6,11 +6,12 @@ from math import sqrt
 
 from sim.contacts.far_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contacts.friction import contact_impulse, start_contact
-from sim.model import Law, Model, Work
+from sim.model import Law, Model
 from sim.moves import third_quaternion
 from sim.rotation import cross, rotate, transposed_times
 from sim.terrain.far import evaluate_on_terrain
-from solvers.jit import kernel
+from sim.work import Work
+from solvers.jit import inlined, kernel
 
 _LINEAR = int(Law.LINEAR)
 
@@ -55,6 +56,14 @@ def far_impulses(model: Model, work: Work, h: float) -> None:
                 _evaluate(model, work, h, c)
 
 
+@inlined
+def _cone_impulse(mu: float, kappa: float, gap: float, x: float, y: float) -> tuple[float, float, float]:
+    """`start_contact` of a cone written out, slip (x, y): one division, and mu = 0 needs no case of its own."""
+    psi = gap + sqrt(gap * gap + 4.0 * mu * mu * (x * x + y * y))  # 2 mu psi of cone.py
+    q = kappa / (gap * psi)
+    return psi * q, -2.0 * mu * mu * q * x, -2.0 * mu * mu * q * y
+
+
 @kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     """far[c, 4:24] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
@@ -93,11 +102,8 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
             kin[0], kin[1], kin[2] = gap, x, y
             start_contact(model, work, k, kappa, row[0])
             fn, fx, fy = contact_impulse(model, work, k)
-        else:  # `start_contact` written out: one division, and mu = 0 needs no case of its own
-            mu = model.contact_friction[k]
-            psi = gap + sqrt(gap * gap + 4.0 * mu * mu * (x * x + y * y))  # 2 mu psi of cone.py
-            q = kappa / (gap * psi)
-            fn, fx, fy = psi * q, -2.0 * mu * mu * q * x, -2.0 * mu * mu * q * y
+        else:
+            fn, fx, fy = _cone_impulse(model.contact_friction[k], kappa, gap, x, y)
             z = work.cone[k]
             z[0], z[1], z[2], z[3] = gap, fn, fx, fy
         N, X, Y = N + fn, X + fx, Y + fy

@@ -20,8 +20,10 @@ from sim.contacts.pyramid import (
     return_pyramid,
     start_pyramid,
 )
-from sim.model import Goal, Law, Model, Work
+from sim.model import Law, Model
+from sim.options import Goal
 from sim.pairs.jacobian import pair_rate
+from sim.work import Work
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
 

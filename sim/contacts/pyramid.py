@@ -8,7 +8,10 @@ along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:1
 
 from __future__ import annotations
 
-from sim.model import Goal, Late, Model, Work
+from sim.late import Late
+from sim.model import Model
+from sim.options import Goal
+from sim.work import Work
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
 from solvers.late import late

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from sim.contacts.contact import contact_kinematics
 from sim.contacts.friction import contact_error, contact_impulse, slip_violation
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import is_absent
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

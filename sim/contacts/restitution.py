@@ -32,9 +32,11 @@ from math import sqrt
 
 from sim.contacts.contact import contact_jacobian, contact_kinematics
 from sim.contacts.friction import contact_impulse
-from sim.model import Late, Model, Work
+from sim.late import Late
+from sim.model import Model
 from sim.pairs.contact import is_absent, pair_arm, pair_force, pair_kinematics
 from sim.rotation import Vec3, cross, transposed_times
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

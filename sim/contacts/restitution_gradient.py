@@ -8,9 +8,11 @@ of the branch that was taken. Scenes without restitution do not compile these ke
 from __future__ import annotations
 
 from sim.coupling.gradient import add_column
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import pair_arm, pair_force
 from sim.rotation import Vec3, cross, join, transposed_times
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.late import late

@@ -7,7 +7,9 @@ They come after the rows of pairs and loops. Their directions are constant, so t
 
 from __future__ import annotations
 
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -12,10 +12,12 @@ from sim.contacts.friction import contact_impulse
 from sim.coupling.gears import gear_derivatives
 from sim.coupling.loop_stiffness import loop_stiffness
 from sim.coupling.rows import is_loop
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import add_earlier_slip, centre_shift
 from sim.rotation import Vec3, cross
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.late import late

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import add_along_path
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.moves import Increment, tree_moves, turn_bodies
+from sim.work import Work
 from solvers.jit import kernel
 
 _MEETING = 0.02  # |w| / |dw|

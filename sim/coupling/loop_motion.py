@@ -13,7 +13,9 @@ from sim.coupling.loop_lead import lead_loops
 from sim.coupling.loop_velocity import close_velocity
 from sim.coupling.loops import direct_loops
 from sim.energy import factor_mass_matrix
-from sim.model import Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 from solvers.status import Status

@@ -10,7 +10,9 @@ from __future__ import annotations
 from sim.coupling.loop_lead import lead_loops
 from sim.coupling.loops import direct_loops
 from sim.coupling.system import body_twists, factor_coupling, solve_coupling
-from sim.model import Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

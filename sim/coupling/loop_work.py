@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import is_loop
-from sim.model import Late, Matrix, Model, Options, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
+from sim.options import Options
 from sim.rotation import Vec3, cross
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

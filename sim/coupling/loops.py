@@ -16,8 +16,10 @@ from __future__ import annotations
 
 from sim.coupling.rows import is_loop
 from sim.frame import place_frame
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, join, rotate, times
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sim.coupling.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 

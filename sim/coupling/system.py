@@ -21,7 +21,9 @@ from __future__ import annotations
 
 from sim.coupling.rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
 from sim.elimination import solve
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
+from sim.work import Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
 from solvers.late import late

@@ -22,10 +22,11 @@ from sim.joints.ball_spring import relative_to_rest
 from sim.joints.swing import swing_curvature
 from sim.kinematics import tree_poses
 from sim.mass import solve_mass
-from sim.model import InputKind, Integers, Model, Vector, Work
+from sim.model import InputKind, Integers, Model, Vector
 from sim.outer import outer_wrenches
 from sim.rotation import cross, inverse_right_jacobian
 from sim.velocity import joint_twists
+from sim.work import Work
 from solvers.jit import kernel
 
 _JOINT = int(InputKind.JOINT)

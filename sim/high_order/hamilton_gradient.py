@@ -22,9 +22,10 @@ from sim.elimination_panel import solve_panel
 from sim.energy import armature_blocks, spatial_inertia
 from sim.high_order.hamilton import column_rate
 from sim.joints.ball_spring import relative_to_rest
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Integers, Matrix, Model, Vector
 from sim.outer import input_slopes, outer_slopes
 from sim.rotation import cross
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 

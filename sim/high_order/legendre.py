@@ -14,10 +14,11 @@ from sim.high_order.hamilton import momenta_of_velocity, place
 from sim.high_order.hamilton_gradient import Slopes, slopes_at
 from sim.joints.ball_spring import spring_turns, turn_product
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Integers, Matrix, Model, Vector
 from sim.pose_jacobians import add_skew, columns_to_origin, pose2_to_origin, rows_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

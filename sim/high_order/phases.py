@@ -19,9 +19,10 @@ from sim.contacts.far import cluster_gap
 from sim.contacts.report import report_contacts
 from sim.high_order.runge_kutta import Scheme, advance, begin
 from sim.layout import model_view, work_view
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.rollout import Cube
 from sim.rotation import cross, quat_matrix, quat_turn
+from sim.work import Work
 from solvers.dense import copy
 from solvers.jit import kernel
 from solvers.record import Table

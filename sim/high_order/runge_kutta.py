@@ -19,10 +19,11 @@ from sim.high_order.hamilton import coordinate_rates, momenta_of_velocity, momen
 from sim.high_order.tangents import Tangents, first_tangents, keep_tangents, last_tangents, move_tangents, tangent_rates
 from sim.kinematics import displace
 from sim.layout import model_view, work_view
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Integers, Matrix, Model, Vector
 from sim.policy import Path, Policy
 from sim.rollout import Linearized
 from sim.state import integrate_state, state_difference
+from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
 from solvers.record import Table

@@ -9,7 +9,7 @@ from math import cos, sqrt
 from typing import NamedTuple
 
 from sim.high_order.hamilton_gradient import Slopes, slopes_at, velocity_slopes
-from sim.model import Integers, Matrix, Model, Vector, Work
+from sim.model import Integers, Matrix, Model, Vector
 from sim.rollout import Cube
 from sim.rotation import (
     cross,
@@ -19,6 +19,7 @@ from sim.rotation import (
     quat_matrix,
     so3_coefficients,
 )
+from sim.work import Work
 from solvers.jit import kernel
 
 

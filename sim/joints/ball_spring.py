@@ -5,8 +5,10 @@ With s the vector part of the rotation from rest, V_d = (h/2) k |(s(2) + s(3))/2
 
 from __future__ import annotations
 
-from sim.model import Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
 from sim.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_matrix, quat_mul
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

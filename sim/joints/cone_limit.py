@@ -16,8 +16,10 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.model import Late, Model, Work
+from sim.late import Late
+from sim.model import Model
 from sim.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

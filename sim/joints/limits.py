@@ -9,7 +9,10 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 from __future__ import annotations
 
 from sim.joints.cone_limit import cone_block, cone_derivative, cone_gap
-from sim.model import Goal, Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
+from sim.options import Goal
+from sim.work import Work
 from solvers.cones import return_pair
 from solvers.jit import kernel
 from solvers.late import late

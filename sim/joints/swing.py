@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from sim.model import Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
 from sim.rotation import (
     Quat,
     Vec3,
@@ -26,6 +27,7 @@ from sim.rotation import (
     so3_coefficients,
     transposed_times,
 )
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from sim.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
 from sim.joints.swing import swing_curvature
-from sim.model import InputKind, Model, Vector, Work
+from sim.model import InputKind, Model, Vector
+from sim.work import Work
 from solvers.jit import kernel
 
 _JOINT = int(InputKind.JOINT)

@@ -19,10 +19,12 @@ from __future__ import annotations
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
 from sim.collision.kinds import SWAPPED, Pair
-from sim.model import Late, Model, Work
+from sim.late import Late
+from sim.model import Model
 from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
 from sim.pairs.memory import NEAR, gap_before, has_no_room, keep, least_size, remember
 from sim.pairs.pose import place_shapes
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

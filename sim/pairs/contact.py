@@ -15,11 +15,13 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.collision.collide import collide_chosen
-from sim.model import Late, Matrix, Model, Work
+from sim.late import Late
+from sim.model import Matrix, Model
 from sim.pairs.choice import choose_shapes
 from sim.pairs.cylinders import collide_cylinders, on_cylinder
 from sim.pairs.pose import place_shapes
 from sim.rotation import Vec3, cross, rotate, transposed_times
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

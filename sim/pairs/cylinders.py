@@ -11,8 +11,10 @@ from sim.collision.cylinders import (
     separation_of_cylinder,
 )
 from sim.collision.kinds import SWAPPED, Pair
-from sim.model import Late, Model, Work
+from sim.late import Late
+from sim.model import Model
 from sim.pairs.memory import gap_before, keep, last_point
+from sim.work import Work
 from solvers.jit import inner_kernel
 from solvers.late import late
 

@@ -24,11 +24,14 @@ from __future__ import annotations
 from sim.collision.axes import OPEN
 from sim.contacts.far_bounds import ANGLE
 from sim.contacts.friction import contact_impulse, start_contact
-from sim.model import Late, Model, Options, Work
+from sim.late import Late
+from sim.model import Model
 from sim.moves import third_quaternion
+from sim.options import Options
 from sim.pairs.choice import choose_shapes, open_pairs
 from sim.pairs.contact import add_pair_wrench, is_absent, point_kinematics
 from sim.pairs.pose import place_shapes
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

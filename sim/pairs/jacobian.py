@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Late, Model, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
 from sim.pairs.contact import point_velocity, shape_b, tangents
 from sim.rotation import Vec3, cross
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -9,7 +9,8 @@ from sim.collision.cylinder_cylinder import RIM_POINTS
 from sim.collision.kept import elsewhere
 from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.witness import dot
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
+from sim.work import Work
 from solvers.jit import inner_kernel, kernel
 
 NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses

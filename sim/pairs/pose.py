@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from sim.collision.kinds import SWAPPED
 from sim.frame import place_frame
-from sim.model import Matrix, Model, Work
+from sim.model import Matrix, Model
+from sim.work import Work
 from solvers.jit import kernel
 
 

@@ -8,11 +8,14 @@ with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows 
 from __future__ import annotations
 
 from sim.contacts.friction import condense_contact, contact_constant, contact_error, contact_impulse
-from sim.model import Goal, Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
+from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.pairs.far import add_far_pairs
 from sim.pairs.jacobian import pair_jacobian
 from sim.rotation import Vec3, cross
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

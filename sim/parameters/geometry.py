@@ -13,11 +13,12 @@ The coordinates of the joint stay what they are.
 from __future__ import annotations
 
 from sim.contacts.restitution_gradient import gap_wrench
-from sim.model import Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.pairs.stiffness import unit_vector
 from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import At, Effect
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
+from sim.work import Work
 from solvers.jit import kernel
 
 _PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)

@@ -14,10 +14,11 @@ from __future__ import annotations
 from sim.coupling.system import solve_coupling_panel
 from sim.elimination_panel import solve_panel
 from sim.layout import model_view, work_view
-from sim.model import IntegerMatrix, Matrix, Model, Vector, Work
+from sim.model import IntegerMatrix, Matrix, Model, Vector
 from sim.parameters.columns import fill_columns
 from sim.parameters.effects import At, Effect
 from sim.rotation import left_jacobian
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 

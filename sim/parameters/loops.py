@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from sim.coupling.gears import gear_row
 from sim.coupling.loops import child_point, loop_frame
-from sim.model import Model, Work
+from sim.model import Model
 from sim.pairs.stiffness import unit_vector
 from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import Effect
 from sim.rotation import cross, rotate, times
+from sim.work import Work
 from solvers.jit import kernel
 
 _LOOP_PARENT, _LOOP_CHILD = int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.witness import dot
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.pairs.pose import place_shape
 from sim.parameters.effects import SIDE, Size
 from sim.parameters.pairs import add_moved_shape, is_felt, pair_floor, row
 from sim.rotation import Vec3
+from sim.work import Work
 from solvers.jit import kernel
 
 _BALL, _ROD, _SIDE_X, _SIDE_Z = int(Size.BALL), int(Size.ROD), int(Size.SIDE_X), int(Size.SIDE_Z)

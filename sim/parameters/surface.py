@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Late, Matrix, Model, Work
+from sim.late import Late
+from sim.model import Matrix, Model
 from sim.parameters.contacts import add_impulse, add_turn, floor_change, impulse_change, is_near
 from sim.terrain.contact import centre, frame_turn
 from sim.terrain.height_field import field_values, height_field
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -15,8 +15,9 @@ from math import sqrt
 
 from sim.coupling.system import solve_coupling_panel
 from sim.elimination_panel import solve_panel
+from sim.late import Late
 from sim.layout import model_view, work_view
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.model import Matrix, Model, Vector
 from sim.parameters.columns import clear_columns
 from sim.parameters.effects import At
 from sim.parameters.gradients import coordinate_rows
@@ -24,6 +25,7 @@ from sim.parameters.surface import add_ground_place, is_on_terrain
 from sim.rotation import Vec3
 from sim.terrain.contact import centre
 from sim.terrain.height_field import cell, height_field, weight
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 from solvers.record import Table

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from sim.dynamics import momentum_balance
-from sim.model import Guess, Model, Options, Vector, Work
+from sim.model import Model, Vector
 from sim.moves import turn_bodies
+from sim.options import Guess, Options
 from sim.pairs.choice import choose_pairs
 from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, start_inequalities
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
+from sim.work import Work
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa

@@ -8,7 +8,8 @@ from sim.contacts.friction import (
     contact_products_ahead,
     slip_violation,
 )
-from sim.model import Model, Work
+from sim.model import Model
+from sim.work import Work
 from solvers.cones import orthant_step
 from solvers.jit import kernel
 

@@ -7,9 +7,11 @@ from sim.dynamics import momentum_balance_jacobian
 from sim.elimination import factor, solve
 from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
-from sim.model import Goal, Model, Vector, Work
+from sim.model import Model, Vector
+from sim.options import Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
+from sim.work import Work
 from solvers.jit import inlined
 
 _SHORT = 0.1  # a step below this share of the Newton step is short

@@ -26,12 +26,15 @@ from sim.contacts.restitution import subtract_floors
 from sim.coupling.loops import keep_loops, move_loops
 from sim.elimination import dot_six, subtree_sums
 from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
-from sim.model import Goal, Late, Matrix, Model, Work
+from sim.late import Late
+from sim.model import Matrix, Model
+from sim.options import Goal
 from sim.pairs.contact import pair_kinematics
 from sim.pairs.far import far_pair_impulses
 from sim.pairs.stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pose_jacobians import add_slip_jacobian
 from sim.terrain.contact import add_frame_matrix
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -21,7 +21,9 @@ from __future__ import annotations
 from sim.contacts.far import came_near, choose_far
 from sim.contacts.friction import slip_noise
 from sim.contacts.restitution import find_impacts, gained_energy
-from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
+from sim.options import FAILED, Guess, Options, Outcome
 from sim.pairs.choice import overlapping
 from sim.pairs.far import begin_pairs
 from sim.solve.central_path import AGAIN, first_attempt, start
@@ -30,6 +32,7 @@ from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
 from sim.solve.merit import Merit, follow, judge, residuals
 from sim.solve.residual import residual_scale, rounding
+from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.late import late
 from solvers.status import Status

@@ -5,10 +5,12 @@ from __future__ import annotations
 from sim.contacts.friction import return_contact
 from sim.dynamics import momentum_balance
 from sim.joints.limits import return_limits
-from sim.model import Model, Options, Vector, Work
+from sim.model import Model, Vector
 from sim.moves import turn_bodies
+from sim.options import Options
 from sim.solve.inequalities import LIMIT_INERTIA, inequality_kinematics, keep_inequalities, move_inequalities
 from sim.solve.merit import Merit, judge, residuals
+from sim.work import Work
 from solvers.jit import inlined, kernel
 
 _WHOLE = 0.9  # a step to the boundary below this share of the Newton step is taken whole

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.coupling.loops import apply_loops
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
+from sim.work import Work
 from solvers.jit import kernel
 
 

@@ -8,9 +8,12 @@ from sim.dynamics import momentum_balance, momentum_balance_jacobian
 from sim.elimination import factor, solve
 from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
-from sim.model import FAILED, Guess, Late, Model, Options, Outcome, Vector, Work
+from sim.late import Late
+from sim.model import Model, Vector
 from sim.moves import turn_bodies
+from sim.options import FAILED, Guess, Options, Outcome
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
+from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.late import late
 from solvers.status import Status

@@ -5,8 +5,9 @@ from __future__ import annotations
 from sim.coupling.gears import apply_gears
 from sim.elimination import project, subtree_sums
 from sim.joints.terms import joint_impulses
-from sim.model import Model, Vector, Work
+from sim.model import Model, Vector
 from sim.rotation import cross
+from sim.work import Work
 from solvers.jit import kernel
 
 

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Late, Matrix, Model, Vector, Work
+from sim.late import Late
+from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.terrain.height_field import height_field
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 

@@ -7,8 +7,10 @@ from math import sqrt
 from sim.contacts.contact import contact_kinematics
 from sim.contacts.far_bounds import NEARER, bound_changes, keep_motion
 from sim.contacts.friction import contact_impulse, start_contact
-from sim.model import Late, Model, Work
+from sim.late import Late
+from sim.model import Model
 from sim.rotation import cross
+from sim.work import Work
 from solvers.late import late
 
 

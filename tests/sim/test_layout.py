@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import sim.model
 from sim.layout import (
     MODEL_FIELDS,
     MODEL_INTS,
@@ -22,7 +22,8 @@ from sim.layout import (
     table,
     work_view,
 )
-from sim.model import Model, Work
+from sim.model import Model
+from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 
@@ -31,8 +32,8 @@ BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)
 
 
 def declared_shapes(cls: type) -> dict[str, list[str] | None]:
-    """Shapes as the comments of model.py state them; None where there is no comment."""
-    text = Path(sim.model.__file__).read_text().split(f"class {cls.__name__}(NamedTuple)")[1].split("\nclass ")[0]
+    """Shapes as the comments of model.py and work.py state them; None where there is no comment."""
+    text = Path(inspect.getfile(cls)).read_text().split(f"class {cls.__name__}(NamedTuple)")[1].split("\nclass ")[0]
     shapes: dict[str, list[str] | None] = {}
     for name, comment in re.findall(r"^    (\w+): \w+(.*)$", text, re.MULTILINE):
         stated = re.search(r"# \(([^)]*)\)", comment)

@@ -1,0 +1,44 @@
+"""Options, Guess, Goal, Outcome: what a step is asked for, and how it ended."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.model import Vector
+from solvers.status import Status
+
+
+class Options(NamedTuple):
+    """Settings of a step."""
+
+    h: float  # time step [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
+    max_iterations: int
+
+
+class Guess(NamedTuple):
+    """Where a step may start to look for its solution; how good a guess it is, is found out."""
+
+    velocity: Vector  # (nv,) of v25
+    impulses: bool  # work holds the impulses of the step before
+
+
+class Goal(NamedTuple):
+    """What a Newton step of the interior point aims at."""
+
+    kappa: float  # target of the complementarity products
+    share: float  # part of the equality residuals to remove
+    corrected: bool  # subtract the second-order term of the affine step in `cone_step`
+
+
+class Outcome(NamedTuple):
+    """How a step ended."""
+
+    status: int
+    iterations: int
+    residual: float  # largest equality residual
+    violation: float  # largest |product - kappa| of complementary pairs
+
+
+FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)
