@@ -23,18 +23,20 @@ def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smo
     Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
     growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
     without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
+    Where no share of them helps, Newton's direction: four corners on curved ground hold a box in more directions than a
+    plane does, one of them hardly, and friction that grows with the impulses there outweighs what holds it. Then the
+    determinant is negative at solutions, too.
     """
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-    share = 1.0
     sign = 0
-    for _ in range(_SHARES):
+    for halvings in range(_SHARES + 1):
+        share = 0.5**halvings if halvings < _SHARES else 1.0
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
         condense_inequalities(model, work, h, smoothing, share)
         sign = factor(model, work)
         if sign >= 0:
             break
-        share *= 0.5
     return sign != 0 and factor_coupling(model, work)
 
 
