@@ -22,6 +22,12 @@ class Merit(NamedTuple):
 
 
 @kernel
+def is_near(merit: Merit, kappa: float) -> bool:
+    """Whether Newton's method can be trusted to end here: products off by less than kappa, residual within their noise."""
+    return merit.violation < kappa and merit.residual < 0.1 * kappa**0.5
+
+
+@kernel
 def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
     """Largest generalized residual, and largest |gap - slack|; fills residual, wrench, subtree."""
     balance_to_wrench(work)
