@@ -11,6 +11,8 @@ from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from solvers.jit import kernel
 
+_NEAR = 10.0  # of kappa: violations that Newton's method takes away in a few steps
+
 
 class Merit(NamedTuple):
     """Distance from the solution; everything infinite where a body turns by half a turn."""
@@ -23,8 +25,8 @@ class Merit(NamedTuple):
 
 @kernel
 def is_near(merit: Merit, kappa: float) -> bool:
-    """Whether Newton's method can be trusted to end here: products off by less than kappa, residual within their noise."""
-    return merit.violation < kappa and merit.residual < 0.1 * kappa**0.5
+    """Whether Newton's method can be trusted to end here: products all but kappa, the residual within their noise."""
+    return merit.violation < _NEAR * kappa and merit.residual < 0.1 * kappa**0.5
 
 
 @kernel
