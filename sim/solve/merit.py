@@ -11,7 +11,7 @@ from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from solvers.jit import kernel
 
-_NEAR = 10.0  # of kappa: violations that Newton's method takes away in a few steps
+_NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps
 
 
 class Merit(NamedTuple):
