@@ -30,7 +30,7 @@ from sim.solve.central_path import AGAIN, first_attempt, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
-from sim.solve.merit import Merit, follow, judge, residuals
+from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
@@ -112,7 +112,7 @@ def try_from(
         if iterations >= patience or halvings > _FEW:
             break
         iterations += 1
-        if not linearize_step(model, work, h, q, v, smoothing):
+        if not linearize_step(model, work, h, q, v, smoothing, is_near(merit, kappa)):
             return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
         boundary = direction(model, work, h, kappa, merit.mean)
         merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)

@@ -12,6 +12,8 @@ from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from sim.work import Work
 from solvers.jit import kernel
 
+_NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps
+
 
 class Merit(NamedTuple):
     """Distance from the solution; everything infinite where a body turns by half a turn."""
@@ -20,6 +22,12 @@ class Merit(NamedTuple):
     violation: float  # largest |product - kappa|, or violation of the friction law at the present smoothing
     slip: float  # the violation of the friction law alone
     mean: float  # of the complementarity products
+
+
+@kernel
+def is_near(merit: Merit, kappa: float) -> bool:
+    """Whether Newton's method can be trusted to end here: products all but kappa, the residual within their noise."""
+    return merit.violation < _NEAR * kappa and merit.residual < 0.1 * kappa**0.5
 
 
 @kernel

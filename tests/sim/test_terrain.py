@@ -187,6 +187,20 @@ def test_without_friction_energy_stays_in_a_bowl():
     assert order(drift).min() > 0.7, drift
 
 
+@pytest.mark.parametrize("friction", [0.5, 1.0, 2.0])
+def test_boxes_land_on_curved_ground(friction, rng):
+    """Four corners hold a box in four directions, one of them hardly: landings whose determinant is negative."""
+    ground = dojo.Terrain.from_function(lambda X, Y: 0.3 * X + 0.1 * Y**2, GRID, GRID)
+    box = dojo.Mechanism([dojo.Body("box", 1.0, shape=dojo.Box(0.3, 0.2, 0.1))], [dojo.Joint("floating", None, "box")])
+    sim = dojo.Simulator(box.on(ground, bodies=["box"], friction=friction), time_step=H, kappa=1e-9)
+    x = sim.neutral()
+    for height in (0.0, *rng.uniform(0.1, 0.4, 10)):
+        t = sim.rollout(x + np.r_[0.0, 0.0, height, np.zeros(10)], np.zeros((60, sim.nu)), throw=True)
+        assert t.contacts.gap.min() > -1e-8
+        assert (t.contacts.normal_force.max(axis=0) > 1.0).sum() >= 4
+        x[7], x[11] = rng.uniform(-1.0, 1.0), rng.uniform(-3.0, 3.0)
+
+
 @pytest.mark.parametrize(
     "terrain",
     [
