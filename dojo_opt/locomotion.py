@@ -196,7 +196,7 @@ def leap(
     the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
     shooting. It asks for the height and does not insist: the base rises by .15, .20, .22 and .24 m for .15, .2, .25 and
     .3 m. Of 28 leaps of -.2 to .5 m and .15 to .3 m high 27 are planned in .8 s; with more time to spend on the ground,
-    the planner more often ends in a fall.
+    the planner more often ends in a fall. The other, .5 m at .25 m, is planned from a leap of .4 m (`warm_start=`).
     Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, because their gains know it at one
     instant only. `ilqr` therefore ends with every step cut into `refinement`, and such plans land at 1 ms, too.
     """

@@ -171,6 +171,18 @@ def test_leap_is_found_from_standing_and_a_goal(distance, height):
     lands(problem, plan)
 
 
+@pytest.mark.slow
+def test_a_leap_leads_to_a_longer_one():
+    """The longer one is not planned directly."""
+    shorter, longer = (problems.leap(distance=distance, height=0.25) for distance in (0.4, 0.5))
+    shorter.refinement = 1
+    plan = ilqr(longer, warm_start=ilqr(shorter))
+    assert plan.success and plan.nit <= 90, plan.summary()
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.5, abs=2e-3)
+    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.19
+    lands(longer, plan)
+
+
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])
 def test_periodic_gaits_choose_their_start(name, settings):
     problem = getattr(problems, name)(periodic=True, cycles=1, **settings)
