@@ -160,20 +160,30 @@ def bound(
 
 
 def jump(
-    *, distance: float = 0.3, height: float = 0.2, damping: float = 0.5, time_step: float = 0.02, **settings: Any
+    *,
+    distance: float = 0.3,
+    height: float = 0.2,
+    damping: float = 0.5,
+    time_step: float = 0.02,
+    refinement: int = 5,
+    **settings: Any,
 ) -> Problem:
     """The quadruped jumps `distance` [m] forward, its base rising by `height` [m]: standing, flight, standing.
 
-    settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction.
+    settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction. Jumps planned with steps of
+    20 ms land up to 72 mm off at 1 ms, those up and backwards worst. As for `leap`, `ilqr` therefore ends with every
+    step cut into `refinement`, and they land within 4 mm.
     """
-    return _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+    problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+    problem.refinement = refinement
+    return problem
 
 
 def leap(
     *,
     distance: float = 0.3,
     height: float = 0.2,
-    duration: float = 1.0,
+    duration: float = 0.8,
     damping: float = 0.5,
     time_step: float = 0.02,
     refinement: int = 5,
@@ -184,7 +194,9 @@ def leap(
     As in `hop`: the first half of `duration` [s] tracks the standing pose at the goal, `height` [m] up, the second half
     the pose itself; squares of place weigh 1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`, and
     the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
-    shooting. It asks for the height and does not insist: the base rises by .15, .22 and .26 m for .15, .2 and .25 m.
+    shooting. It asks for the height and does not insist: the base rises by .15, .20, .22 and .24 m for .15, .2, .25 and
+    .3 m. Of 28 leaps of -.2 to .5 m and .15 to .3 m high 27 are planned in .8 s; with more time to spend on the ground,
+    the planner more often ends in a fall. The other, .5 m at .25 m, is planned from a leap of .4 m (`warm_start=`).
     Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, because their gains know it at one
     instant only. `ilqr` therefore ends with every step cut into `refinement`, and such plans land at 1 ms, too.
     """

@@ -46,7 +46,8 @@ def ilqr(
     """Plan a trajectory.
 
     controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the
-    same problem, whose trajectory, multipliers and penalties are taken over. settings: fields of `Options` by name.
+    same problem, whose trajectory, multipliers and penalties are taken over. It may be a plan of an easier variant,
+    with more damping, say: what fails directly is often planned by way of it. settings: fields of `Options` by name.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
     is one of the finer problem then, and its history is that of both.
