@@ -131,6 +131,8 @@ class Late(IntEnum):
     CYLINDER_BEFORE = 68
     # joints with two rotations, over an interval
     SWING_TURN = 69
+    # energy from collisions of polytopes and cylinders
+    PAIRS_GAINED = 70
 
 
 class Model(NamedTuple):

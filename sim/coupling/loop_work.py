@@ -13,7 +13,7 @@ _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that 
 
 
 @kernel
-def _twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
+def twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
     """p.v of the intervals 1-2 and 2-3 together [J], rotations by their sines."""
     energy = 0.0
     for i in range(model.body_parent.shape[0]):
@@ -85,7 +85,7 @@ def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     have solutions that lead anywhere, and to any energy. Loops that were open are closed by work.
     """
     gain = 0.5 * _loop_work(model, work) / options.h
-    most = _SHARE * 0.5 * _twice_kinetic(model, work, options.h, v)
+    most = _SHARE * 0.5 * twice_kinetic(model, work, options.h, v)
     if not gain > most:
         return False
     return gain - 0.5 * _closing_work(model, work, options.tolerance) / options.h > most
