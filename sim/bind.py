@@ -23,6 +23,7 @@ from sim.pairs import cylinders as pair_cylinders
 from sim.pairs import far as pair_far
 from sim.pairs import jacobian as pair_jacobian
 from sim.pairs import stiffness as pair_stiffness
+from sim.pairs import work as pair_work
 from sim.parameters import surface as parameter_surface
 from sim.parameters import terrain as parameter_terrain
 from sim.solve.inequalities import add_stiffness
@@ -145,6 +146,8 @@ def bind_step(model: Model) -> None:
         _bind(model, _PAIRS)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         _bind(model, _CYLINDERS)
+    if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_POLYTOPE)):
+        _bind(model, (pair_work.pairs_gained,))
     if np.any(model.contact_terrain):
         _bind(model, _TERRAIN)
     if np.any(model.contact_restitution):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, unique
 
 
+@unique
 class Late(IntEnum):
     """Where the address of each late kernel is in `Model.late`."""
 
@@ -92,3 +93,5 @@ class Late(IntEnum):
     CYLINDER_BEFORE = 68
     # joints with two rotations, over an interval
     SWING_TURN = 69
+    # energy from collisions of polytopes and cylinders
+    PAIRS_GAINED = 70

@@ -17,6 +17,7 @@ class Status(IntEnum):
     SINGULAR = 4
     ANGULAR_STEP = 5
     LOOP_STEP = 6
+    COLLISION_STEP = 7
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
@@ -33,6 +34,7 @@ MESSAGES: dict[Status, str] = {
     Status.SINGULAR: "A matrix was singular, or not positive definite where it has to be.",
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
     Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
+    Status.COLLISION_STEP: "Shapes pass through one another, or gain energy, in what was found; use smaller steps.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",

@@ -31,6 +31,13 @@ def _momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: M
 
 
 @kernel
+def twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
+    """p.v of the intervals 1-2 and 2-3 together [J]."""
+    before = _momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
+    return before + _momentum_velocity(model, work, h, work.move, work.turn, work.nu)
+
+
+@kernel
 def _work_on(work: Work, i: int, f: Vec3, t: Vec3) -> float:
     """Twice the work over the intervals 1-2 and 2-3 of the wrench (f, t) about O on body i at configuration 2."""
     if i < 0:

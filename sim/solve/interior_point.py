@@ -26,6 +26,7 @@ from sim.model import Model, Vector
 from sim.options import FAILED, Guess, Options, Outcome
 from sim.pairs.choice import overlapping
 from sim.pairs.far import begin_pairs
+from sim.pairs.work import pairs_gained
 from sim.solve.central_path import AGAIN, first_attempt, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
@@ -41,6 +42,7 @@ _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
+_COLLISION_STEP = int(Status.COLLISION_STEP)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
@@ -119,6 +121,15 @@ def try_from(
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
+@inlined
+def misplacement(model: Model, work: Work, options: Options, v: Vector, status: int) -> int:
+    """Why a solution is none, as `overlapping`; 2 also where collisions gave energy."""
+    if status != _SOLVED:
+        return 0
+    found = overlapping(model, work)
+    return 2 if found == 0 and pairs_gained(model, work, options, v) else found
+
+
 @late(Late.SOLVE, FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
@@ -136,17 +147,17 @@ def interior_point(
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
-            misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+            misplaced = misplacement(model, work, options, v, out.status)
             for choice in range(_CHOICES):
                 if misplaced != 1 or work.pair_free[0] == 1:
                     break
                 if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = 2
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
-                misplaced = overlapping(model, work) if out.status == _SOLVED else 0
+                misplaced = misplacement(model, work, options, v, out.status)
             if misplaced == 0 and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
-            out = Outcome(_NO_PROGRESS, out.iterations, out.residual, out.violation)
+            out = Outcome(_COLLISION_STEP if misplaced else _NO_PROGRESS, out.iterations, out.residual, out.violation)
             work.pair_free[0] = (attempt + 1) // 2 % 2
         if came_near(model, work):
             continue

@@ -145,6 +145,16 @@ def test_motions_keep_momentum_and_gain_no_energy(name: str, first: bool) -> Non
     )  # of two cylinders some steps find no elements that fit, and say so
 
 
+@pytest.mark.parametrize(("radius", "length", "seed"), [(0.3, 0.2, 495), (0.3, 0.02, 709)], ids=["wheel", "coin"])
+def test_no_step_is_accepted_whose_impulses_give_energy(radius: float, length: float, seed: int) -> None:
+    """A box against a wheel and a coin: the first elements with which one step is solved give 228 J and 130 J."""
+    sim = dojo.Simulator(two(SHAPES["box"], Cylinder(radius, length)), time_step=0.01)
+    t = sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu)))
+    assert t.success or t.status in (dojo.Status.COLLISION_STEP, dojo.Status.MAX_ITERATIONS)
+    assert np.diff(sim.energy(t.x)).max() < 1e-2  # kappa pushes from afar
+    assert np.abs(t.contacts.impulse).max() > 0.1
+
+
 @pytest.mark.parametrize("name", ["capsule", "box", "rock"])
 def test_derivatives_of_a_step(name: str) -> None:
     """In the step that hits, and in the one before."""
