@@ -36,6 +36,7 @@ __all__ = [
     "Mechanism",
     "MjcfMechanism",
     "MjcfWarning",
+    "Options",
     "ParameterSpace",
     "Parameters",
     "Perturbation",
@@ -49,6 +50,7 @@ __all__ = [
     "SimulationError",
     "Simulator",
     "Sphere",
+    "Stage",
     "Status",
     "StepResult",
     "String",
@@ -96,6 +98,7 @@ _HOME: dict[str, str | None] = {
     "Mechanism": "sim.mechanism",
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
+    "Options": "dojo_opt.options",
     "ParameterSpace": "dojo_opt.parameter_space",
     "Parameters": "sim.parameters.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
@@ -109,6 +112,7 @@ _HOME: dict[str, str | None] = {
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
+    "Stage": "dojo_opt.options",
     "Status": "solvers.status",
     "StepResult": "sim.results",
     "String": "sim.shapes",
@@ -141,6 +145,7 @@ if TYPE_CHECKING:
     from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
+    from dojo_opt.options import Options, Stage
     from dojo_opt.parameter_space import ParameterSpace
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr

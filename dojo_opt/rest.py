@@ -109,6 +109,8 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
 
     Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
     """
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
     mech = sim.mechanism
     feet, B = Feet(sim, mech.contact_names), input_map(sim)
     state = np.array(sim.neutral() if x is None else x, dtype=float)

@@ -15,7 +15,7 @@ from sim.border import whole
 from sim.parameters.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
 from sim.parameters.selection import select, with_values
 from sim.parameters.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
-from sim.results import Linearization, Trajectory, error_of
+from sim.results import Linearization, Trajectory, error_of, path_of
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
@@ -166,7 +166,7 @@ class Derivatives(States):
         the trajectory. An unsolved step raises SimulationError.
         """
         call = "Simulator.vjp"
-        xs, us = (trajectory.x, trajectory.u) if isinstance(trajectory, Trajectory) else trajectory
+        xs, us = path_of(f"{call}(trajectory)", trajectory)
         inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))

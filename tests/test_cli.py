@@ -108,6 +108,12 @@ def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFix
     assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
 
 
+@pytest.mark.parametrize("name", ["pendulum", "slider", "cartpole", "fourbar"])
+def test_show_lets_go_of_what_does_not_float(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", name, "--seconds", "0.02"]) == 0
+    assert "let go for 0.02 s" in capsys.readouterr().out
+
+
 def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = branched(tmp_path)
     assert cli.main(["show", str(path), "--seconds", "0.05", "--drop", "0.2"]) == 0
@@ -120,6 +126,8 @@ def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, caps
     [
         (["quadrupet"], "'quadrupet' is neither a .urdf nor an .xml file, nor a model; did you mean 'quadruped'?"),
         (["nowhere.urdf"], "nowhere.urdf"),
+        (["pendulum", "--seconds", "-1"], "--seconds: expected a number > 0, got -1"),
+        (["block", "--drop", "nan"], "--drop: expected finite numbers, got nan"),
         (["pendulum", "--drop", "1"], "--drop is for a floating base, and 'joint_0' is revolute"),
     ],
 )
