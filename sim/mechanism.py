@@ -76,7 +76,7 @@ class Mechanism:
         object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
 
     def __repr__(self) -> str:
-        parts = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
+        parts: dict[str, Any] = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
         parts |= {"collisions": self.collisions, "loops": self.loops, "gears": self.gears}
         sizes = "".join(f", {what} {len(found)}" for what, found in parts.items() if found)
         return f"{type(self).__name__}({self.name}, nq {self.nq}, nv {self.nv}{sizes})"
