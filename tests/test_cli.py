@@ -99,6 +99,17 @@ def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureF
     assert "are for closed loops (hopper_mpc, quadruped_mpc), and hop is a plan" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "command", [["run", "hop", "--out"], ["run", "hopper_mpc", "--html"], ["show", "block", "--plot"]]
+)
+def test_files_that_cannot_be_written_are_refused_first(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([*command, str(tmp_path / "nowhere" / "file.png")]) == 2
+    streams = capsys.readouterr()
+    assert "there is no folder" in streams.err and streams.out == ""
+
+
 def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     figure, page = tmp_path / "fall.png", tmp_path / "fall.html"
     command = ["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--out", str(figure), "--html", str(page)]
