@@ -23,7 +23,8 @@ from sim.collision.cylinder_crossings import (
 )
 from sim.collision.exchange import exchange
 from sim.collision.kept import original
-from sim.collision.polytope_cylinder import MISSED, RIM_POINTS
+from sim.collision.kinds import CROSSINGS, RIM_POINTS
+from sim.collision.polytope_cylinder import MISSED
 from sim.collision.rim import (
     STEEP,
     plane_gap,
@@ -34,8 +35,6 @@ from sim.collision.witness import TIE, absent, dot
 from sim.model import Integers, Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
-
-CROSSINGS = 9
 
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
 

@@ -16,6 +16,7 @@ from sim.collision.box import to_a, to_b
 from sim.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
 from sim.collision.hull import above, row
 from sim.collision.kept import original
+from sim.collision.kinds import CROSSINGS, RIM_POINTS
 from sim.collision.polytope_cylinder_crossings import (
     corner_of,
     crossings,
@@ -34,8 +35,6 @@ from sim.model import Integers, Matrix, Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
-CROSSINGS = 9
-RIM_POINTS = 8
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 
 END, FACE, CORNER, CROSS = 0, 1, 2, 3

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from sim import late
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import is_loop
-from sim.late import Late
 from sim.model import Matrix, Model, Vector
 from sim.options import Options
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
 
@@ -84,7 +83,7 @@ def _closing_work(model: Model, work: Work, tolerance: float) -> float:
     return total
 
 
-@late(Late.LOOPS_GAINED, False)
+@late.loops_gained.defined(otherwise=False)
 def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the forces of loops did work on the way 1-2-3, which those of a motion do to O(h^3) only.
 

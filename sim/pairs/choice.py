@@ -16,17 +16,17 @@ energy.)
 
 from __future__ import annotations
 
+from sim import late
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
 from sim.collision.kinds import SWAPPED, Pair
-from sim.late import Late
+from sim.late import choose_cylinders, cylinder_before, cylinder_distance
 from sim.model import Model
-from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
+from sim.pairs.cylinders import on_cylinder
 from sim.pairs.memory import NEAR, gap_before, has_no_room, keep, least_size, remember
 from sim.pairs.pose import place_shapes
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose
@@ -101,7 +101,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
             collide_chosen(kind, k - first, work.pair_code[k], sizes, model.hull, pose[:9], pose[9:], work.pair_out[k])
 
 
-@late(Late.CHOOSE_PAIRS)
+@late.choose_pairs.defined()
 def choose_pairs(model: Model, work: Work) -> None:
     """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
@@ -139,7 +139,7 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     return False
 
 
-@late(Late.OVERLAPPING, 0)
+@late.overlapping.defined(otherwise=0)
 def overlapping(model: Model, work: Work) -> int:
     """Whether the solution at configuration 3 is none: 1 where shapes overlap, in elements that were not chosen; 2
     where a point has passed through the other shape; 0 else.

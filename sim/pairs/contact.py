@@ -14,16 +14,16 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim import late
 from sim.collision.collide import collide_chosen
-from sim.late import Late
+from sim.late import collide_cylinders
 from sim.model import Matrix, Model
 from sim.pairs.choice import choose_shapes
-from sim.pairs.cylinders import collide_cylinders, on_cylinder
+from sim.pairs.cylinders import on_cylinder
 from sim.pairs.pose import place_shapes
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
 
@@ -77,7 +77,7 @@ def is_absent(work: Work, j: int) -> bool:
     return work.pair_out[j, 0] > _NO_POINT
 
 
-@late(Late.PAIR_KINEMATICS)
+@late.pair_kinematics.defined()
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
     """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
     ground = model.contact_height.shape[0]

@@ -18,15 +18,12 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.far import came_near, choose_far
 from sim.contacts.friction import slip_noise
-from sim.contacts.restitution import find_impacts, gained_energy
-from sim.late import Late
+from sim.late import begin_pairs, find_impacts, gained_energy, overlapping, pairs_gained
 from sim.model import Model, Vector
 from sim.options import FAILED, Guess, Options, Outcome
-from sim.pairs.choice import overlapping
-from sim.pairs.far import begin_pairs
-from sim.pairs.work import pairs_gained
 from sim.solve.central_path import AGAIN, first_attempt, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
@@ -35,7 +32,6 @@ from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -130,7 +126,7 @@ def misplacement(model: Model, work: Work, options: Options, v: Vector, status: 
     return 2 if found == 0 and pairs_gained(model, work, options, v) else found
 
 
-@late(Late.SOLVE, FAILED)
+@late.interior_point.defined(otherwise=FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:
