@@ -175,7 +175,7 @@ class Simulator(Derivatives):
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
         error = error_of(mech, where, report, self.tolerance, max(gaps, default=None))
-        if error.status == Status.ANGULAR_STEP and x is not None:
+        if error.status == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
             return SimulationError(f"{error} {fastest(mech, self.replace(time_step=1e-6).maximal(x))}", error.status)
         return error
 

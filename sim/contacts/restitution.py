@@ -35,6 +35,7 @@ from sim.contacts.contact import contact_jacobian, contact_kinematics
 from sim.contacts.friction import contact_impulse
 from sim.late import pair_kinematics
 from sim.model import Model
+from sim.options import AT_EVERY_POSE, AT_START
 from sim.pairs.contact import is_absent, pair_arm, pair_force
 from sim.rotation import Vec3, cross, transposed_times
 from sim.work import Work
@@ -58,9 +59,9 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             work.rot3[i, k] = rot[i, k]
     for m in range(work.counts[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
-    work.pair_free[0] = 1  # what touched there, whatever it is now
+    work.pair_free[0] = AT_EVERY_POSE  # what touched there, whatever it is now
     pair_kinematics(model, work, h)
-    work.pair_free[0] = 0
+    work.pair_free[0] = AT_START
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]

@@ -13,6 +13,7 @@ from sim.collision.cylinders import (
 )
 from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Model
+from sim.options import BESIDE_KEPT
 from sim.pairs.memory import gap_before, keep, last_point
 from sim.work import Work
 from solvers.jit import inner_kernel
@@ -78,7 +79,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
             if g[0] < before[12]:
                 work.pair_code[j] = 0
-    if work.pair_free[0] == 2:
+    if work.pair_free[0] == BESIDE_KEPT:
         keep(model, work, first)
     put_all(model, work, first)
 

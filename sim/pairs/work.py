@@ -17,7 +17,7 @@ from __future__ import annotations
 from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.contacts.restitution import impulse_work
-from sim.coupling.loop_work import twice_kinetic
+from sim.energy import twice_kinetic
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.pairs.contact import is_absent, pair_arm, pair_force
