@@ -16,6 +16,7 @@ from sim.collision.box import column, to_a
 from sim.collision.clip import BORDER
 from sim.collision.cylinder_crossings import (
     crossing,
+    distance_apart,
     nearest_rim_point,
     put_crossing,
     separation_along,
@@ -71,6 +72,10 @@ def survey(
         if found < room:
             codes[first + found] = code
             found += 1
+    if best < 0.0:
+        apart = distance_apart(sizes, R, r)
+        if apart > best + TIE * sizes[4]:
+            best, which = apart, 0
     return best, which, up, down
 
 

@@ -22,15 +22,23 @@ from sim.collision.kinds import SWAPPED, Pair
 from sim.late import Late
 from sim.model import Model
 from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
-from sim.pairs.memory import NEAR, gap_before, has_no_room, keep, least_size, remember
+from sim.pairs.memory import (
+    NEAR,
+    gap_before,
+    has_no_room,
+    keep,
+    least_size,
+    overlap_before,
+    remember,
+    rounding_of_rims,
+)
 from sim.pairs.pose import place_shapes
 from sim.work import Work
 from solvers.jit import kernel
 from solvers.late import late
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
-_LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose
-_BEFORE = NEAR  # by which elements may overlap at its beginning
+_LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less
 
 
 @kernel
@@ -43,7 +51,7 @@ def open_pairs(model: Model, work: Work, j: int) -> float:
     pose = work.pair_before[j]
     work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:12])
     apart = distance(model, work, j)
-    work.pair_before[j, 12] = min(apart, 0.0) - _BEFORE * least_size(model, j)
+    work.pair_before[j, 12] = min(apart, 0.0) - overlap_before(model, j)
     return apart
 
 
@@ -119,7 +127,8 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     kind = model.pair_kind[first]
     before = work.pair_before[first]
     g = work.pair_trial[0]
-    close = _BEFORE * least_size(model, first)
+    close = NEAR * least_size(model, first)
+    least = before[12] - _LAST_RESORT * least_size(model, first)
     ground = model.contact_height.shape[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
@@ -132,8 +141,8 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             now = work.pair_out[j]
             turned = now[1] * g[1] + now[2] * g[2] + now[3] * g[3] < 0.0
-            doubtful = turned or g[0] < before[12]
-            if doubtful and gap_before(kind, now, work.pair_relative[first], before) < before[12]:
+            doubtful = turned or g[0] < least
+            if doubtful and gap_before(kind, now, work.pair_relative[first], before) < least:
                 return True
         j += 1
     return False
@@ -153,7 +162,7 @@ def overlapping(model: Model, work: Work) -> int:
             place_shapes(model, work, j, work.pos3, work.rot3)
             if not signed and passed_through(model, work, j):
                 return 2
-            part = _LAST_RESORT if work.pair_free[0] == 1 else _OVERLAP
-            if distance(model, work, j) < -part * least_size(model, j):
+            part = _LAST_RESORT if work.pair_free[0] == 1 or work.pair_free[1] == 1 else _OVERLAP
+            if distance(model, work, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
                 found = 1
     return found

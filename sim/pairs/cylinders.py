@@ -65,6 +65,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
     kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
     before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
     R, r = before[:9], before[9:12]
+    missing = False
     choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
     for j in range(first, last_point(model, first)):
         k = j - first
@@ -79,6 +80,9 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
             if g[0] < before[12]:
                 work.pair_code[j] = 0
+            missing = missing or work.pair_code[j] == 0
+    if missing:
+        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
     if work.pair_free[0] == 2:
         keep(model, work, first)
     put_all(model, work, first)

@@ -8,6 +8,7 @@ from sim.collision.box import to_a, to_b
 from sim.collision.cylinder_cylinder import RIM_POINTS
 from sim.collision.kept import elsewhere
 from sim.collision.kinds import SWAPPED, Pair
+from sim.collision.rim import LEVEL
 from sim.collision.witness import dot
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
@@ -33,6 +34,23 @@ def least_size(model: Model, j: int) -> float:
         if model.pair_sizes[j, k] > 0.0:
             least = min(least, model.pair_sizes[j, k])
     return least
+
+
+@kernel
+def rounding_of_rims(model: Model, j: int) -> float:
+    """How much deeper than their contact points say the shapes of pair j may overlap: the point of a rim that is
+    farthest along a normal is rounded by LEVEL of its radius (sim/collision/rim.py). 0 without cylinders.
+    """
+    kind, sizes = model.pair_kind[j] % SWAPPED, model.pair_sizes[j]
+    if kind == Pair.CYLINDER_CYLINDER:
+        return LEVEL * max(sizes[0], sizes[4])
+    return LEVEL * sizes[4] if kind == Pair.POLYTOPE_CYLINDER else 0.0
+
+
+@kernel
+def overlap_before(model: Model, j: int) -> float:
+    """By how much elements of pair j may overlap where a step begins, and still be chosen [m]."""
+    return NEAR * least_size(model, j) + rounding_of_rims(model, j)
 
 
 @inner_kernel

@@ -21,7 +21,7 @@ from sim.late import Late
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.pairs.contact import is_absent, pair_arm, pair_force
-from sim.pairs.memory import NEAR, least_size
+from sim.pairs.memory import least_size, overlap_before, rounding_of_rims
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
@@ -66,8 +66,8 @@ def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0:
             size = least_size(model, j)
-            overlap = max(0.0, -(work.pair_before[j, 12] + NEAR * size))
-            slack = overlap + _LEFT * size + options.tolerance
+            overlap = max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
+            slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
             counts = work.pair_apart[j] == 0.0 and overlap < _THROWN * size
         if not counts or is_absent(work, j):
             continue
