@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.collision.apart import TRIALS, farthest, is_exact, nearest_between
-from sim.collision.box import column, to_a, to_b
+from sim.collision.box import column, to_a
 from sim.collision.clip import edge_normal, on_edges
 from sim.collision.cylinder import nearest, reach, vertex_on_cylinder
 from sim.collision.exchange import exchange
@@ -46,26 +45,6 @@ def turn_around(R: Vector, r: Vector, turned: Vector) -> None:
 def separation_along(n: Vec3, sizes: Vector, R: Vector, r: Vector) -> float:
     """Distance of the two along n, out of b."""
     return dot(n, (r[0], r[1], r[2])) - reach(to_a(R, n), sizes[0], sizes[1]) - reach(n, sizes[4], sizes[5])
-
-
-@inner_kernel
-def distance_apart(sizes: Vector, R: Vector, r: Vector) -> float:
-    """A lower bound of the distance of the two, all but exact where they are apart (apart.py)."""
-    best = -1e300
-    v = (r[0], r[1], r[2])
-    for _ in range(TRIALS):
-        size = sqrt(dot(v, v))
-        if size == 0.0:
-            break
-        n = (v[0] / size, v[1] / size, v[2] / size)
-        x = to_b(R, farthest(to_a(R, (-n[0], -n[1], -n[2])), sizes[0], sizes[1]))
-        y = farthest(n, sizes[4], sizes[5])
-        w = (x[0] + r[0] - y[0], x[1] + r[1] - y[1], x[2] + r[2] - y[2])
-        best = max(best, dot(n, w))
-        if is_exact(best, v):
-            break
-        v = nearest_between(v, w)
-    return best
 
 
 @inner_kernel

@@ -12,11 +12,11 @@ Codes: 16 + 8 i + what it is, i: the end; or which rims, the side of the normal 
 
 from __future__ import annotations
 
+from sim.collision.aligned import from_cylinder
 from sim.collision.box import column, to_a
 from sim.collision.clip import BORDER
 from sim.collision.cylinder_crossings import (
     crossing,
-    distance_apart,
     nearest_rim_point,
     put_crossing,
     separation_along,
@@ -73,9 +73,9 @@ def survey(
             codes[first + found] = code
             found += 1
     if best < 0.0:
-        apart = distance_apart(sizes, R, r)
-        if apart > best + TIE * sizes[4]:
-            best, which = apart, 0
+        s = from_cylinder(sizes, R, r, turned)
+        if s > best + TIE * sizes[4]:
+            best, which = s, 0
     return best, which, up, down
 
 

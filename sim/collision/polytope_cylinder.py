@@ -12,6 +12,7 @@ Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with
 
 from __future__ import annotations
 
+from sim.collision.aligned import from_polytope
 from sim.collision.box import to_a, to_b
 from sim.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
 from sim.collision.hull import above, row
@@ -19,7 +20,6 @@ from sim.collision.kept import original
 from sim.collision.polytope_cylinder_crossings import (
     corner_of,
     crossings,
-    distance_apart,
     nearest_rim_point,
     put_crossing,
     separation_along,
@@ -39,7 +39,7 @@ CROSSINGS = 9
 RIM_POINTS = 8
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 
-END, FACE, CORNER, CROSS, APART = 0, 1, 2, 3, 4
+END, FACE, CORNER, CROSS, ALIGNED = 0, 1, 2, 3, 4
 Survey = tuple[float, int, int, int, int]  # separation, what gives it, which, face of a (row), end of b (TOP, BOTTOM)
 
 
@@ -81,10 +81,10 @@ def survey(
         s = separation_along((out[1], out[2], out[3]), sizes, hull, R, r)
         if s > best + TIE * rho:
             best, kind, which = s, CORNER, 8 * k + where
-    if best < 0.0:
-        apart = distance_apart(sizes, hull, R, r)
-        if apart > best + TIE * rho:
-            best, kind, which = apart, APART, 0
+    if best < sizes[1]:
+        s = from_polytope(sizes, hull, R, r)
+        if s > best + TIE * rho:
+            best, kind, which = s, ALIGNED, 0
     return best, kind, which, face, end
 
 

@@ -5,9 +5,8 @@ Codes: see polytope_cylinder.py.
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, sin
 
-from sim.collision.apart import TRIALS, farthest, is_exact, nearest_between
 from sim.collision.box import to_a, to_b
 from sim.collision.clip import edge_normal, on_edges
 from sim.collision.cylinder import RIM_BOTTOM, RIM_TOP, SIDE, reach
@@ -57,31 +56,6 @@ def separation_along(n: Vec3, sizes: Vector, hull: Matrix, R: Vector, r: Vector)
     for k in range(int(hull[o, 0])):
         least = min(least, dot(w, row(hull, o + 1 + k)))
     return least + dot(n, (r[0], r[1], r[2])) - reach(n, sizes[4], sizes[5])
-
-
-@inner_kernel
-def distance_apart(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> float:
-    """A lower bound of the distance of the two, all but exact where they are apart (apart.py); a without its radius."""
-    o = int(sizes[0])
-    best = -1e300
-    v = corner_of(hull, o, 0, R, r)
-    for _ in range(TRIALS):
-        size = sqrt(dot(v, v))
-        if size == 0.0:
-            break
-        n = (v[0] / size, v[1] / size, v[2] / size)
-        x, least = v, 1e300
-        for k in range(int(hull[o, 0])):
-            c = corner_of(hull, o, k, R, r)
-            if dot(n, c) < least:
-                x, least = c, dot(n, c)
-        y = farthest(n, sizes[4], sizes[5])
-        w = (x[0] - y[0], x[1] - y[1], x[2] - y[2])
-        best = max(best, dot(n, w))
-        if is_exact(best, v):
-            break
-        v = nearest_between(v, w)
-    return best
 
 
 @inner_kernel

@@ -24,10 +24,10 @@ from sim.model import Model
 from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
 from sim.pairs.memory import (
     NEAR,
-    gap_before,
     has_no_room,
     keep,
     least_size,
+    left_behind,
     overlap_before,
     remember,
     rounding_of_rims,
@@ -94,7 +94,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
             lost = g[0] < before[12]
             if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE:
-                lost = lost and gap_before(kind, work.pair_out[j], pose, before) < before[12]
+                lost = lost and left_behind(work, kind, work.pair_out[j], pose, before, before[12])
             if lost:
                 code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
@@ -142,7 +142,7 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
             now = work.pair_out[j]
             turned = now[1] * g[1] + now[2] * g[2] + now[3] * g[3] < 0.0
             doubtful = turned or g[0] < least
-            if doubtful and gap_before(kind, now, work.pair_relative[first], before) < least:
+            if doubtful and left_behind(work, kind, now, work.pair_relative[first], before, least):
                 return True
         j += 1
     return False

@@ -13,7 +13,7 @@ from sim.collision.cylinders import (
 from sim.collision.kinds import SWAPPED, Pair
 from sim.late import Late
 from sim.model import Model
-from sim.pairs.memory import gap_before, keep, last_point
+from sim.pairs.memory import keep, last_point, left_behind
 from sim.work import Work
 from solvers.jit import inner_kernel
 from solvers.late import late
@@ -74,7 +74,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
         lost = g[0] < before[12]
         if lost:
             collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
-            lost = gap_before(kind, g, pose, before) < before[12]
+            lost = left_behind(work, kind, g, pose, before, before[12])
         if lost:
             work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)

@@ -4,6 +4,8 @@ of the other in the first. Collisions of polytopes and of cylinders have room fo
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.collision.box import to_a, to_b
 from sim.collision.cylinder_cylinder import RIM_POINTS
 from sim.collision.kept import elsewhere
@@ -11,6 +13,7 @@ from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.rim import LEVEL
 from sim.collision.witness import dot
 from sim.model import Matrix, Model, Vector
+from sim.rotation import Vec3
 from sim.work import Work
 from solvers.jit import inner_kernel, kernel
 
@@ -74,9 +77,8 @@ def room(kind: int, sizes: Vector, hull: Matrix) -> int:
 
 
 @inner_kernel
-def gap_before(kind: int, out: Vector, pose: Vector, before: Vector) -> float:
-    """Gap at the pose `before`, along the normal that a contact has at `pose`, of the two points that it is between:
-    how far they have come towards each other since then, whatever the normal was on the way.
+def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
+    """How far the two points of a contact at `pose` have moved past each other since the pose `before`.
 
     p' = R' R^T (p - r) + r' of a point p of shape a, in the frame of b; of one of b in the frame of a, where the two
     have changed places, p' = R'^T (R p + r - r').
@@ -85,12 +87,27 @@ def gap_before(kind: int, out: Vector, pose: Vector, before: Vector) -> float:
     p = (out[4], out[5], out[6])
     if kind < SWAPPED:
         q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
-        moved = (p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11])
-    else:
-        q = to_b(R, p)
-        q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
-        moved = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
-    return out[0] - dot((out[1], out[2], out[3]), moved)
+        return p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11]
+    q = to_b(R, p)
+    q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
+    return p[0] - q[0], p[1] - q[1], p[2] - q[2]
+
+
+@kernel
+def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector, least: float) -> bool:
+    """Whether the two points of a contact at `pose` were closer than `least` at the pose `before`, along the normal at
+    `pose`: they have moved apart since then, whatever the normal was on the way.
+
+    Where nothing else was found, the normal of shapes that were apart may have turned by the angle of the two poses:
+    the points seem to have been closer than they were by that angle times their motion.
+    """
+    moved = moved_since(kind, out, pose, before)
+    if work.pair_free[1] == 1:
+        turn = 0.0
+        for k in range(9):
+            turn += (pose[k] - before[k]) ** 2
+        least -= sqrt(0.5 * turn * dot(moved, moved))
+    return out[0] - dot((out[1], out[2], out[3]), moved) < least
 
 
 @kernel
