@@ -54,10 +54,11 @@ def default_kappa(mechanism: Mechanism, time_step: float) -> float:
         kappa = 1e-9 m/s * m |g| h,    between 1e-13 and 1e-6
 
     m is the mass of the lightest part that no joint holds to another [kg], h the time step [s], |g| the size of
-    gravity, 9.81 m/s^2 where there is none. Where bodies collide, m is no less than a thousandth of the mass of all
-    parts: what lies on a part that is a million times lighter would be a gap below rounding above it. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
+    gravity, 9.81 m/s^2 where there is none. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
     above the ground whatever it weighs and at every time step, and creeps down a slope a with
     n * 1e-9 m/s * tan a / (cos a (mu^2 - tan^2 a)): less than 1e-6 m in 10 s, but for slopes close to the cone.
+    Where bodies collide, m is no less than a thousandth of the mass of all parts: the gap below what lies on a part
+    that is a million times lighter would be less than its rounding.
     """
     masses = free_parts(mechanism)
     carried = _LIGHT * sum(masses) if mechanism.collisions else 0.0

@@ -64,8 +64,7 @@ class Work(NamedTuple):
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (2,) 1: elements are chosen anew at every pose; 2: those that press are kept beside new ones.
-    # [1]: 1 where small overlaps may be left
+    pair_free: Integers  # (2,) 1: elements are chosen at every pose; 2: those that press stay, too; [1] see choice.py
     far: Matrix  # (nground, 24) see contacts/far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

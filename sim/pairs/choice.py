@@ -11,7 +11,12 @@ Only elements that did not overlap when the step began are chosen: a contact pus
 end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
 energy. That is so where they overlapped along the normal that they had then, and along the one that polytopes and
 cylinders have in the end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds
-energy.)
+energy.) Where all elements of cylinders that overlap in the end did so in the beginning, those of the beginning stand
+for them.
+
+Shapes may slide from one element to another within a step. The one that they came to was below the other then, is left
+out, and overlaps in the end. Where several attempts end so (pair_free[1] is 1), normals may have turned on the way
+(`left_behind`), and a small overlap is left to the next step.
 """
 
 from __future__ import annotations
