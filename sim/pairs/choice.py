@@ -9,8 +9,8 @@ Where a solution with some elements overlaps in others, and one with these in th
 
 Only elements that did not overlap when the step began are chosen: a contact pushes along the normal that it has at the
 end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
-energy. That is so where they overlapped along the normal that they had then, and along the one that polytopes and
-cylinders have in the end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds
+energy. That is so where they overlapped along the normal that they had then, and along the one that they have in the
+end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds
 energy.) Where all elements of cylinders that overlap in the end did so in the beginning, those of the beginning stand
 for them.
 
@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
-from sim.collision.kinds import SWAPPED, Pair
 from sim.late import Late
 from sim.model import Model
 from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
@@ -97,10 +96,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
         code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         if code > 1 or code < 0:  # a choice
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-            lost = g[0] < before[12]
-            if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE:
-                lost = lost and left_behind(work, kind, work.pair_out[j], pose, before, before[12])
-            if lost:
+            if g[0] < before[12] and left_behind(work, kind, work.pair_out[j], pose, before, before[12]):
                 code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
                 code = code if g[0] >= before[12] else 0

@@ -145,6 +145,7 @@ def interior_point(
     find_impacts(model, work, options.h)
     while True:
         work.pair_free[0] = 0
+        work.pair_free[1] = 0
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             work.pair_free[1] = 1 if attempt >= _LENIENT else 0
