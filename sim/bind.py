@@ -62,6 +62,7 @@ _PAIRS = (
     pair_far.enlist_pairs,
     pair_far.far_pair_impulses,
     pair_far.pairs_came_near,
+    pair_work.pairs_gained,
 )
 _CYLINDERS = (
     pair_cylinders.cylinder_distance,
@@ -146,8 +147,6 @@ def bind_step(model: Model) -> None:
         _bind(model, _PAIRS)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         _bind(model, _CYLINDERS)
-    if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_POLYTOPE)):
-        _bind(model, (pair_work.pairs_gained,))
     if np.any(model.contact_terrain):
         _bind(model, _TERRAIN)
     if np.any(model.contact_restitution):

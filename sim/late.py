@@ -93,5 +93,5 @@ class Late(IntEnum):
     CYLINDER_BEFORE = 68
     # joints with two rotations, over an interval
     SWING_TURN = 69
-    # energy from collisions of polytopes and cylinders
+    # energy from collisions
     PAIRS_GAINED = 70
