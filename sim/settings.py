@@ -13,7 +13,6 @@ from sim.parts import WORLD
 __all__ = ["Settings", "default_kappa", "free_parts"]
 
 _CREEP = 1e-9  # [m/s]
-_LIGHT = 1e-3  # part of the mass of all
 _EARTH = 9.81  # [m/s^2] where there is no gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
 
@@ -57,10 +56,10 @@ def default_kappa(mechanism: Mechanism, time_step: float) -> float:
     gravity, 9.81 m/s^2 where there is none. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
     above the ground whatever it weighs and at every time step, and creeps down a slope a with
     n * 1e-9 m/s * tan a / (cos a (mu^2 - tan^2 a)): less than 1e-6 m in 10 s, but for slopes close to the cone.
-    Where bodies collide, m is no less than a thousandth of the mass of all parts: the gap below what lies on a part
-    that is a million times lighter would be less than its rounding.
+    Where bodies collide, m is the mass of all parts: each may carry the others, and the gap below its load has to stay
+    above the rounding of positions.
     """
     masses = free_parts(mechanism)
-    carried = _LIGHT * sum(masses) if mechanism.collisions else 0.0
+    mass = sum(masses) if mechanism.collisions else min(masses)
     gravity = float(np.linalg.norm(np.asarray(mechanism.gravity))) or _EARTH
-    return float(np.clip(_CREEP * max(min(masses), carried) * gravity * time_step, _SMALLEST, _LARGEST))
+    return float(np.clip(_CREEP * mass * gravity * time_step, _SMALLEST, _LARGEST))
