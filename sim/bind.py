@@ -41,6 +41,7 @@ _PAIRS = (
     late.enlist_pairs,
     late.far_pair_impulses,
     late.pairs_came_near,
+    late.pairs_gained,
 )
 _CYLINDERS = (
     late.cylinder_distance,
@@ -130,8 +131,6 @@ def bind_step(model: Model) -> None:
         _bind(model, _PAIRS)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         _bind(model, _CYLINDERS)
-    if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_POLYTOPE)):
-        _bind(model, (late.pairs_gained,))
     if np.any(model.contact_terrain):
         _bind(model, _TERRAIN)
     if np.any(model.contact_restitution):

@@ -109,7 +109,7 @@ cylinder_before = _late("sim.pairs.cylinders:cylinder_before")
 # joints with two rotations, over an interval
 swing_turn = _late("sim.joints.swing:swing_turn")
 
-# energy from collisions of polytopes and cylinders
+# energy from collisions
 pairs_gained = _late("sim.pairs.work:pairs_gained")
 
 COUNT = _late.count  # of addresses

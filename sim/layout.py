@@ -51,7 +51,7 @@ MODEL_FLOATS = _shapes(
 
 WORK_INTS = _shapes(
     """
-    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 1,
+    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 2,
     loop_led 2, loop_used nrow, coupling_live ncoupling, couple_live nrow 2
     """
 )

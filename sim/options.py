@@ -29,7 +29,7 @@ class Goal(NamedTuple):
 
     kappa: float  # target of the complementarity products
     share: float  # part of the equality residuals to remove
-    corrected: bool  # subtract the second-order term of the affine step in `cone_step`
+    corrected: float  # part of the second-order term of the affine step in `cone_step` to subtract
 
 
 class Outcome(NamedTuple):

@@ -10,7 +10,7 @@ from sim.mechanism import Mechanism
 from sim.model import Vector
 from sim.parts import WORLD
 
-__all__ = ["Settings", "default_kappa", "lightest_part"]
+__all__ = ["Settings", "default_kappa", "free_parts"]
 
 _CREEP = 1e-9  # [m/s]
 _EARTH = 9.81  # [m/s^2] where there is no gravity
@@ -31,8 +31,8 @@ class Settings(NamedTuple):
         return np.array((self if kappa is None else self._replace(kappa=kappa))[:4], dtype=np.float64)
 
 
-def lightest_part(mechanism: Mechanism) -> float:
-    """Mass of the lightest group of bodies that joints hold together and that can move [kg]."""
+def free_parts(mechanism: Mechanism) -> list[float]:
+    """Masses of the groups of bodies that joints hold together and that can move [kg]."""
     group = {body.name: body.name for body in mechanism.bodies}
 
     def leader(name: str) -> str:
@@ -44,22 +44,22 @@ def lightest_part(mechanism: Mechanism) -> float:
         if WORLD not in (joint.parent, joint.child):
             group[leader(joint.child)] = leader(str(joint.parent))
     free = {leader(joint.child) for joint in mechanism.joints if joint.nv > 0}
-    return min(sum(body.mass for body in mechanism.bodies if leader(body.name) == head) for head in free)
+    return [sum(body.mass for body in mechanism.bodies if leader(body.name) == head) for head in free]
 
 
 def default_kappa(mechanism: Mechanism, time_step: float) -> float:
     """Central-path parameter of a simulator that was given none [N s m]:
 
-        kappa = 1e-9 m/s * m |g| h,    between 1e-13 and 1e-6;    1e-6 where bodies collide with one another
+        kappa = 1e-9 m/s * m |g| h,    between 1e-13 and 1e-6
 
     m is the mass of the lightest part that no joint holds to another [kg], h the time step [s], |g| the size of
     gravity, 9.81 m/s^2 where there is none. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
     above the ground whatever it weighs and at every time step, and creeps down a slope a with
     n * 1e-9 m/s * tan a / (cos a (mu^2 - tan^2 a)): less than 1e-6 m in 10 s, but for slopes close to the cone.
-    From 1e-8 down, steps of one of 240 collisions of boxes find no solution, and under loads 1e4 times heavier than
-    what carries them gaps are below rounding.
+    Where bodies collide, m is the mass of all parts: each may carry the others, and the gap below its load has to stay
+    above the rounding of positions.
     """
-    if mechanism.collisions:
-        return _LARGEST
+    masses = free_parts(mechanism)
+    mass = sum(masses) if mechanism.collisions else min(masses)
     gravity = float(np.linalg.norm(np.asarray(mechanism.gravity))) or _EARTH
-    return float(np.clip(_CREEP * lightest_part(mechanism) * gravity * time_step, _SMALLEST, _LARGEST))
+    return float(np.clip(_CREEP * mass * gravity * time_step, _SMALLEST, _LARGEST))

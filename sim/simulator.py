@@ -35,7 +35,7 @@ class Simulator(Derivatives):
 
     kappa           central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa over
                     its impulse. By default 1e-9 m/s * m |g| h, m the lightest part that no joint holds to another,
-                    |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions 1e-6. See `default_kappa`
+                    |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions m is that of all parts
     tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
     max_iterations  of the interior point
     order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum

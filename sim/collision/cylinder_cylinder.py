@@ -12,6 +12,7 @@ Codes: 16 + 8 i + what it is, i: the end; or which rims, the side of the normal 
 
 from __future__ import annotations
 
+from sim.collision.aligned import from_cylinder
 from sim.collision.box import column
 from sim.collision.clip import BORDER
 from sim.collision.cylinder_crossings import (
@@ -68,6 +69,10 @@ def survey(
         if found < room:
             codes[first + found] = code
             found += 1
+    if best < 0.0:
+        s = from_cylinder(sizes, R, r, turned)
+        if s > best + TIE * sizes[4]:
+            best, which = s, 0
     return best, which, up, down
 
 

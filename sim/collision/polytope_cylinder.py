@@ -12,6 +12,7 @@ Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with
 
 from __future__ import annotations
 
+from sim.collision.aligned import from_polytope
 from sim.collision.box import to_b
 from sim.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
 from sim.collision.hull import above, row
@@ -35,7 +36,7 @@ from solvers.jit import inner_kernel
 
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 
-END, FACE, CORNER, CROSS = 0, 1, 2, 3
+END, FACE, CORNER, CROSS, ALIGNED = 0, 1, 2, 3, 4
 Survey = tuple[float, int, int, int, int]  # separation, what gives it, which, face of a (row), end of b (TOP, BOTTOM)
 
 
@@ -77,6 +78,10 @@ def survey(
         s = separation_along((out[1], out[2], out[3]), sizes, hull, R, r)
         if s > best + TIE * rho:
             best, kind, which = s, CORNER, 8 * k + where
+    if best < sizes[1]:
+        s = from_polytope(sizes, hull, R, r)
+        if s > best + TIE * rho:
+            best, kind, which = s, ALIGNED, 0
     return best, kind, which, face, end
 
 

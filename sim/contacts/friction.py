@@ -168,14 +168,14 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float, share: floa
 def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the goal.
 
-    `goal.corrected` subtracts the second-order term of the affine step now in cone_step (Mehrotra).
+    `goal.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
     """
     z = work.cone[c]
     d = work.cone_step[c]
     w = work.contact_w[c]
     r = goal.kappa - z[0] * z[1]
-    if goal.corrected:
-        r -= d[0] * d[1]
+    if goal.corrected > 0.0:
+        r -= goal.corrected * d[0] * d[1]
     w[0] = (r - z[1] * goal.share * (work.contact_kin[c, 0] - z[0])) / z[0]
     w[1] = 0.0
     w[2] = 0.0

@@ -153,13 +153,13 @@ def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     total = 0.0
     for e in range(4):
         r = goal.kappa - z[4 + e] * z[8 + e]
-        if goal.corrected:
-            r -= d[4 + e] * d[8 + e]
+        if goal.corrected > 0.0:
+            r -= goal.corrected * d[4 + e] * d[8 + e]
         q[8 + e] = (r - z[4 + e] * goal.share * (side(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
         total += q[8 + e]
     r = goal.kappa - z[2] * z[3]
-    if goal.corrected:
-        r -= d[2] * d[3]
+    if goal.corrected > 0.0:
+        r -= goal.corrected * d[2] * d[3]
     q[7] = (r + z[2] * (total - goal.share * cap_error(model, work, c))) * q[6]
     p = q[7] - z[2] * q[6] * model.contact_friction[c] * w[0]
     w[1] = q[8] - q[9] - q[4] * p

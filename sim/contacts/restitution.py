@@ -20,6 +20,10 @@ of the step, the gap changes along those on the way. Where the impulses f of a s
 its restitutions are lowered, all of them by the same part, and it is solved again, until they do none: without
 restitution they do not.
 
+What the impulses do not do, the energy at the nodes may, by a part of first order in the time step: an impact is
+somewhere within one. A frictionless chain of three bodies with e = 1 gained up to 1.0e-3 of its energy in two impacts
+at 2 ms, 1.5e-4 at .25 ms, and lost .3 % and .05 % (median of eight falls); between impacts, 1.7e-5 and 3e-7.
+
 Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
 of 2, 14 phi1, 15 phi2, of pairs 16:19 the contact point at 1, 19:22 at 2. Derivatives: restitution_gradient.py.
 

@@ -71,8 +71,8 @@ def limit_constants(model: Model, work: Work, goal: Goal) -> None:
         s = work.bound[k, 0]
         g = work.bound[k, 1]
         r = goal.kappa - s * g
-        if goal.corrected:
-            r -= work.bound_step[k, 0] * work.bound_step[k, 1]
+        if goal.corrected > 0.0:
+            r -= goal.corrected * work.bound_step[k, 0] * work.bound_step[k, 1]
         w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         add_limit_impulse(model, work, k, w, work.dnu)

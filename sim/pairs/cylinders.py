@@ -14,7 +14,7 @@ from sim.collision.cylinders import (
 from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Model
 from sim.options import BESIDE_KEPT
-from sim.pairs.memory import gap_before, keep, last_point
+from sim.pairs.memory import keep, last_point, left_behind
 from sim.work import Work
 from solvers.jit import inner_kernel
 
@@ -65,6 +65,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
     kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
     before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
     R, r = before[:9], before[9:12]
+    missing = False
     choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
     for j in range(first, last_point(model, first)):
         k = j - first
@@ -73,12 +74,15 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
         lost = g[0] < before[12]
         if lost:
             collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
-            lost = gap_before(kind, g, pose, before) < before[12]
+            lost = left_behind(work, kind, g, pose, before, before[12])
         if lost:
             work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
             if g[0] < before[12]:
                 work.pair_code[j] = 0
+            missing = missing or work.pair_code[j] == 0
+    if missing:
+        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
     if work.pair_free[0] == BESIDE_KEPT:
         keep(model, work, first)
     put_all(model, work, first)

@@ -4,11 +4,15 @@ of the other in the first. Collisions of polytopes and of cylinders have room fo
 
 from __future__ import annotations
 
+from math import sqrt
+
 from sim.collision.box import to_a, to_b
 from sim.collision.kept import elsewhere
 from sim.collision.kinds import RIM_POINTS, SWAPPED, Pair
+from sim.collision.rim import LEVEL
 from sim.collision.witness import dot
 from sim.model import Matrix, Model, Vector
+from sim.rotation import Vec3
 from sim.work import Work
 from solvers.jit import inner_kernel, kernel
 
@@ -34,6 +38,23 @@ def least_size(model: Model, j: int) -> float:
     return least
 
 
+@kernel
+def rounding_of_rims(model: Model, j: int) -> float:
+    """How much deeper than their contact points say the shapes of pair j may overlap: the point of a rim that is
+    farthest along a normal is rounded by LEVEL of its radius (sim/collision/rim.py). 0 without cylinders.
+    """
+    kind, sizes = model.pair_kind[j] % SWAPPED, model.pair_sizes[j]
+    if kind == Pair.CYLINDER_CYLINDER:
+        return LEVEL * max(sizes[0], sizes[4])
+    return LEVEL * sizes[4] if kind == Pair.POLYTOPE_CYLINDER else 0.0
+
+
+@kernel
+def overlap_before(model: Model, j: int) -> float:
+    """By how much elements of pair j may overlap where a step begins, and still be chosen [m]."""
+    return NEAR * least_size(model, j) + rounding_of_rims(model, j)
+
+
 @inner_kernel
 def has_no_room(kind: int) -> bool:
     """Whether a kind of pair is none of polytopes or cylinders: points of the others have sides that stay open."""
@@ -55,9 +76,8 @@ def room(kind: int, sizes: Vector, hull: Matrix) -> int:
 
 
 @inner_kernel
-def gap_before(kind: int, out: Vector, pose: Vector, before: Vector) -> float:
-    """Gap at the pose `before`, along the normal that a contact has at `pose`, of the two points that it is between:
-    how far they have come towards each other since then, whatever the normal was on the way.
+def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
+    """How far the two points of a contact at `pose` have moved past each other since the pose `before`.
 
     p' = R' R^T (p - r) + r' of a point p of shape a, in the frame of b; of one of b in the frame of a, where the two
     have changed places, p' = R'^T (R p + r - r').
@@ -66,12 +86,27 @@ def gap_before(kind: int, out: Vector, pose: Vector, before: Vector) -> float:
     p = (out[4], out[5], out[6])
     if kind < SWAPPED:
         q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
-        moved = (p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11])
-    else:
-        q = to_b(R, p)
-        q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
-        moved = (p[0] - q[0], p[1] - q[1], p[2] - q[2])
-    return out[0] - dot((out[1], out[2], out[3]), moved)
+        return p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11]
+    q = to_b(R, p)
+    q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
+    return p[0] - q[0], p[1] - q[1], p[2] - q[2]
+
+
+@kernel
+def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector, least: float) -> bool:
+    """Whether the two points of a contact at `pose` were closer than `least` at the pose `before`, along the normal at
+    `pose`: they have moved apart since then, whatever the normal was on the way.
+
+    Where nothing else was found, the normal of shapes that were apart may have turned by the angle of the two poses:
+    the points seem to have been closer than they were by that angle times their motion.
+    """
+    moved = moved_since(kind, out, pose, before)
+    if work.pair_free[1] == 1:
+        turn = 0.0
+        for k in range(9):
+            turn += (pose[k] - before[k]) ** 2
+        least -= sqrt(0.5 * turn * dot(moved, moved))
+    return out[0] - dot((out[1], out[2], out[3]), moved) < least
 
 
 @kernel

@@ -49,19 +49,21 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
 
     predictor     full residual, products to kappa                      -> sigma = (mean ahead / mean)^3
     corrector     full residual, products to max(kappa, sigma mean), second-order term        (Mehrotra 1992);
-                  left out where the predictor already lands on kappa
+                  left out where the predictor already lands on kappa. The term is that of the part of the predictor
+                  that stays in the cones: whole, it can cancel what it corrects, and nothing would move
     if short      half the residual, products to half the mean; then a tenth, to nine tenths
     """
     sigma = 0.0
     share = 1.0
     alpha = 0.0
+    reach = 0.0
     for phase in range(4):
         if phase >= 2:
             if alpha > _SHORT:
                 break
             share = 0.5 if phase == 2 else 0.1
             sigma = 1.0 - share
-        goal = Goal(max(kappa, sigma * mean), share, phase == 1)
+        goal = Goal(max(kappa, sigma * mean), share, reach * reach if phase == 1 else 0.0)
         for d in range(work.dnu.shape[0]):
             work.dnu[d] = -share * work.residual[d]
         inequality_rhs(model, work, goal)
@@ -70,7 +72,8 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
         recover_inequalities(model, work, h, share)
         alpha = boundary_step(model, work)
         if phase == 0:
-            ahead = products_ahead(model, work, min(1.0, 0.95 * alpha))
+            reach = min(1.0, 0.95 * alpha)
+            ahead = products_ahead(model, work, reach)
             if alpha > 1.06 and abs(ahead - kappa) < 0.1 * kappa:
                 break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3

@@ -58,6 +58,7 @@ _ATTEMPTS = 60
 _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
+_LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -151,8 +152,10 @@ def interior_point(
     find_impacts(model, work, options.h)
     while True:
         work.pair_free[0] = AT_START
+        work.pair_free[1] = 0
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
+            work.pair_free[1] = 1 if attempt >= _LENIENT else 0
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
             misplaced = misplacement(model, work, options, v, out.status)
             for choice in range(_CHOICES):

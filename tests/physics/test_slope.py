@@ -28,6 +28,18 @@ def test_no_creep_in_ten_seconds_by_default(time_step, mass):
     assert np.linalg.norm(xs[-1, :2] - xs[0, :2]) < 1e-6
 
 
+@pytest.mark.parametrize("shape", [dojo.Box(0.5, 0.5, 0.5), dojo.Cylinder(0.25, 0.5)], ids=["box", "cylinder"])
+def test_no_creep_on_another_body_by_default(shape):
+    """On an obstacle, by collisions."""
+    on = dojo.Collision("a", shape_b=dojo.Box(4.0, 4.0, 0.5, center=(0.0, 0.0, -0.25)), friction=0.5)
+    gravity = tilted(np.deg2rad(20.0))
+    mech = dojo.Mechanism(
+        [dojo.Body("a", 1.0, shape=shape)], [dojo.Joint("floating", None, "a")], collisions=[on], gravity=gravity
+    )
+    xs = run(dojo.Simulator(mech, time_step=0.01), REST, 1000)
+    assert np.linalg.norm(xs[-1, :2] - xs[0, :2]) < 1e-6
+
+
 def test_creep_is_that_of_the_central_path():
     """mu gamma v / (a + sqrt(a^2 + v^2)) = tangential load: v = 2 a r / (1 - r^2), a = gap/(2 mu), r = tan/mu."""
     angle, kappa, h = np.deg2rad(15.0), 1e-6, 0.01

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.settings import lightest_part
+from sim.settings import free_parts
 
 
 def test_it_follows_weight_and_time_step() -> None:
@@ -23,20 +23,29 @@ def test_it_follows_weight_and_time_step() -> None:
 def test_it_stays_between_rounding_and_what_is_hard() -> None:
     assert dojo.Simulator(dojo.models.block(mass=1e-3), time_step=1e-4).kappa == 1e-13
     assert dojo.Simulator(dojo.models.block(mass=1e5), time_step=0.1).kappa == 1e-6
-    on_a_box = dojo.models.sphere().with_obstacle(dojo.Box(1.0, 1.0, 1.0))
-    assert dojo.Simulator(on_a_box, time_step=0.01).kappa == 1e-6
+
+
+def test_parts_that_collide_may_carry_each_other() -> None:
+    ball = dojo.models.sphere(mass=2.0)
+    on_a_box = ball.with_obstacle(dojo.Box(1.0, 1.0, 1.0))
+    assert dojo.Simulator(on_a_box, time_step=0.01).kappa == pytest.approx(1e-9 * 2.0 * 9.81 * 0.01, rel=1e-12)
+    bodies = [dojo.Body(name, mass, shape=dojo.Sphere(0.1)) for name, mass in (("light", 1.0), ("heavy", 1e4))]
+    joints = [dojo.Joint("floating", None, body.name) for body in bodies]
+    for collisions, mass in (([dojo.Collision("light", "heavy")], 1e4 + 1.0), ([], 1.0)):
+        mech = dojo.Mechanism(bodies, joints, collisions=collisions)
+        assert dojo.Simulator(mech, time_step=0.01).kappa == pytest.approx(1e-9 * mass * 9.81 * 0.01, rel=1e-12)
 
 
 def test_the_lightest_part_counts_with_all_that_hangs_on_it() -> None:
     robot, ball = dojo.models.quadruped(), dojo.models.sphere(mass=0.3)
     whole = sum(body.mass for body in robot.bodies)
-    assert lightest_part(robot) == pytest.approx(whole)
-    assert lightest_part(robot.add(ball, pose=(1.0, 0.0, 0.0), prefix="ball/")) == pytest.approx(0.3)
+    assert min(free_parts(robot)) == pytest.approx(whole)
+    assert min(free_parts(robot.add(ball, pose=(1.0, 0.0, 0.0), prefix="ball/"))) == pytest.approx(0.3)
     bodies = [dojo.Body("shelf", 0.1, (1e-3,) * 3), dojo.Body("cart", 5.0, (0.1,) * 3)]
     joints = [dojo.Joint("fixed", None, "shelf"), dojo.Joint("prismatic", None, "cart")]
-    assert lightest_part(dojo.Mechanism(bodies, joints)) == 5.0  # what cannot move does not count
+    assert min(free_parts(dojo.Mechanism(bodies, joints))) == 5.0  # what cannot move does not count
     fourbar = dojo.models.fourbar()
-    assert lightest_part(fourbar) == pytest.approx(sum(body.mass for body in fourbar.bodies))
+    assert min(free_parts(fourbar)) == pytest.approx(sum(body.mass for body in fourbar.bodies))
 
 
 def test_a_given_one_is_kept_and_the_rule_is_followed_again() -> None:

@@ -85,3 +85,12 @@ def test_foot_between_sticking_and_sliding(kappa):
     result = sim.step(np.array([*pose, *legs, 0.421, -0.013, 0.009, 0.01, 0.028, 0.007, *rates]), np.array(torques))
     assert result.status == 0, result.status
     assert result.iterations <= 100
+
+
+@pytest.mark.parametrize("kappa", [None, 1e-10])
+def test_a_walker_lands_at_a_stop_of_its_knee(kappa):
+    """The second-order term of the predictor cancelled the product of a joint limit: Newton's steps were zero."""
+    sim = dojo.Simulator(dojo.models.walker(), time_step=0.02, kappa=kappa)
+    x = sim.neutral()
+    x[sim.nq :] += np.random.default_rng(1).normal(size=sim.nv)
+    sim.rollout(x, np.zeros((50, sim.nu)), throw=True)
