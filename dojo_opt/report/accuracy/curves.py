@@ -16,7 +16,7 @@ from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-STEPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
+STEPS = (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.002, 0.001, 5e-4, 2.5e-4, 2e-4, 1e-4)  # [s] whole parts of .1
 COARSE = (0.2,)  # [s] for ours of higher order besides: an evaluation less often, at the time of a peer's largest step
 FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse; see `floors`
 LOST = 1.0  # of the energy, relative to all there is: such a run is lost, whether the engine knows it or not

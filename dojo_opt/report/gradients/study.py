@@ -11,7 +11,7 @@ import numpy as np
 
 from dojo_opt.report.clock import slope
 from dojo_opt.report.engines import Engine, installed
-from dojo_opt.report.gradients import one_step, sliding, smoothing, touchdown
+from dojo_opt.report.gradients import drake_motion, drake_step, one_step, sliding, smoothing, touchdown
 from dojo_opt.report.gradients.figure import draw
 from dojo_opt.report.gradients.tables import motion_table, resting_table, smoothing_table, step_table
 from dojo_opt.report.result import Report, Row
@@ -94,6 +94,8 @@ class Gradients:
                     if h in BARRED or engine.name.startswith("MuJoCo")  # the others are slower
                     for eps in EPS
                 ]
+                if h in BARRED:
+                    found += [drake_motion.carried(motion, h, name) for name in _drakes(self.quick)]
                 if find_spec("mujoco") is not None:
                     found += [sliding.mujoco_chained(motion, h, name) for name in CHAINED[: 1 if self.quick else 2]]
         for h in (h for h in BARRED if h in steps):
@@ -111,6 +113,7 @@ class Gradients:
         curves = [touchdown.ours(heights, kappa) for kappa in touchdown.KAPPAS]
         if find_spec("mujoco") is not None:
             curves += [touchdown.mujoco_ball(heights, label) for label in touchdown.MUJOCO]
+        curves += [drake_motion.touchdown(heights, name) for name in _drakes(self.quick)[:1]]
         h = touchdown.H
         at = {k: touchdown.ours(np.array([touchdown.TOUCH, touchdown.TOUCH + AHEAD]), k) for k in touchdown.KAPPAS}
         off = max(abs(curve.gradient[0] + 0.5 / h) * h for curve in at.values())
@@ -124,7 +127,7 @@ class Gradients:
                 "",
                 0.05,
                 at_least=True,
-                note="hard contact, and MuJoCo: 0",
+                note="hard contact, MuJoCo and Drake: 0",
             ),
         ]
         for curve in curves:
@@ -133,6 +136,13 @@ class Gradients:
                 report.rows.append(Row(f"touch-down: h times the steepest gradient, {curve.label}", value, ""))
         report.details["touchdown"] = {"heights": heights, **{c.label: c._asdict() for c in curves}}
         return heights, curves
+
+
+def _drakes(quick: bool) -> tuple[str, ...]:
+    """Contact approximations of Drake, where it is installed."""
+    if find_spec("pydrake") is None:
+        return ()
+    return drake_step.APPROXIMATIONS[: 1 if quick else None]
 
 
 def _able(report: Report, quick: bool) -> list[Engine]:
