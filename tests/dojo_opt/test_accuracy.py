@@ -100,7 +100,10 @@ def test_the_largest_step_that_is_good_enough_is_chosen() -> None:
     assert str(trials[2]) == "h = 10 ms, kappa 1e-05, tolerance 1e-08: 0.9 mm after 0.1 s, 250 times real time"
 
 
-@pytest.mark.parametrize("mechanism", [dojo.models.quadruped(), dojo.models.cartpole(), dojo.models.raiberthopper()])
+@pytest.mark.parametrize(
+    "mechanism",
+    [dojo.models.quadruped(), dojo.models.cartpole(), dojo.models.raiberthopper(), dojo.models.walker()],
+)
 def test_starts_are_reproducible_within_limits_and_above_ground(mechanism: dojo.Mechanism) -> None:
     q, v = start.start(mechanism)
     again = start.start(mechanism)

@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 _PIECE, _PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
 _DURATION = _PIECE * _PIECES
 _TARGET = 1e-3  # [m] error that is asked for after a piece
+_CONVERGED = 1e-2  # [m] beyond which there is no motion to compare with
 _STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
 _KAPPAS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
 _SHARP = ((1e-4, 1e-10), (2e-4, 1e-10), (5e-4, 1e-10), (5e-4, 1e-9), (1e-3, 1e-8))  # steps, kappas to converge with
@@ -158,6 +159,7 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
             "the converged motion, against twice its step",
             1e3 * own,
             "mm",
+            1e3 * _CONVERGED,
             note=f"h = {1e3 * exact.time_step:g} ms, kappa {exact.kappa:g}; asked for is no less than twice this",
         ),
     ]

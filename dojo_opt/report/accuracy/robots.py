@@ -33,6 +33,6 @@ def recommendations(report: Report, quick: bool) -> None:
     note = (
         "The largest time step, then the largest kappa, with an error after 0.1 s as small as asked for: 1 mm, or "
         "twice what the converged motion itself is known to. Passive robots that start in the air with random joint "
-        "velocities of 1 rad/s and land; for yours: dojo-opt report accuracy ROBOT.urdf."
+        "velocities of 1 rad/s and land. For yours: dojo-opt report accuracy ROBOT.urdf."
     )
     report.tables.insert(0, Table("Recommended time step and kappa, with contacts and limits", header, rows, note))

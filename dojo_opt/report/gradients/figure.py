@@ -95,7 +95,8 @@ def _motions(axes: Any, found: Sequence[Derivative]) -> None:
         axes.plot(1e3 * np.array(x), y, marker="o", markersize=3.5, label=label, **look)
     axes.plot(1e3 * np.array(steps), steps, color="0.2", linewidth=1, linestyle=(0, (1, 3)), label="h / 1 s")
     axes.set(xscale="log", yscale="log", xlabel="time step [ms]", ylabel="worst relative error of five derivatives")
-    axes.set_ylim(1e-6, 2 * _TOP)
+    lines = -(-len(axes.get_lines()) // 2)  # of the legend, below the curves
+    axes.set_ylim(10.0 ** (-3.4 - 0.5 * lines), 2 * _TOP)
     axes.set_title("Whole motions with friction: dx/dF, d(stop)/dv0")
     axes.legend(fontsize=7, ncols=2, loc="lower right")
 

@@ -27,6 +27,7 @@ EPS = (1e-5, 1e-2)  # of differenced motions: what one would choose, and a wide 
 CHAINED = ("implicitfast", "discrete")  # of the integrators of which MuJoCo gives Jacobians
 EXACT = 1e-6  # bar of one step, relative
 AHEAD = 5e-3  # [m] above the height from which a step reaches the ground
+_LEFT_OUT = ("MuJoCo implicit", "Drake RK3")  # of a block as implicitfast; explicit, for stiff contacts
 _NO_MUJOCO = 'without MuJoCo; pip install ".[bench]" for its rows'
 
 
@@ -149,8 +150,8 @@ def _able(report: Report, quick: bool) -> list[Engine]:
     """Engines that can simulate the block; a note for those that cannot."""
     engines = []
     for engine in installed():
-        if engine.name == "MuJoCo implicit" or (quick and engine.name != "MuJoCo implicitfast"):
-            continue  # of a block the same as implicitfast
+        if engine.name in _LEFT_OUT or (quick and engine.name != "MuJoCo implicitfast"):
+            continue
         try:
             sliding.differenced(engine, sliding.motions()[0], BARRED[-1], EPS[0])
         except (ValueError, RuntimeError) as error:
