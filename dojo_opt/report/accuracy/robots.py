@@ -29,7 +29,7 @@ def recommendations(report: Report, quick: bool) -> None:
         error, asked = 1e3 * best.error, 1e3 * target
         rows.append([name, mechanism.nv, 1e3 * best.time_step, best.kappa, error, asked, best.realtime, 1e3 * own])
         report.details.setdefault("robots", {})[name] = [{**vars(t), "realtime": t.realtime} for t in trials]
-    header = ["", "dofs", "time step, ms", "kappa", "error, mm", "asked for", "times real time", "converged to"]
+    header = ["", "dofs", "time step, ms", "kappa", "error, mm", "asked for, mm", "times real time", "converged to, mm"]
     note = (
         "The largest time step, then the largest kappa, with an error after 0.1 s as small as asked for: 1 mm, or "
         "twice what the converged motion itself is known to. Passive robots that start in the air with random joint "
