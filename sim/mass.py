@@ -11,7 +11,7 @@ from solvers.jit import kernel
 
 @kernel
 def _add_rest(A: Vector, U: Vector, D: float, out: Vector) -> None:
-    """out += A - D U U^T"""
+    """out += A - D U U^T: A without the last coordinate of its joint, on the way to the parent's."""
     u0, u1, u2, u3, u4, u5 = U[0], U[1], U[2], U[3], U[4], U[5]
     for r in range(6):
         c, k = D * U[r], 6 * r
@@ -27,8 +27,7 @@ def _add_rest(A: Vector, U: Vector, D: float, out: Vector) -> None:
 def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
     """M out = p by elimination from the leaves to the root, one coordinate after the other: M is positive definite.
 
-    up      U = A S,  D = S.U + armature,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's,
-            where the last coordinate of a joint is taken from A on the way
+    up      U = A S,  D = S.U + armature,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's
     down    out = z - U.V/D,  V += S out
 
     False when M is singular.   Leaves the twists of the bodies in work.twist.
@@ -61,9 +60,8 @@ def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
                 _add_rest(A, U, D, work.A[q])
             elif d > first:
                 for r in range(6):
-                    c = D * U[r]
                     for k in range(6):
-                        A[6 * r + k] -= c * U[k]
+                        A[6 * r + k] -= D * U[r] * U[k]
         if q >= 0:
             for k in range(6):
                 work.wrench[q, k] += f[k]
