@@ -80,7 +80,7 @@ WORK_FLOATS = _shapes(
     loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
-    far nground 24, far_law 2
+    far nground 37, far_law 2
     """
 )
 

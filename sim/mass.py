@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from sim.elimination import dot_six
 from sim.energy import spatial_inertia
 from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
+
+
+@kernel
+def _add_rest(A: Vector, U: Vector, D: float, out: Vector) -> None:
+    """out += A - D U U^T: A without the last coordinate of its joint, on the way to the parent's."""
+    u0, u1, u2, u3, u4, u5 = U[0], U[1], U[2], U[3], U[4], U[5]
+    for r in range(6):
+        c, k = D * U[r], 6 * r
+        out[k] += A[k] - c * u0
+        out[k + 1] += A[k + 1] - c * u1
+        out[k + 2] += A[k + 2] - c * u2
+        out[k + 3] += A[k + 3] - c * u3
+        out[k + 4] += A[k + 4] - c * u4
+        out[k + 5] += A[k + 5] - c * u5
 
 
 @kernel
@@ -24,44 +39,42 @@ def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
             work.wrench[i, k] = 0.0
     for i in range(n - 1, -1, -1):
         A, f = work.A[i], work.wrench[i]
-        for d in range(model.body_vadr[i + 1] - 1, model.body_vadr[i] - 1, -1):
+        q, first = model.body_parent[i], model.body_vadr[i]
+        for d in range(model.body_vadr[i + 1] - 1, first - 1, -1):
             S, U = work.S2[d], work.U[d]
+            s0, s1, s2, s3, s4, s5 = S[0], S[1], S[2], S[3], S[4], S[5]
             for k in range(6):
                 U[k] = (
-                    S[0] * A[k] + S[1] * A[6 + k] + S[2] * A[12 + k]
-                    + S[3] * A[18 + k] + S[4] * A[24 + k] + S[5] * A[30 + k]
-                )  # fmt: skip
-            D = model.dof_armature[d]
-            z = p[d]
-            for k in range(6):
-                D += S[k] * U[k]
-                z -= S[k] * f[k]
+                    (s0 * A[k] + s1 * A[6 + k]) + (s2 * A[12 + k] + s3 * A[18 + k]) + (s4 * A[24 + k] + s5 * A[30 + k])
+                )
+            D = model.dof_armature[d] + dot_six(S, U)
+            z = p[d] - dot_six(S, f)
             if not D > 0.0:
                 return False
             D = 1.0 / D
             z *= D
             work.z[d], work.residual[d] = z, D
             for r in range(6):
-                c = D * U[r]
                 f[r] += U[r] * z
-                for k in range(6):
-                    A[6 * r + k] -= c * U[k]
-        q = model.body_parent[i]
+            if d == first and q >= 0:
+                _add_rest(A, U, D, work.A[q])
+            elif d > first:
+                for r in range(6):
+                    for k in range(6):
+                        A[6 * r + k] -= D * U[r] * U[k]
         if q >= 0:
             for k in range(6):
                 work.wrench[q, k] += f[k]
-            for k in range(36):
-                work.A[q, k] += A[k]
+            if first == model.body_vadr[i + 1]:
+                for k in range(36):
+                    work.A[q, k] += A[k]
     for i in range(n):
         V, q = work.twist[i], model.body_parent[i]
         for k in range(6):
             V[k] = work.twist[q, k] if q >= 0 else 0.0
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            S, U = work.S2[d], work.U[d]
-            t = 0.0
-            for k in range(6):
-                t += U[k] * V[k]
-            t = work.z[d] - work.residual[d] * t
+            S = work.S2[d]
+            t = work.z[d] - work.residual[d] * dot_six(work.U[d], V)
             out[d] = t
             for k in range(6):
                 V[k] += S[k] * t

@@ -65,7 +65,7 @@ class Work(NamedTuple):
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] see choice.py
-    far: Matrix  # (nground, 24) see contacts/far.py
+    far: Matrix  # (nground, 37) see contacts/far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables, see contacts/contact.py

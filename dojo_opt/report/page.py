@@ -14,12 +14,19 @@ from dojo_opt.report.result import Cell, Report, Table, finite, shown, verdict
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 70em; margin: 2em auto; padding: 0 1em; color: #222; }
 table { border-collapse: collapse; margin: 1em 0; font-variant-numeric: tabular-nums; }
+table { display: block; overflow-x: auto; }
 th, td { border-bottom: 1px solid #ddd; padding: .2em .8em; text-align: left; vertical-align: top; }
 th { border-bottom: 2px solid #888; }
+.num { white-space: nowrap; }
+details { margin: 1em 0; } summary { cursor: pointer; font-weight: bold; }
 .yes { color: #17632b; } .no { color: #a01313; font-weight: bold; }
 img { max-width: 100%; } .small { color: #666; font-size: 13px; white-space: pre-line; }
 code { background: #f3f3f3; padding: 0 .3em; }
 """
+
+
+_LONG = 20  # rows beyond which a table is folded
+_SHORT = 20  # characters of a number with its unit or bound: not broken into lines
 
 
 def write_page(reports: Mapping[str, Report], folder: Path, command: str) -> list[Path]:
@@ -94,27 +101,40 @@ def _markdown_table(table: Table) -> list[str]:
 
 
 def _html(reports: Mapping[str, Report], pictures: Mapping[str, bytes], command: str) -> str:
+    first = next(iter(reports.values()))
     parts = ["<h1>dojo-opt: what it measures here</h1>", f"<p><code>{escape(command)}</code></p>"]
-    parts += [_html_table(_overview(reports))]
+    parts.append(f'<p class="small">{escape(_facts(first))}</p>')
+    overview = _html_table(_overview(reports))
+    for name in map(escape, reports):
+        overview = overview.replace(f"<td>{name}</td>", f'<td><a href="#{name}">{name}</a></td>', 1)
+    parts.append(overview)
     for name, report in reports.items():
         parts += [f'<h2 id="{escape(name)}">{escape(report.title)}</h2>', f"<p>{escape(report.summary)}</p>"]
         if name in pictures:
             data = base64.b64encode(pictures[name]).decode("ascii")
             parts.append(f'<img alt="{escape(report.title)}" src="data:image/png;base64,{data}">')
-        for table in _tables(report):
-            parts += [f"<h3>{escape(table.title)}</h3>"] if table.title else []
-            parts += [_html_table(table)]
-            parts += [f'<p class="small">{escape(table.note)}</p>'] if table.note else []
+        parts += [_html_section(table) for table in _tables(report)]
         parts += [f"<p>{escape(note)}</p>" for note in report.notes]
         parts.append(f'<p class="small"><code>{escape(report.command)}</code>; {escape(_facts(report))}</p>')
     head = f'<meta charset="utf-8"><title>dojo-opt report</title><style>{_STYLE}</style>'
     return f'<!DOCTYPE html><html lang="en"><head>{head}</head><body>{"".join(parts)}</body></html>\n'
 
 
+def _html_section(table: Table) -> str:
+    """A table under its title; a long one is shown when asked for."""
+    note = f'<p class="small">{escape(table.note)}</p>' if table.note else ""
+    if table.title and len(table.rows) > _LONG:
+        summary = f"<summary>{escape(table.title)} ({len(table.rows)} rows)</summary>"
+        return f"<details>{summary}{_html_table(table)}{note}</details>"
+    return (f"<h3>{escape(table.title)}</h3>" if table.title else "") + _html_table(table) + note
+
+
 def _html_table(table: Table) -> str:
     def cell(value: Cell) -> str:
         text = shown(value)
         mark = {"yes": ' class="yes"', "NO": ' class="no"'}.get(text, "")
+        if not mark and len(text) < _SHORT and any(c.isdigit() for c in text):
+            mark = ' class="num"'
         return f"<td{mark}>{escape(text)}</td>"
 
     head = "".join(f"<th>{escape(name)}</th>" for name in table.header)

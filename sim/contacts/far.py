@@ -15,13 +15,14 @@ cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn
 
 The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
 solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
-iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`moved` bounds it,
-cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution makes the
-cluster near, and the step is solved again.
+iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`changes` of
+far_impulses.py bounds it, cluster by cluster, from the motion of the body since they were evaluated). A gap below a at
+the solution makes the cluster near, and the step is solved again.
 
 Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(wrench about O) per gap, slip
 and turn; and of the body when the law was evaluated, 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular
-velocity; 17:23 force and moment about the centre of mass, 23 the smallest gap (0: not evaluated).
+velocity; 17:23 force and moment about the centre of mass, 23 the smallest gap (0: not evaluated), 24 the largest
+height of a plane, 25:36 arms of the force (far_impulses.py), 36 whether they have turned since the law was evaluated.
 Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: largest distance from the centre of mass,
 5 M, 6 largest friction, 7 T.
 """
@@ -38,8 +39,17 @@ from solvers.jit import kernel
 
 
 @kernel
-def cluster_gap(model: Model, work: Work, c: int, third: bool) -> float:
-    """Lower bound of the gaps of the cluster that begins at contact c, at configuration 3 or 2."""
+def highest(model: Model, c: int) -> float:
+    """Largest height of the planes of the cluster that begins at contact c: they may rise while a ground is learnt."""
+    height = model.contact_height[c]
+    for k in range(c + 1, model.cluster_end[c]):
+        height = max(height, model.contact_height[k])
+    return height
+
+
+@kernel
+def cluster_gap(model: Model, work: Work, c: int, height: float, third: bool) -> float:
+    """Lower bound of the gaps of the cluster that begins at contact c, at configuration 3 or 2.   height: `highest`."""
     if model.contact_terrain[c] > 0:
         return terrain_gap(model, work, c, third)
     i = model.contact_body[c]
@@ -47,9 +57,6 @@ def cluster_gap(model: Model, work: Work, c: int, third: bool) -> float:
     rot = work.rot3 if third else work.rot2
     n = model.contact_frame[c]
     p = model.cluster[c]
-    height = model.contact_height[c]
-    for k in range(c + 1, model.cluster_end[c]):
-        height = max(height, model.contact_height[k])
     x, y, z = rotate(rot, i, p[0], p[1], p[2])
     return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[3]
 
@@ -66,9 +73,8 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
     work.counts[0] = 0
     work.counts[1] = 0
-    for c in range(count):
-        if model.cluster_end[c] == 0:
-            continue  # not the first of its cluster
+    c = 0
+    while c < count:
         i = model.contact_body[c]
         n = model.contact_frame[c]
         most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
@@ -84,6 +90,7 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
         if a == 0.0 or not known:
             work.far[c, 23] = 0.0
         _enlist(model, work, c)
+        c = model.cluster_end[c]
     work.counts[2] = work.counts[0]
     enlist_pairs(model, work)
     work.far_law[1] = options.tolerance / max(1, work.counts[1])
@@ -112,7 +119,9 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
     travel = 0.0
     for k in range(3):
         travel += abs(work.move_in[i, k]) + 2.0 * model.cluster[c, 4] * abs(work.turn_in[i, 1 + k])
-    return 0.5 * (cluster_gap(model, work, c, False) - travel)
+    height = highest(model, c)
+    work.far[c, 24] = height
+    return 0.5 * (cluster_gap(model, work, c, height, False) - travel)
 
 
 @kernel
@@ -128,7 +137,7 @@ def came_near(model: Model, work: Work) -> bool:
     found = pairs_came_near(model, work)
     for m in range(work.counts[1]):
         c = work.far_first[m]
-        if cluster_gap(model, work, c, True) < work.far[c, 0]:
+        if cluster_gap(model, work, c, work.far[c, 24], True) < work.far[c, 0]:
             found = True
             work.far[c, 0] = 0.0
             work.far[c, 23] = 0.0

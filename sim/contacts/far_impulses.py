@@ -1,4 +1,11 @@
-"""Impulses of far contacts (far.py): the law of the central path, evaluated anew when the motion has changed it."""
+"""Impulses of far contacts (far.py): the law of the central path, evaluated anew when the motion has changed it.
+
+Most of what changes is the moment, for arms turn with the body. That is known exactly: of a cluster whose law still
+holds only the arms are turned, at a cost that does not depend on the number of its contacts.
+
+Columns 25:36 of `far`:  25:28, 28:31, 31:34 sums of p times the impulses along n, t1, t2 (p: contact points, in axes of
+the body), 34:36 sums of radius times impulse along t1, t2.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +24,12 @@ _LINEAR = int(Law.LINEAR)
 
 
 @kernel
-def moved(model: Model, work: Work, h: float, c: int) -> bool:
-    """Whether the impulses of a far cluster may have changed by more than its share of the tolerance."""
+def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
+    """Bounds of the change of a far cluster's wrench since its law was evaluated: by that law, by turned arms."""
     i = model.contact_body[c]
     row = work.far[c]
     if row[23] == 0.0:
-        return True
+        return 1e300, 0.0
     dx = 0.0
     dv = 0.0
     dw = 0.0
@@ -39,21 +46,25 @@ def moved(model: Model, work: Work, h: float, c: int) -> bool:
     arm = model.cluster[c, 4]
     turn = ANGLE * dq
     if dx + arm * turn > NEARER * row[23]:
-        return True
-    change = row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)) + row[3] * turn
-    return not change <= work.far_law[1]
+        return 1e300, 0.0
+    return row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)), row[3] * turn
 
 
 @kernel
 def far_impulses(model: Model, work: Work, h: float) -> None:
-    """Impulses of the far clusters at configuration 3, evaluated again where they may have changed."""
+    """Impulses of the far clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
+    share = work.far_law[1]
     for m in range(work.counts[1]):
         c = work.far_first[m]
-        if moved(model, work, h, c):
-            if model.contact_terrain[c] > 0:
+        law, arms = changes(model, work, h, c)
+        if model.contact_terrain[c] > 0:
+            if not law + arms <= share:
                 evaluate_on_terrain(model, work, h, c)
-            else:
-                _evaluate(model, work, h, c)
+        elif not law <= share:
+            _evaluate(model, work, h, c)
+        elif work.far[c, 36] > 0.0 or law + arms > share:
+            work.far[c, 36] = 1.0
+            turn_arms(model, work, c)
 
 
 @inlined
@@ -65,11 +76,29 @@ def _cone_impulse(mu: float, kappa: float, gap: float, x: float, y: float) -> tu
 
 
 @kernel
+def turn_arms(model: Model, work: Work, c: int) -> None:
+    """far[c, 20:23], the moment of the impulses of the last evaluation, at configuration 3:
+
+    (R sum gamma p) x n + (R sum beta p) x t - sum rho beta n x t
+    """
+    i = model.contact_body[c]
+    row = work.far[c]
+    f = model.contact_frame[c]
+    R = work.rot3
+    nx, ny, nz = cross(*rotate(R, i, row[25], row[26], row[27]), f[0], f[1], f[2])
+    ax, ay, az = cross(*rotate(R, i, row[28], row[29], row[30]), f[3], f[4], f[5])
+    bx, by, bz = cross(*rotate(R, i, row[31], row[32], row[33]), f[6], f[7], f[8])
+    # n x t1 = t2, n x t2 = -t1
+    row[20] = nx + ax + bx - row[34] * f[6] + row[35] * f[3]
+    row[21] = ny + ay + by - row[34] * f[7] + row[35] * f[4]
+    row[22] = nz + az + bz - row[34] * f[8] + row[35] * f[5]
+
+
+@kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
-    """far[c, 4:24] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
+    """far[c, 4:37] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
 
     gap    n.x3 - height + (R^T n).p - rho              slip    t.v + (R^T (t x omega)).p - rho (t x omega).n
-    moment (R sum gamma p) x n + (R sum beta p) x t - sum rho beta n x t
     """
     i = model.contact_body[c]
     row = work.far[c]
@@ -115,15 +144,11 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     bound_changes(model, work, c, (1.0 - NEARER) * least)
     turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
     row[3] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
-    nx, ny, nz = cross(*rotate(R, i, N0, N1, N2), f[0], f[1], f[2])
-    ax, ay, az = cross(*rotate(R, i, X0, X1, X2), f[3], f[4], f[5])
-    bx, by, bz = cross(*rotate(R, i, Y0, Y1, Y2), f[6], f[7], f[8])
     for k in range(3):
         row[17 + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
-    # n x t1 = t2, n x t2 = -t1
-    row[20] = nx + ax + bx - rX * f[6] + rY * f[3]
-    row[21] = ny + ay + by - rX * f[7] + rY * f[4]
-    row[22] = nz + az + bz - rX * f[8] + rY * f[5]
+    row[25], row[26], row[27], row[28], row[29], row[30] = N0, N1, N2, X0, X1, X2
+    row[31], row[32], row[33], row[34], row[35], row[36] = Y0, Y1, Y2, rX, rY, 0.0
+    turn_arms(model, work, c)
 
 
 @kernel

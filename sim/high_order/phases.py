@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from sim.contacts.far import cluster_gap
+from sim.contacts.far import cluster_gap, highest
 from sim.high_order.runge_kutta import Scheme, advance, begin
 from sim.late import report_contacts
 from sim.layout import model_view, work_view
@@ -75,7 +75,8 @@ def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> flo
     total = 0.0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0:
-            row, gap, speed = work.far[c], cluster_gap(model, work, c, False), _speed(model, work, c)
+            row, speed = work.far[c], _speed(model, work, c)
+            gap = cluster_gap(model, work, c, highest(model, c), False)
             g = _least(gap, speed, row[0], row[1], h)
             row[0], row[1] = gap, speed
             total = total + (model.cluster_end[c] - c) * kappa / g if g > 0.0 else 1e300

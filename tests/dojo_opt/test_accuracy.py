@@ -100,7 +100,10 @@ def test_the_largest_step_that_is_good_enough_is_chosen() -> None:
     assert str(trials[2]) == "h = 10 ms, kappa 1e-05, tolerance 1e-08: 0.9 mm after 0.1 s, 250 times real time"
 
 
-@pytest.mark.parametrize("mechanism", [dojo.models.quadruped(), dojo.models.cartpole(), dojo.models.raiberthopper()])
+@pytest.mark.parametrize(
+    "mechanism",
+    [dojo.models.quadruped(), dojo.models.cartpole(), dojo.models.raiberthopper(), dojo.models.walker()],
+)
 def test_starts_are_reproducible_within_limits_and_above_ground(mechanism: dojo.Mechanism) -> None:
     q, v = start.start(mechanism)
     again = start.start(mechanism)
@@ -135,9 +138,23 @@ def test_a_robot_without_contacts_and_limits_is_measured_too() -> None:
 
 
 @pytest.mark.slow
+def test_a_robot_that_the_reference_does_not_know_is_compared_with_itself() -> None:
+    report = study("accuracy", quick=True, mechanism=dojo.models.orbital(2)).run(Progress())
+    assert report.rows[0].name == "recommended time step"
+    assert report.notes == ["not compared with an independent ODE: that has no joint with two rotations ('joint_1')"]
+
+
+def test_what_the_reference_does_not_know_is_named() -> None:
+    assert scenes.not_in_reference(dojo.models.fourbar()).startswith("loop (")
+    assert scenes.not_in_reference(dojo.models.quadruped()) == ""
+
+
+@pytest.mark.slow
 def test_the_study_runs_quickly() -> None:
     report = Accuracy(quick=True).run(Progress())
     assert report.figure is not None and len(report.tables) >= 6
     drift = {row.name: row.value for row in report.rows if "drift" in row.name}
     assert all(value < 1e-12 for name, value in drift.items() if "order" in name)
     assert set(report.details) >= {"free body", "tree of 13 bodies", "pendulum of 2"}
+    advice = report.tables[0]
+    assert advice.title.startswith("Recommended") and 0.1 < float(advice.rows[0][2]) < 100.0

@@ -26,7 +26,7 @@ def test_accelerations_are_those_of_mujoco(kind: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     mech = chain_with(kind, False)
     # MuJoCo's ball spring pulls with k angle, ours with 2 k sin(angle / 2)
-    joints = [replace(j, spring=0.0, rest=0.0) if j.nrot == 3 else j for j in mech.joints]
+    joints = [replace(j, spring=0.0, rest=0.0) if j.nrot == 3 else replace(j, armature=0.2) for j in mech.joints]
     mech = dojo.Mechanism(mech.bodies, joints)
     q, v = random_state(np.random.default_rng(8), mech, speed=2.0)
     model = pack(mech)

@@ -116,8 +116,30 @@ def test_drake_gets_the_same_robot():
     step = DrakeStep(sim.model, h, "Lagged")
     step.settle(x, u, 20)
     ours = sim.rollout(x, np.tile(u, (20, 1))).x[-1]
-    np.testing.assert_allclose(step._x, step.state(ours), atol=2e-2 * 20 * h)
+    np.testing.assert_allclose(step.x, step.state(ours), atol=2e-2 * 20 * h)
     assert relative_error(step.autodiff()(), step.reference().value) < 1e-8
+
+
+@pytest.mark.parametrize("which", [1, 4])  # pulled off, sliding at an angle
+def test_drake_carries_the_derivative_that_its_motion_has(which):
+    pytest.importorskip("pydrake")
+    from dojo_opt.report.engines.drake import Drake
+    from dojo_opt.report.gradients.drake_motion import carried
+
+    motion = sliding.motions()[which]
+    found, expected = carried(motion, 0.01, "Tamsi"), sliding.differenced(Drake("Tamsi"), motion, 0.01, 1e-5)
+    assert found.way == pytest.approx(expected.way, rel=1e-6)
+    assert found.value == pytest.approx(expected.value, rel=1e-4)
+
+
+def test_drake_touches_down_with_the_slope_of_its_own_curve():
+    pytest.importorskip("pydrake")
+    from dojo_opt.report.gradients.drake_motion import touchdown as drake
+
+    heights = np.array([-2e-3, -2e-3 + 1e-7, touchdown.TOUCH + 0.05])
+    curve = drake(heights, "Lagged")
+    assert curve.gradient[0] == pytest.approx(np.diff(curve.velocity[:2])[0] / 1e-7, rel=1e-3)
+    assert curve.gradient[2] == 0.0 and curve.velocity[2] == pytest.approx(-1.0 - 9.81 * touchdown.H)
 
 
 def test_what_drake_cannot_be_told_is_refused():

@@ -65,6 +65,15 @@ def test_the_page_holds_pictures_tables_and_numbers(tmp_path: Path) -> None:
     assert "![A study](one.png)" in markdown and "a \\| b" in markdown and "1 of 3" in markdown
 
 
+def test_long_tables_are_folded_and_the_overview_leads_to_the_studies(tmp_path: Path) -> None:
+    long = report()
+    long.tables.append(Table("long", ("k",), [(k,) for k in range(40)]))
+    write_page({"one": long}, tmp_path, "")
+    text = (tmp_path / "report.html").read_text()
+    assert text.count("<details>") == 1 and "<summary>long (40 rows)</summary>" in text
+    assert 'href="#one"' in text and 'id="one"' in text
+
+
 def test_text_shows_bars_and_tables() -> None:
     text = report().as_text()
     assert "<= 0.01" in text and ">= 2" in text and "FAILED" in text and "of energy" in text

@@ -132,6 +132,23 @@ def test_far_contacts_push_by_the_law_of_the_central_path():
     assert push.sum() > 100 * TOLERANCE * steps / 50, "nothing to be seen"
 
 
+def test_arms_of_far_impulses_turn_with_a_body_whose_law_still_holds():
+    """Angular momentum changes by the moment of the impulses where they act, of contacts far to one side of a body."""
+    kappa, steps = 1e-6, 40
+    points = [(1.0, 0.1 * y, 0.1 * z) for y in range(5) for z in range(4)]
+    contacts = [dojo.Contact("block", p, friction=0.2, height=-90.0, name=str(p)) for p in points]
+    mech = dataclasses.replace(block(gravity=np.zeros(3)), contacts=contacts)
+    sim = dojo.Simulator(mech, time_step=0.02, kappa=kappa, tolerance=TOLERANCE)
+    turning = np.r_[np.zeros(3), 1.0, np.zeros(3)], np.r_[np.zeros(4), 1.0, 0.0]
+    path = sim.rollout(sim.start(*turning), np.zeros((steps, 0)))
+    assert far(sim) == len(points)
+    assert sim._calls.last().far[0, 36] == 1.0, "evaluated again instead"
+    moment = np.cross(path.contacts.point, path.contacts.impulse).sum(axis=1)
+    angular = np.array([sim.momentum(state)[1] for state in path.x])
+    np.testing.assert_allclose(angular[-1] - angular[0], moment.sum(axis=0), rtol=0, atol=5.0 * TOLERANCE)
+    assert np.abs((moment - moment[0]).sum(axis=0)).max() > 20.0 * TOLERANCE, "arms have not turned enough to be seen"
+
+
 def test_every_contact_is_in_one_cluster(rng):
     """Balls of the clusters hold their contacts; bodies and directions do not mix."""
     mech = chain("spherical", 2)

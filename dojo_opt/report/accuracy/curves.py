@@ -16,8 +16,8 @@ from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
-STEPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4)
-COARSE = (0.2,)  # [s] for ours of higher order besides: an evaluation less often, at the time of a peer's largest step
+STEPS = (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.002, 0.001, 5e-4, 2.5e-4, 2e-4, 1e-4)  # [s] whole parts of .1
+BETWEEN = (0.2, 0.1 / 3)  # [s] for ours of higher order besides: points at the times of a peer's largest steps
 FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse; see `floors`
 LOST = 1.0  # of the energy, relative to all there is: such a run is lost, whether the engine knows it or not
 
@@ -48,19 +48,20 @@ def ours(order: int, rounds: int) -> Ours:
 def measure(scene: Scene, engines: Sequence[Engine], steps: Sequence[float], limit: float) -> Curves:
     """Errors of the engines from the largest time step down to the first that would take longer than `limit` [s].
 
-    Ours of order 2, whose momentum has a bar at every step, runs with all of them where momentum is conserved.
+    Engines take turns at every step, so that a busy minute of the machine hits all of them alike. Ours of order 2,
+    whose momentum has a bar at every step, runs with all of them where momentum is conserved.
     """
     exact = scene.exact()
-    curves: Curves = {}
-    for engine in engines:
-        points: list[Point] = []
-        every = isinstance(engine, Ours) and engine.order == 2 and scene.floating
-        coarse = COARSE if isinstance(engine, Ours) and engine.order > 2 else ()
-        for h in (*coarse, *steps):
-            if not every and points and points[-1].seconds * points[-1].time_step / h > limit:
-                break
-            points.append(point(scene, engine, h, exact))
-        curves[engine.name] = points
+    curves: Curves = {engine.name: [] for engine in engines}
+    between = [h for h in BETWEEN if abs(scene.duration / (SAMPLES * h) % 1.0 - 0.5) > 0.5 - 1e-9]
+    for h in sorted({*between, *steps}, reverse=True):
+        for engine in engines:
+            points, order = curves[engine.name], engine.order if isinstance(engine, Ours) else 0
+            if h not in steps and order <= 2:
+                continue
+            every = order == 2 and scene.floating
+            if every or not points or points[-1].seconds * points[-1].time_step / h <= limit:
+                points.append(point(scene, engine, h, exact))
     return curves
 
 

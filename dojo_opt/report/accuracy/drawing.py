@@ -9,6 +9,7 @@ import numpy as np
 
 from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy.curves import Curves
+from dojo_opt.report.palette import is_ours, palette
 
 PANELS = (  # scene, what, title
     ("free body", "attitude", "free body: attitude [rad]"),
@@ -19,13 +20,6 @@ PANELS = (  # scene, what, title
     ("pendulum of 50", "position", "pendulum of 50 links: position [m]"),
     ("pendulum of 2", "position", "pendulum of 2 links: position [m]"),
 )
-_OURS = {
-    "dojo-opt": "#9ecae1",
-    "dojo-opt order 4": "#4292c6",
-    "dojo-opt order 6": "#08519c",
-    "dojo-opt order 8": "#08306b",
-}
-_PEERS = ("#e6550d", "#31a354", "#756bb1", "#dd1c77", "#636363", "#b8860b", "#17becf", "#8c564b", "#bcbd22")
 
 
 def figure(measured: Mapping[str, Curves], panels: Sequence[tuple[str, str, str]] = PANELS) -> Any:
@@ -37,14 +31,12 @@ def figure(measured: Mapping[str, Curves], panels: Sequence[tuple[str, str, str]
     rows = -(-len(panels) // columns)
     out = Figure(figsize=(4.6 * columns, 3.6 * rows + 0.8), layout="constrained")
     axes = np.atleast_1d(out.subplots(rows, columns)).ravel()
-    names: dict[str, str] = {}
-    for name in dict.fromkeys(name for curves in measured.values() for name in curves):
-        names[name] = _OURS.get(name) or _PEERS[sum(n not in _OURS for n in names) % len(_PEERS)]
+    names = palette(name for curves in measured.values() for name in curves)
     for axis, (scene, what, title) in zip(axes, panels, strict=False):
         for name, points in measured[scene].items():
             good = [p for p in points if np.isfinite(p.errors[what]) and p.errors[what] < 10.0]
             x, y = [1e3 * p.seconds for p in good], [max(p.errors[what], 1e-16) for p in good]
-            ours = name.startswith("dojo-opt")
+            ours = is_ours(name)
             style: dict[str, Any] = {
                 "lw": 2.0 if ours else 1.2,
                 "ls": "-" if ours else "--",

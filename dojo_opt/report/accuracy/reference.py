@@ -23,7 +23,8 @@ _TOLERANCE = 1e-12
 class Motion:
     """q'' of a tree without contacts, limits and loops: M(q) v' = forces - M-free accelerations, in NumPy.
 
-    Springs, dampers and inputs of joints are represented; inputs on bodies are not, and must be zero.
+    Springs, dampers, armatures and inputs of joints are represented; inputs on bodies are not, and must be zero; joints
+    with two rotations, loops and gears are not (scenes.not_in_reference).
     """
 
     def __init__(self, model: Model) -> None:
@@ -43,7 +44,7 @@ class Motion:
         R, x = np.empty((n, 3, 3)), np.empty((n, 3))
         w, acc, alpha = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         lin, ang = np.zeros((n, 3, self.nv)), np.zeros((n, 3, self.nv))
-        M, f = np.zeros((self.nv, self.nv)), self._joint_forces(q, v, u)
+        M, f = np.diag(model.dof_armature), self._joint_forces(q, v, u)
         for i in range(n):
             p = int(model.body_parent[i])
             arm = model.joint_parent_point[i]

@@ -23,6 +23,7 @@ Floats = NDArray[np.float64]
 _PIECE, _PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
 _DURATION = _PIECE * _PIECES
 _TARGET = 1e-3  # [m] error that is asked for after a piece
+_CONVERGED = 1e-2  # [m] beyond which there is no motion to compare with
 _STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
 _KAPPAS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
 _SHARP = ((1e-4, 1e-10), (2e-4, 1e-10), (5e-4, 1e-10), (5e-4, 1e-9), (1e-3, 1e-8))  # steps, kappas to converge with
@@ -66,10 +67,16 @@ def recommend(mechanism: Mechanism, quick: bool, progress: Progress) -> Report:
         "contacts and limits, uncut, it is an independent ODE."
     )
     q, v = start(mechanism)
-    hard = bool(mechanism.contacts) or scenes.without_contact(mechanism).joints != mechanism.joints
-    parts: list[tuple[str, Any]] = [("smooth motion", lambda: _smooth(report, mechanism, q, v, quick))]
-    if hard:
-        parts.insert(0, ("time steps, kappas", lambda: _hard(report, mechanism, q, v, quick)))
+    smooth = scenes.without_contact(mechanism)
+    hard = bool(mechanism.contacts or mechanism.collisions) or smooth.joints != mechanism.joints
+    unknown = scenes.not_in_reference(mechanism)
+    parts: list[tuple[str, Any]] = []
+    if hard or unknown:
+        parts.append(("time steps, kappas", lambda: _hard(report, mechanism, q, v, quick)))
+    if unknown:
+        report.notes.append(f"not compared with an independent ODE: that has no {unknown}")
+    else:
+        parts.append(("smooth motion", lambda: _smooth(report, mechanism, q, v, quick)))
     for part in progress(parts, "accuracy"):
         part()
     return report
@@ -114,8 +121,18 @@ def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float,
     return Trial(h, kappa, tolerance, float(np.mean(errors)), seconds, "")
 
 
-def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
-    """Trials with contacts and limits, and the recommendation."""
+class Advice(NamedTuple):
+    """What a mechanism needs, and the trials behind it."""
+
+    best: Trial
+    trials: list[Trial]
+    target: float  # [m]
+    own: float  # [m] error of the converged motion, against twice its step
+    exact: Converged
+
+
+def advise(mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> Advice:
+    """Trials of time steps and kappas from (q, v), with contacts and limits.   ValueError: none can be simulated."""
     exact = _converged(mechanism, q, v, quick)
     own = _trial(mechanism, exact, (2.0 * exact.time_step, exact.kappa, 1e-8), 0).error
     target = max(_TARGET, 2.0 * own) if np.isfinite(own) else _TARGET
@@ -123,9 +140,15 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
     steps = _STEPS[1::2] if quick else _STEPS
     kappas = (1e-5, 1e-8) if quick else _KAPPAS
     trials = [_trial(mechanism, exact, (h, kappa, 1e-8), rounds) for h in steps for kappa in kappas]
-    best = choose(trials, target)
+    return Advice(choose(trials, target), trials, target, own, exact)
+
+
+def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> None:
+    """Trials with contacts and limits, and the recommendation."""
+    best, trials, target, own, exact = advise(mechanism, q, v, quick)
     tolerances = [
-        _trial(mechanism, exact, (best.time_step, best.kappa, tolerance), rounds) for tolerance in _TOLERANCES
+        _trial(mechanism, exact, (best.time_step, best.kappa, tolerance), 1 if quick else 3)
+        for tolerance in _TOLERANCES
     ]
     report.rows += [
         Row("recommended time step", 1e3 * best.time_step, "ms", note=str(best)),
@@ -136,6 +159,7 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
             "the converged motion, against twice its step",
             1e3 * own,
             "mm",
+            1e3 * _CONVERGED,
             note=f"h = {1e3 * exact.time_step:g} ms, kappa {exact.kappa:g}; asked for is no less than twice this",
         ),
     ]
@@ -145,7 +169,7 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
     header = ["step, ms", "kappa", "tolerance", "error, mm", "times real time", "ended early"]
     report.tables.append(Table("With contacts and limits", header, rows, note="the last rows vary the tolerance"))
     report.details["trials"] = [{**vars(t), "realtime": t.realtime} for t in (*trials, *tolerances)]
-    report.figure = _figure(mechanism.name, trials, own, target)
+    report.figure = _figure(mechanism.name, best, trials, own, target)
 
 
 def choose(trials: Sequence[Trial], target: float = _TARGET) -> Trial:
@@ -192,7 +216,7 @@ def _smooth(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: b
         report.figure = drawing.figure({"": measured}, panels)
 
 
-def _figure(name: str, trials: Sequence[Trial], own: float, target: float) -> Any:
+def _figure(name: str, best: Trial, trials: Sequence[Trial], own: float, target: float) -> Any:
     """Error against processor time, one line per kappa."""
     from matplotlib.figure import Figure
 
@@ -202,7 +226,16 @@ def _figure(name: str, trials: Sequence[Trial], own: float, target: float) -> An
         line = [t for t in trials if t.kappa == kappa and np.isfinite(t.error)]
         axis.loglog([1e3 * t.seconds for t in line], [1e3 * t.error for t in line], "o-", label=f"kappa {kappa:g}")
         for t in line:
-            axis.annotate(f"{1e3 * t.time_step:g}", (1e3 * t.seconds, 1e3 * t.error), fontsize=7, alpha=0.6)
+            axis.annotate(
+                f"{1e3 * t.time_step:g}",
+                (1e3 * t.seconds, 1e3 * t.error),
+                (3, 4),
+                textcoords="offset points",
+                fontsize=7,
+                alpha=0.6,
+            )
+    label = f"recommended: {1e3 * best.time_step:g} ms, kappa {best.kappa:g}"
+    axis.plot(1e3 * best.seconds, 1e3 * best.error, "o", ms=13, mfc="none", mec="k", mew=1.5, label=label)
     axis.axhline(1e3 * target, color="k", lw=0.8, ls=":", label="asked for")
     if np.isfinite(own) and own > 0.0:
         axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="the converged motion itself")

@@ -116,9 +116,23 @@ def smooth(mechanism: Mechanism, q: Floats, v: Floats, duration: float) -> Scene
 
 
 def without_contact(mechanism: Mechanism) -> Mechanism:
-    """The same without contacts and limits."""
+    """The same without contacts, collisions and limits."""
     joints = [replace(joint, limits=None) for joint in mechanism.joints]
-    return replace(mechanism, contacts=(), joints=joints)
+    return replace(mechanism, contacts=(), collisions=(), joints=joints)
+
+
+def not_in_reference(mechanism: Mechanism) -> str:
+    """What `Motion` does not represent of a mechanism without contacts; empty if it is all there."""
+    model = _model(replace(mechanism, contacts=(), collisions=()))
+    swings = [mechanism.joint_names[i] for i in np.flatnonzero(model.joint_nrot == 2)]
+    for what, names in (
+        ("loop", [joint.name for joint in mechanism.loops]),
+        ("gear", [gear.name for gear in mechanism.gears]),
+        ("joint with two rotations", swings),
+    ):
+        if names:
+            return f"{what} ({', '.join(map(repr, names))})"
+    return ""
 
 
 def _model(mech: Mechanism) -> Any:

@@ -11,10 +11,15 @@ from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
+_ABOVE = 0.02  # [m] above the ground
+_SHIFT = 1e-3  # [m] by which a base is moved to see what that does
+_STEEP = 0.1  # least rise of the lowest contact over the way of the base
+
 
 def start(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """(q, v): the neutral pose, joints turned by about 0.2 rad within their limits and moving at 1 rad/s, a floating
-    base at 0.3 m/s and 0.5 rad/s, its lowest contact 2 cm above its ground. The same for everybody.
+    base at 0.3 m/s and 0.5 rad/s; a base that translates has its lowest contact 2 cm above its ground. The same for
+    everybody.
     """
     sim = Simulator(mechanism, time_step=1e-3)
     rng = np.random.default_rng(0)
@@ -28,13 +33,26 @@ def start(mechanism: Mechanism) -> tuple[Floats, Floats]:
     q = np.array(neutral)
     for share in (1.0, 0.5, 0.25, 0.1, 0.0):
         q = _inside(sim, sim.integrate(np.concatenate([neutral, np.zeros(sim.nv)]), share * dx)[: sim.nq])
-        lowest = min(gaps(sim, q), default=0.02)
-        if mechanism.joints[0].kind == "floating":
-            q[2] += 0.02 - lowest
-            return q, v
-        if lowest >= 0.0:
+        raised = _raised(sim, q)
+        if raised is not None:
+            return raised, v
+        if min(gaps(sim, q), default=0.0) >= 0.0:
             break
     return q, v
+
+
+def _raised(sim: Simulator, q: Floats) -> Floats | None:
+    """q with the base moved along the translation that raises its lowest contact most; None where none of them does."""
+    lowest = min(gaps(sim, q), default=_ABOVE)
+    out, moves = np.array(q), int(sim.model.joint_ntrans[0])
+    if sim.ncontact == 0 or moves == 0:
+        return out if moves == 3 else None
+    slopes = [(min(gaps(sim, q + _SHIFT * e)) - lowest) / _SHIFT for e in np.eye(len(q))[:moves]]
+    best = int(np.argmax(np.abs(slopes)))
+    if abs(slopes[best]) < _STEEP:
+        return None
+    out[best] += (_ABOVE - lowest) / slopes[best]
+    return out if np.allclose(out, _inside(sim, out)) else None
 
 
 def _inside(sim: Simulator, q: Floats) -> Floats:

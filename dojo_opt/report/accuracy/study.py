@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.report.accuracy import curves, drawing, robot, scenes
+from dojo_opt.report.accuracy import curves, drawing, robot, robots, scenes
 from dojo_opt.report.accuracy.curves import Curves
 from dojo_opt.report.accuracy.scenes import Scene
 from dojo_opt.report.engines import Engine
@@ -53,6 +53,8 @@ class Accuracy:
         _ratio_table(report)
         for part in progress([("short pieces", _pieces), ("long runs", _long_runs)], "accuracy"):
             part(report, everyone, self.quick)
+        for advice in progress([("robots", robots.recommendations)], "accuracy"):
+            advice(report, self.quick)
         report.figure = drawing.figure(measured)
         report.notes.append(
             "processor time is that of the steps: what a call with nothing to do takes from Python is taken off, of "

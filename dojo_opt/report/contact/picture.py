@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from dojo_opt.plots.axes import finish
+from dojo_opt.report.palette import is_ours, palette
 
 
 def picture(results: dict[str, dict[str, Any]], curve: dict[str, list[float]], step: str) -> Figure:
@@ -60,12 +60,11 @@ def _bars(ax: Any, results: dict[str, dict[str, Any]], step: str) -> None:
 
 
 def _lines(ax: Any, results: dict[str, dict[str, Any]], key: str, xlabel: str, ylabel: str) -> None:
-    colours = colormaps["tab20"]
-    for k, (name, found) in enumerate(results.items()):
+    colours = palette(results)
+    for name, found in results.items():
         x = [float(value) for value in found[key]]
-        ours = name.startswith("dojo-opt")
-        style = {"marker": "o", "lw": 2.0} if ours else {"marker": "x", "lw": 1.0, "ls": ":"}
-        ax.loglog(x, list(found[key].values()), label=name, ms=4, color=colours(k % 20), **style)
+        style = {"marker": "o", "lw": 2.0} if is_ours(name) else {"marker": "x", "lw": 1.0, "ls": "--"}
+        ax.loglog(x, list(found[key].values()), label=name, ms=4, color=colours[name], **style)
     ax.set_xticks(x, [f"{value:g}" for value in x])
     ax.minorticks_off()
     ax.set_xlabel(xlabel)

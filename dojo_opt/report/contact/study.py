@@ -51,7 +51,8 @@ class Contact:
 
     def run(self, progress: Progress) -> Report:
         """Measure every engine."""
-        report = Report("contact", "dojo-opt report contact" + (" --quick" if self.quick else ""), summary=SUMMARY)
+        command = "dojo-opt report contact" + (" --quick" if self.quick else "")
+        report = Report("Contact: sliding, rest and impact", command, summary=SUMMARY)
         report.notes += NOTES
         steps = (1e-2,) if self.quick else (1e-3, 1e-2)
         engines: list[tuple[str, Engine]] = [
@@ -154,14 +155,19 @@ def _tables(results: Results, steps: Sequence[str]) -> list[Table]:
         Table(
             "A quadruped dropped from 0.1 m: trunk height against the same engine at 2 kHz, largest distance [mm]",
             ("", *(f"{rate} Hz" for rate in rates)),
-            [[engine, *(1e3 * found["rates"][r] for r in rates)] for engine, found in results.items()],
+            [[engine, *(_millimetres(found["rates"][r]) for r in rates)] for engine, found in results.items()],
         ),
         Table(
             "A tossed cube: mean distance from the same engine at a fine step [mm]",
             ("", *(f"{float(h) * 1e3:g} ms" for h in tosses)),
-            [[engine, *(1e3 * found["toss"][h] for h in tosses)] for engine, found in results.items()],
+            [[engine, *(_millimetres(found["toss"][h]) for h in tosses)] for engine, found in results.items()],
         ),
     ]
+
+
+def _millimetres(value: float) -> Cell:
+    """A length [mm], 'failed' where the engine stopped."""
+    return "failed" if np.isnan(value) else 1e3 * value
 
 
 def _pair(found: dict[str, Any], steps: Sequence[str], name: tuple[str, str, float]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +15,16 @@ from sim.model import InputKind, Model, Vector
 
 Matrix = NDArray[np.float64]
 
-APPROXIMATIONS = ("Lagged", "Sap")  # its default, and its convex one
+APPROXIMATIONS = ("Lagged", "Sap", "Tamsi")  # its default, its convex one, and its oldest
 
 
 class DrakeStep:
-    """The discrete update at the state to which `steps` steps from `start` lead, in Drake's own coordinates.
+    """The discrete update at the state to which `steps` steps from `start` lead, in Drake's own coordinates [q; v].
 
     ValueError: a mechanism, or inputs, that cannot be represented.
     """
+
+    x: Vector  # Drake's state, once settled
 
     def __init__(self, model: Model, time_step: float, approximation: str) -> None:
         self._model, self._scene = model, load(model, time_step, approximation)
@@ -33,9 +36,9 @@ class DrakeStep:
         """Take the steps, and stay where they end."""
         self._force = self._generalized(u)
         self._plant.get_applied_generalized_force_input_port().FixValue(self._context, self._force)
-        self._x = self.state(start)
+        self.x = self.state(start)
         for _ in range(steps):
-            self._x = self._step(self._x)
+            self.x = self._step(self.x)
 
     def state(self, x: Vector) -> Vector:
         """Drake's discrete state [q; v] of our state x (nx,)."""
@@ -50,19 +53,30 @@ class DrakeStep:
         """A call that gives the Jacobian."""
         from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 
+        update = self.differentiable(np.array([AutoDiffXd(value) for value in self._force]))
+        x = InitializeAutoDiff(self.x).ravel()
+        return lambda: np.asarray(ExtractGradient(update(x)))
+
+    def differentiable(self, force: Any) -> Callable[[Any], Any]:
+        """The update of a state, held under a generalized force; numbers are AutoDiffXd."""
         diagram = self._diagram.ToAutoDiffXd()
         root = diagram.CreateDefaultContext()
         plant = diagram.GetSubsystemByName(self._plant.get_name())
         context = plant.GetMyMutableContextFromRoot(root)
-        constant = np.array([AutoDiffXd(value) for value in self._force])
-        plant.get_applied_generalized_force_input_port().FixValue(context, constant)
-        x = InitializeAutoDiff(self._x).ravel()
+        plant.get_applied_generalized_force_input_port().FixValue(context, force)
 
-        def jacobian() -> Matrix:
+        def update(x: Any) -> Any:
             context.SetDiscreteState(x)
-            return np.asarray(ExtractGradient(diagram.EvalUniquePeriodicDiscreteUpdate(root).value()))
+            return diagram.EvalUniquePeriodicDiscreteUpdate(root).value()
 
-        return jacobian
+        return update
+
+    def place(self, body: int) -> tuple[slice, slice]:
+        """Where the position of a floating body and its velocity stand in the state."""
+        drakes = self._scene.bodies[body]
+        q = drakes.floating_positions_start() + 4
+        v = self._plant.num_positions() + drakes.floating_velocities_start_in_v() + 3
+        return slice(q, q + 3), slice(v, v + 3)
 
     def _step(self, x: Vector) -> Vector:
         self._context.SetDiscreteState(x)
@@ -70,9 +84,9 @@ class DrakeStep:
 
     def _central(self, eps: float) -> Matrix:
         try:
-            columns = [(self._step(self._x + dx) - self._step(self._x - dx)) for dx in eps * np.eye(len(self._x))]
+            columns = [(self._step(self.x + dx) - self._step(self.x - dx)) for dx in eps * np.eye(len(self.x))]
         except RuntimeError:  # its solver did not converge
-            return np.full((len(self._x), len(self._x)), np.nan)
+            return np.full((len(self.x), len(self.x)), np.nan)
         return np.array(columns).T / (2.0 * eps)
 
     def _generalized(self, u: Vector) -> Vector:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.report.gradients import one_step, touchdown
+from dojo_opt.report.gradients.drake_motion import CARRIED
 from dojo_opt.report.gradients.sliding import Derivative
 from dojo_opt.report.gradients.tables import worst
 
@@ -53,7 +54,7 @@ def _steps(axes: Any, measured: Mapping[str, Any]) -> None:
             axes.plot(x, y, marker, color=colour, label=label, alpha=0.75)
             best = min(own, key=lambda p: p.error)
             axes.annotate(f"eps {best.eps:.0e}", (best.microseconds, best.error), (4, -10), **_SMALL)
-    for p, marker in zip((p for p in points if one_step.AUTODIFF in p.method), "^D", strict=False):
+    for p, marker in zip((p for p in points if one_step.AUTODIFF in p.method), "^DP", strict=False):
         label = p.method.replace(one_step.AUTODIFF, "AutoDiffXd")
         axes.plot(p.microseconds, max(p.error, _LEAST), marker, color="C2", label=label)
     for method, face, label in ((one_step.IMPLICIT, "C3", "1e-8"), (one_step.TIGHTLY, "none", "1e-13")):
@@ -81,6 +82,8 @@ def _motions(axes: Any, found: Sequence[Derivative]) -> None:
             continue  # lies on the chained curve
         if kappa is None and how == f"differences of {EPS_WIDE:g}":
             continue  # in the table
+        if "differences" in how and (engine, CARRIED, None) in ways:
+            continue  # lies on the curve of its AutoDiffXd
         own = [d for d in found if (d.engine, d.how, d.kappa) == (engine, how, kappa)]
         x = sorted({d.time_step for d in own})
         y = [min(worst([d for d in own if d.time_step == h]), _TOP) for h in x]
@@ -88,23 +91,24 @@ def _motions(axes: Any, found: Sequence[Derivative]) -> None:
         label = f"dojo-opt, (A, B) chained, kappa {kappa:g}" if kappa else f"{engine}: {how}"
         if kappa is None:
             colour = f"C{[0, 1, 2, 4, 5, 6, 7, 8, 9][engines.index(engine) % 9]}"
-            look = {"color": colour, "linestyle": ":" if "chained" in how else "-"}
+            look = {"color": colour, "linestyle": "-" if "differences" in how else ":"}
         axes.plot(1e3 * np.array(x), y, marker="o", markersize=3.5, label=label, **look)
     axes.plot(1e3 * np.array(steps), steps, color="0.2", linewidth=1, linestyle=(0, (1, 3)), label="h / 1 s")
     axes.set(xscale="log", yscale="log", xlabel="time step [ms]", ylabel="worst relative error of five derivatives")
-    axes.set_ylim(1e-6, 2 * _TOP)
+    lines = -(-len(axes.get_lines()) // 2)  # of the legend, below the curves
+    axes.set_ylim(10.0 ** (-3.4 - 0.5 * lines), 2 * _TOP)
     axes.set_title("Whole motions with friction: dx/dF, d(stop)/dv0")
     axes.legend(fontsize=7, ncols=2, loc="lower right")
 
 
 def _touchdown(axes: Any, result: tuple[Any, list[touchdown.Curve]]) -> None:
-    """Gradient against height; ours in colour, MuJoCo in grey."""
+    """Gradient against height; ours in colour, others in grey."""
     from matplotlib import colormaps
 
     heights, curves = result
     ours = [curve for curve in curves if curve.kappa is not None]
     colours = dict(zip((c.label for c in ours), colormaps["viridis"](np.linspace(0.85, 0.05, len(ours))), strict=True))
-    greys = iter((("0.6", "-"), ("0.45", "--"), ("0.2", ":")))
+    greys = iter((("0.6", "-"), ("0.45", "--"), ("0.2", ":"), ("0.3", "-.")))
     h = touchdown.H
     for curve in curves:
         if curve.kappa is None:

@@ -8,7 +8,8 @@ and slides with v0 = 3 m/s along an axis, or at 30 degrees to it, until friction
 
     x = v0^2 / 2 mu g,    dx/dv0 = v0 / mu g
 
-Ours by chaining (A, B) of every step, others by differencing the whole motion, ours and MuJoCo in both ways.
+Ours by chaining (A, B) of every step, others by differencing the whole motion, ours and MuJoCo in both ways; Drake by
+automatic differentiation besides (drake_motion.py).
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ SPEED = 3.0  # [m/s]
 PULL, GLIDE = 1.0, 1.5  # [s]
 CHAINED = "(A, B) chained"
 CHAINED_EPS = 1e-6  # of mjd_transitionFD, centred
-_SETTLE = 1.0  # [s] in which a soft contact takes its load
+SETTLE = 1.0  # [s] in which a soft contact takes its load
 
 
 class Motion(NamedTuple):
@@ -98,7 +99,7 @@ def chained(motion: Motion, time_step: float, kappa: float) -> Derivative:
             S = A @ S + (B @ motion.direction if motion.pulled else 0.0)
         return float((xs[-1, :3] - xs[0, :3]) @ motion.direction), float(S[:3] @ motion.direction)
 
-    return _derivative("dojo-opt", CHAINED, kappa, motion, time_step, run)
+    return derivative("dojo-opt", CHAINED, kappa, motion, time_step, run)
 
 
 def ours_differenced(motion: Motion, time_step: float, eps: float, kappa: float) -> Derivative:
@@ -109,14 +110,14 @@ def ours_differenced(motion: Motion, time_step: float, eps: float, kappa: float)
         xs = sim.rollout(*_start(sim, motion, p), throw=True).x
         return float((xs[-1, :3] - xs[0, :3]) @ motion.direction)
 
-    return _derivative("dojo-opt", f"differences of {eps:g}", kappa, motion, time_step, _central(way, motion, eps))
+    return derivative("dojo-opt", f"differences of {eps:g}", kappa, motion, time_step, _central(way, motion, eps))
 
 
 def differenced(engine: Engine, motion: Motion, time_step: float, eps: float) -> Derivative:
     """Any other engine, from its own state of rest."""
     sim = Simulator(motion.mechanism, time_step=time_step)
     still = np.zeros(sim.nv), np.zeros(sim.nu)
-    rest = _end(engine, motion, time_step, sim.neutral()[: sim.nq], *still, _SETTLE)
+    rest = _end(engine, motion, time_step, sim.neutral()[: sim.nq], *still, SETTLE)
 
     def way(p: float) -> float:
         v, u = np.zeros(sim.nv), np.zeros(sim.nu)
@@ -124,7 +125,7 @@ def differenced(engine: Engine, motion: Motion, time_step: float, eps: float) ->
         end = _end(engine, motion, time_step, rest, v, u, motion.duration)
         return float((end - rest)[:3] @ motion.direction)
 
-    return _derivative(engine.name, f"differences of {eps:g}", None, motion, time_step, _central(way, motion, eps))
+    return derivative(engine.name, f"differences of {eps:g}", None, motion, time_step, _central(way, motion, eps))
 
 
 def mujoco_chained(motion: Motion, time_step: float, integrator: str) -> Derivative:
@@ -134,7 +135,7 @@ def mujoco_chained(motion: Motion, time_step: float, integrator: str) -> Derivat
     sim = Simulator(motion.mechanism, time_step=time_step)
     model = mujoco_scene.load(sim.model, time_step, integrator=integrator)
     data = mujoco_scene.state(model, sim.neutral())
-    mujoco.mj_step(model, data, round(_SETTLE / time_step))
+    mujoco.mj_step(model, data, round(SETTLE / time_step))
     rest = data.qpos.copy()
     n = 2 * model.nv
     A, B = np.zeros((n, n)), np.zeros((n, model.nu))
@@ -154,7 +155,7 @@ def mujoco_chained(motion: Motion, time_step: float, integrator: str) -> Derivat
         return float((data.qpos - rest)[:3] @ motion.direction), float(S[:3] @ motion.direction)
 
     with np.errstate(over="ignore", invalid="ignore"):
-        return _derivative(f"MuJoCo {integrator}", "mjd_transitionFD chained", None, motion, time_step, run)
+        return derivative(f"MuJoCo {integrator}", "mjd_transitionFD chained", None, motion, time_step, run)
 
 
 def _start(sim: Simulator, motion: Motion, p: float) -> tuple[Vector, Vector]:
@@ -188,9 +189,10 @@ def _central(way: Callable[[float], float], motion: Motion, eps: float) -> Calla
     return lambda: (way(p), (way(p + eps) - way(p - eps)) / (2.0 * eps))
 
 
-def _derivative(
+def derivative(
     engine: str, how: str, kappa: float | None, motion: Motion, h: float, run: Callable[[], tuple[float, float]]
 ) -> Derivative:
+    """What `run`, which returns (way, derivative), says, and the time it takes."""
     start = time.process_time()
     way, value = run()
     seconds = time.process_time() - start

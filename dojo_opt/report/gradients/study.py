@@ -11,7 +11,7 @@ import numpy as np
 
 from dojo_opt.report.clock import slope
 from dojo_opt.report.engines import Engine, installed
-from dojo_opt.report.gradients import one_step, sliding, smoothing, touchdown
+from dojo_opt.report.gradients import drake_motion, drake_step, one_step, sliding, smoothing, touchdown
 from dojo_opt.report.gradients.figure import draw
 from dojo_opt.report.gradients.tables import motion_table, resting_table, smoothing_table, step_table
 from dojo_opt.report.result import Report, Row
@@ -27,6 +27,7 @@ EPS = (1e-5, 1e-2)  # of differenced motions: what one would choose, and a wide 
 CHAINED = ("implicitfast", "discrete")  # of the integrators of which MuJoCo gives Jacobians
 EXACT = 1e-6  # bar of one step, relative
 AHEAD = 5e-3  # [m] above the height from which a step reaches the ground
+_LEFT_OUT = ("MuJoCo implicit", "Drake RK3")  # of a block as implicitfast; explicit, for stiff contacts
 _NO_MUJOCO = 'without MuJoCo; pip install ".[bench]" for its rows'
 
 
@@ -94,6 +95,8 @@ class Gradients:
                     if h in BARRED or engine.name.startswith("MuJoCo")  # the others are slower
                     for eps in EPS
                 ]
+                if h in BARRED:
+                    found += [drake_motion.carried(motion, h, name) for name in _drakes(self.quick)]
                 if find_spec("mujoco") is not None:
                     found += [sliding.mujoco_chained(motion, h, name) for name in CHAINED[: 1 if self.quick else 2]]
         for h in (h for h in BARRED if h in steps):
@@ -111,6 +114,7 @@ class Gradients:
         curves = [touchdown.ours(heights, kappa) for kappa in touchdown.KAPPAS]
         if find_spec("mujoco") is not None:
             curves += [touchdown.mujoco_ball(heights, label) for label in touchdown.MUJOCO]
+        curves += [drake_motion.touchdown(heights, name) for name in _drakes(self.quick)[:1]]
         h = touchdown.H
         at = {k: touchdown.ours(np.array([touchdown.TOUCH, touchdown.TOUCH + AHEAD]), k) for k in touchdown.KAPPAS}
         off = max(abs(curve.gradient[0] + 0.5 / h) * h for curve in at.values())
@@ -124,7 +128,7 @@ class Gradients:
                 "",
                 0.05,
                 at_least=True,
-                note="hard contact, and MuJoCo: 0",
+                note="hard contact, MuJoCo and Drake: 0",
             ),
         ]
         for curve in curves:
@@ -135,12 +139,19 @@ class Gradients:
         return heights, curves
 
 
+def _drakes(quick: bool) -> tuple[str, ...]:
+    """Contact approximations of Drake, where it is installed."""
+    if find_spec("pydrake") is None:
+        return ()
+    return drake_step.APPROXIMATIONS[: 1 if quick else None]
+
+
 def _able(report: Report, quick: bool) -> list[Engine]:
     """Engines that can simulate the block; a note for those that cannot."""
     engines = []
     for engine in installed():
-        if engine.name == "MuJoCo implicit" or (quick and engine.name != "MuJoCo implicitfast"):
-            continue  # of a block the same as implicitfast
+        if engine.name in _LEFT_OUT or (quick and engine.name != "MuJoCo implicitfast"):
+            continue
         try:
             sliding.differenced(engine, sliding.motions()[0], BARRED[-1], EPS[0])
         except (ValueError, RuntimeError) as error:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
+from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -47,12 +48,16 @@ class Curve(NamedTuple):
     gradient: Vector  # d velocity / d height [1/s]
 
 
-def ours(heights: Vector, kappa: float) -> Curve:
-    """By the implicit function theorem; heights: of the lowest point."""
+def ball() -> Mechanism:
+    """A ball of 1 kg and the ground."""
     body = dojo.Body("ball", 1.0, inertia=np.full(3, 0.4 * RADIUS**2))
     contact = dojo.Contact("ball", radius=RADIUS)
-    ball = dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")], [contact])
-    sim = Simulator(ball, time_step=H, kappa=kappa, tolerance=_TOLERANCE)
+    return dojo.Mechanism([body], [dojo.Joint("floating", None, "ball")], [contact])
+
+
+def ours(heights: Vector, kappa: float) -> Curve:
+    """By the implicit function theorem; heights: of the lowest point."""
+    sim = Simulator(ball(), time_step=H, kappa=kappa, tolerance=_TOLERANCE)
     xs = np.tile(np.r_[0.0, 0.0, RADIUS, 1.0, np.zeros(5), -SPEED, np.zeros(3)], (len(heights), 1))
     xs[:, 2] += heights
     linear = sim.linearize_trajectory(xs, np.zeros((len(xs), sim.nu)), kappa=kappa)

@@ -10,6 +10,11 @@ from matplotlib.figure import Figure
 
 from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
 
+_LEGEND = (
+    "green: passed; red: not (x: above the bar of its rule); yellow: refused with a reason; grey: not represented.\n"
+    "Numbers are what the rule of the row measures; the rules are in the tables."
+)
+
 
 def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
     """Green where the rule is met, red where it is not, yellow where a scene is refused, grey where it is not given."""
@@ -27,6 +32,7 @@ def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) 
     edges = [k for k in range(1, rows) if trials[k].group != trials[k - 1].group]
     ax.hlines(np.array(edges) - 0.5, -0.5, columns - 0.5, color="white", lw=2.0)
     ax.vlines(np.arange(1, columns) - 0.5, -0.5, rows - 0.5, color="white", lw=1.0)
+    ax.set_xlabel(_LEGEND, fontsize=8)
     ax.tick_params(length=0)
     for side in ax.spines.values():
         side.set_visible(False)

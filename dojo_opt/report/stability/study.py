@@ -48,7 +48,7 @@ class Stability:
     def run(self, progress: Progress) -> Report:
         """Judge every trial."""
         command = "dojo-opt report stability" + (" --quick" if self.quick else "")
-        report = Report("stability", command, summary=SUMMARY, notes=list(NOTES))
+        report = Report("Stability: stiff and extreme scenes", command, summary=SUMMARY, notes=list(NOTES))
         trials = [trial for trial in self.trials() if not (self.quick and trial.slow)]
         peers = [engine for engine in installed() if engine.name not in _LEFT_OUT]
         peers = peers[1:2] if self.quick else peers
