@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
@@ -73,3 +74,8 @@ class Options:
             value = getattr(self, field.name)
             if isinstance(value, int | float) and not isinstance(value, bool) and not value >= 0:
                 raise ValueError(f"ilqr({field.name}=...): expected a number >= 0, got {value}")
+
+    def say(self, line: str) -> None:
+        """Print a line where the table goes, if `verbose`."""
+        if self.verbose:
+            print(line, file=self.stream or sys.stdout)
