@@ -36,6 +36,7 @@ __all__ = [
     "Mechanism",
     "MjcfMechanism",
     "MjcfWarning",
+    "Options",
     "ParameterSpace",
     "Parameters",
     "Perturbation",
@@ -49,6 +50,7 @@ __all__ = [
     "SimulationError",
     "Simulator",
     "Sphere",
+    "Stage",
     "Status",
     "StepResult",
     "String",
@@ -96,6 +98,7 @@ _HOME: dict[str, str | None] = {
     "Mechanism": "sim.mechanism",
     "MjcfMechanism": "sim.mjcf",
     "MjcfWarning": "sim.mjcf",
+    "Options": "dojo_opt.options",
     "ParameterSpace": "dojo_opt.parameter_space",
     "Parameters": "sim.parameters.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
@@ -109,14 +112,15 @@ _HOME: dict[str, str | None] = {
     "SimulationError": "sim.results",
     "Simulator": "sim.simulator",
     "Sphere": "sim.shapes",
+    "Stage": "dojo_opt.options",
     "Status": "solvers.status",
     "StepResult": "sim.results",
     "String": "sim.shapes",
     "Terrain": "sim.terrain.terrain",
     "Trajectory": "sim.results",
-    "UrdfError": "sim.urdf",
-    "UrdfMechanism": "sim.urdf",
-    "UrdfWarning": "sim.urdf",
+    "UrdfError": "sim.urdf.xml",
+    "UrdfMechanism": "sim.urdf.report",
+    "UrdfWarning": "sim.urdf.report",
     "closed_loop": "dojo_opt.plant.loop",
     "constraint": None,
     "cost": None,
@@ -125,7 +129,7 @@ _HOME: dict[str, str | None] = {
     "ilqr": "dojo_opt.planner",
     "kernel": "dojo_opt.residual",
     "load_mjcf": "sim.mjcf",
-    "load_urdf": "sim.urdf",
+    "load_urdf": "sim.urdf.load",
     "models": None,
     "monte_carlo": "dojo_opt.plant.study",
     "plots": None,
@@ -141,6 +145,7 @@ if TYPE_CHECKING:
     from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled
+    from dojo_opt.options import Options, Stage
     from dojo_opt.parameter_space import ParameterSpace
     from dojo_opt.plan import Plan
     from dojo_opt.planner import ilqr
@@ -165,7 +170,9 @@ if TYPE_CHECKING:
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
     from sim.terrain.terrain import Terrain
-    from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
+    from sim.urdf.load import load_urdf
+    from sim.urdf.report import UrdfMechanism, UrdfWarning
+    from sim.urdf.xml import UrdfError
     from solvers.status import Status
 
 

@@ -204,10 +204,19 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 }
 
 
+def _check_folders(args: argparse.Namespace) -> None:
+    """Refuse files that cannot be written before the work is done, not after."""
+    for name in ("out", "html"):
+        path = getattr(args, name, None)
+        if path is not None and args.command != "report" and not path.parent.is_dir():
+            raise ValueError(f"--{name}: there is no folder {str(path.parent)!r}")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     args = _parser().parse_args(arguments)
     try:
+        _check_folders(args)
         return _COMMANDS[args.command](args)
     except (ValueError, TypeError, OSError, ImportError) as error:
         print(f"dojo-opt {args.command}: {error}", file=sys.stderr)

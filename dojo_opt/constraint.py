@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.names import chosen_components, chosen_inputs, component_name
 from dojo_opt.residual import ResidualKernels, check_residual
-from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
+from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Goal:
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
-        target = table("Goal(target=...)", self.target, knots.size, sim.nx)
+        target = state_table("Goal(target=...)", self.target, knots.size, sim.nx, layout)
         mask = np.zeros((knots.size, sim.ndx))
         mask[:, chosen_components("Goal(components=...)", self.components, sim)] = 1.0
         return StateTerm("Goal", knots, mask, target, layout)

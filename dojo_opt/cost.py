@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.names import input_weight, state_weight
 from dojo_opt.residual import ResidualKernels, check_residual
-from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, table
+from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
 
 Integers = NDArray[np.int64]
 
@@ -52,7 +52,7 @@ class Tracking:
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
-        reference = table("Tracking(reference=...)", self.reference, knots.size, sim.nx)
+        reference = state_table("Tracking(reference=...)", self.reference, knots.size, sim.nx, layout)
         named = state_weight("Tracking(weight=...)", self.weight, sim)
         weight = _checked_weight("Tracking(weight=...)", named, knots.size, sim.ndx, self.scale)
         return StateTerm("Tracking", knots, weight, reference, layout)

@@ -11,6 +11,7 @@ from dojo_opt.mpc.horizon import with_own_terms
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.study import Sampler
 from dojo_opt.problem import Problem
+from sim import checks
 
 try:
     import gymnasium
@@ -42,6 +43,10 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
             raise ImportError('dojo.Environment needs gymnasium: pip install "dojo-opt[gym]"')
         if not isinstance(problem, Problem):
             raise TypeError(f"Environment(problem): expected a Problem, got {problem!r}")
+        if plant is not None and not isinstance(plant, Plant):
+            raise TypeError(f"Environment(plant=...): expected a Plant, as Plant(simulator), got {plant!r}")
+        if sampler is not None and not callable(sampler):
+            raise TypeError(f"Environment(sampler=...): expected a function of a generator, got {sampler!r}")
         self.problem = with_own_terms(problem)
         self._plant = self.plant = Plant(problem.sim, problem.start) if plant is None else plant
         self._sampler = sampler
@@ -78,7 +83,8 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         info: dict[str, Any] = {}
         if t >= self.problem.horizon:
             raise RuntimeError("Environment.step: the episode is over; call reset()")
-        self._us[t] = self._middle + self._half * np.asarray(action, dtype=np.float64)
+        chosen = checks.array("Environment.step(action)", action, (self.problem.sim.nu,))
+        self._us[t] = self._middle + self._half * chosen
         for _ in range(self._steps):
             _, result = self.plant.step(self._us[t])
             if not result.success:

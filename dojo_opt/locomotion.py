@@ -115,6 +115,7 @@ def trot(
 ) -> Problem:
     """A quadruped of the A1's size trots at `speed` [m/s] for two periods of one second, 40 knots of 50 ms.
 
+    A plan with periodic=True is one period long, unless it is given `cycles`.
     By default the reference of Dojo's quadruped example, with its weights (impulses .01 per (N m s)^2), its friction of
     .8 and less damping in the joints (5 N m s/rad there, .5 here, where the robot falls over by itself). The pose of
     the base at the end is a constraint, torques are limited to 33.5 N m. speed=0 trots on the spot.
@@ -193,6 +194,8 @@ def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, 
     follows |= {key: settings[key] for key in _FOLLOW if key in settings}
     rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
+    if follows.get("periodic") and gait is not gaits.jump:
+        rest.setdefault("cycles", 1)
     h = time_step / follows.get("substeps", 1)
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
     return follow(gait(sim, **keywords, **rest), **follows)

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
+import numpy as np
+
 __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
@@ -63,17 +65,36 @@ class Options:
     def __post_init__(self) -> None:
         if self.reopen not in ("feedback", "gaps"):
             raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
-        if len(self.stages) == 0:
-            raise ValueError("ilqr(stages=...): expected at least one stage")
-        stages = tuple(Stage(*stage) for stage in self.stages)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(field.default, int | float) and not isinstance(field.default, bool):
+                self._check_number(field.name, value, whole=isinstance(field.default, int))
+        if self.callback is not None and not callable(self.callback):
+            raise TypeError(f"ilqr(callback=...): expected a function of a record, got {self.callback!r}")
+        stages = self._stages()
         object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
         for stage in self.stages:
             if not (stage.kappa_eval > 0.0 and stage.kappa_grad > 0.0):
                 raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, int | float) and not isinstance(value, bool) and not value >= 0:
-                raise ValueError(f"ilqr({field.name}=...): expected a number >= 0, got {value}")
+
+    def _stages(self) -> tuple[Stage, ...]:
+        """The stages as such; a user may give plain tuples."""
+        try:
+            stages = tuple(Stage(*stage) for stage in self.stages)
+        except TypeError:
+            wanted = "pairs (kappa_eval, kappa_grad) or Stages"
+            raise TypeError(f"ilqr(stages=...): expected {wanted}, got {self.stages!r}") from None
+        if len(stages) == 0:
+            raise ValueError("ilqr(stages=...): expected at least one stage")
+        return stages
+
+    @staticmethod
+    def _check_number(name: str, value: Any, *, whole: bool) -> None:
+        """Refuse what is no number >= 0, and fractions where a count is asked for; infinity is allowed."""
+        kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+        if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
+            what = "a whole number" if whole else "a number"
+            raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {value!r}")
 
     def say(self, line: str) -> None:
         """Print a line where the table goes, if `verbose`."""

@@ -77,6 +77,9 @@ class ParameterSpace:
         self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
         self._narrow(f"{call}(bounds=...)", bounds or {})
 
+    def __repr__(self) -> str:
+        return f"ParameterSpace({self._sim.mechanism.name}, {len(self.labels)} values: {', '.join(self.labels)})"
+
     @property
     def wrt(self) -> tuple[str, ...]:
         """The parameters whose derivatives `chain` needs."""

@@ -46,12 +46,17 @@ def ilqr(
 
     controls (T, nu), states (T + 1, nx): the guess, by default the problem's own. warm_start: an earlier plan of the
     same problem, whose trajectory, multipliers and penalties are taken over. It may be a plan of an easier variant,
-    with more damping, say: what fails directly is often planned by way of it. settings: fields of `Options` by name.
+    with more damping, say: what fails directly is often planned by way of it. settings: fields of
+    `dojo.Options` by name.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
     is one of the finer problem then, and its history is that of both.
     """
     checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
+    if options is not None and not isinstance(options, Options):
+        raise TypeError(f"ilqr(options=...): expected Options, got {options!r}")
+    if warm_start is not None and not isinstance(warm_start, Plan):
+        raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
     options = Options(**settings) if options is None else replace(options, **settings)
     plan = Solver(problem, options).solve(controls, states, warm_start)
     if problem.refinement == 1 or not plan.success:

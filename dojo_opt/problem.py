@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.cost import Spec
 from dojo_opt.manifold import tangent_layout
 from dojo_opt.names import chosen_components
-from dojo_opt.term import table
+from dojo_opt.term import numbers, state_table, table
+from sim.border import whole
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -26,7 +27,7 @@ def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector
         return None
     if not hasattr(limits, "__len__") or len(limits) != 2:
         raise ValueError(f"Problem(control_limits=...): expected (lower, upper), got {limits!r}")
-    lo, hi = (np.asarray(b, dtype=float) for b in limits)
+    lo, hi = (numbers("Problem(control_limits=...)", b) for b in limits)
     for side, bound in (("lower", lo), ("upper", hi)):
         if bound.shape not in ((), (nu,)) or np.any(np.isnan(bound)):
             raise ValueError(
@@ -80,20 +81,18 @@ class Problem:
         states0: ArrayLike | None = None,
         free_start: Any = None,
     ) -> None:
-        if int(horizon) != horizon or horizon < 1:
-            raise ValueError(f"Problem(horizon=...): expected a positive number of knots, got {horizon}")
-        if int(substeps) != substeps or substeps < 1:
-            raise ValueError(f"Problem(substeps=...): expected a positive number of steps per knot, got {substeps}")
+        if not all(hasattr(sim, name) for name in ("nx", "ndx", "nu", "integrate", "horizon")):
+            raise TypeError(f"Problem(sim): expected a Simulator, got {sim!r}")
         self.sim = sim
-        self.horizon = int(horizon)
-        self.substeps = int(substeps)
+        self.horizon = whole("Problem(horizon=...)", horizon)
+        self.substeps = whole("Problem(substeps=...)", substeps)
         self.refinement = 1
         self.refined_constraints: tuple[Spec, ...] = ()
-        start = np.asarray(start, dtype=float)
+        start = numbers("Problem(start=...)", start)
         if start.shape != (sim.nx,):
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
-        self.start: Vector = table("Problem(start=...)", start, 1, sim.nx)[0]
-        self.layout = tangent_layout(sim, self.start)
+        self.layout = tangent_layout(sim, sim.neutral())
+        self.start: Vector = state_table("Problem(start=...)", start, 1, sim.nx, self.layout)[0]
         self.free_start = _components("Problem(free_start=...)", free_start, sim)
         self.specs = (_terms(cost), _terms(constraints))
         for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
@@ -105,6 +104,12 @@ class Problem:
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    def __repr__(self) -> str:
+        knots = f"{self.horizon} knots of {self.knot_time:g} s"
+        terms = [type(spec).__name__ for spec in (*self.specs[0], *self.specs[1])]
+        name = getattr(self.sim.mechanism, "name", type(self.sim).__name__)
+        return f"Problem({name}, {knots}, {', '.join(terms) or 'no terms'})"
 
     def refined(self, count: int = 5) -> Problem:
         """The same problem with every time step cut into `count`: same knots, inputs, terms; `refined_constraints` too.

@@ -14,6 +14,8 @@ from dojo_opt.leaps import leap
 from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
+from sim import checks
+from sim.border import whole
 from sim.checks import nearest
 from sim.simulator import Simulator
 
@@ -29,10 +31,13 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
     force that carries the body.   Howell et al. 2022, Dojo, hopper example.
     """
     knot, horizon = 0.05, 20
+    place = np.array(checks.vector("problems.hop(target=...)", target, 2))
+    height = checks.number("problems.hop(height=...)", height)
+    substeps = whole("problems.hop(substeps=...)", substeps)
     sim = Simulator(models.raiberthopper(**model), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     goal, apex = start.copy(), start.copy()
-    goal[:2] += np.asarray(target, dtype=float)
+    goal[:2] += place
     apex[:3] = goal[0], goal[1], goal[2] + height
     weight = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1, 1.0, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01])
     half = horizon // 2

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from sim import checks
 from sim.checks import nearest
 
 __all__ = ["add_show", "show"]
-
-_KAPPA = 1e-10  # to simulate, see the README
 
 
 def add_show(commands: Any) -> None:
@@ -47,8 +46,10 @@ def load(args: argparse.Namespace) -> dojo.Mechanism:
 
 def show(args: argparse.Namespace) -> int:
     """Print, simulate, draw; returns the exit status."""
+    checks.number("--seconds", args.seconds, above=0.0)
+    checks.number("--drop", args.drop)
     mechanism = load(args)
-    sim = dojo.Simulator(mechanism, time_step=args.time_step, kappa=_KAPPA)
+    sim = dojo.Simulator(mechanism, time_step=args.time_step)
     print(sim.describe())
     if getattr(mechanism, "report", None) is not None:
         print(mechanism.report)  # type: ignore[attr-defined]
@@ -57,7 +58,8 @@ def show(args: argparse.Namespace) -> int:
         raise ValueError(
             f"--drop is for a floating base, and {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}"
         )
-    x[2] += args.drop
+    if args.drop:
+        x[2] += args.drop
     motion = sim.rollout(x, np.zeros((max(1, round(args.seconds / args.time_step)), sim.nu)))
     print(f"let go for {motion.time[-1]:g} s, inputs zero: {motion.message}")
     if args.out:

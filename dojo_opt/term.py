@@ -16,6 +16,9 @@ Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+_UNIT = 1e-6  # by how much the length of a quaternion may be off
+_ROUNDED = 1e-12  # below, it is as near to one as sums get
+
 
 class Term:
     """Residual r (m, d) at `knots` (m,), weight and slope (m, d); see `dojo_opt.penalty` for what it adds.
@@ -135,15 +138,40 @@ class ResidualTerm(Term):
         add_dense_expansion(jacobian, self._first, self._second, self.knots, g, H)
 
 
+def numbers(call: str, value: ArrayLike) -> Matrix:
+    """`value` as an array of floats; anything else is refused by a ValueError that names the call."""
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected numbers, got {value!r}") from None
+
+
 def table(call: str, value: ArrayLike, rows: int, columns: int) -> Matrix:
     """Broadcast `value` to (rows, columns) and refuse anything that is not finite."""
-    array = np.asarray(value, dtype=float)
+    array = numbers(call, value)
     if array.shape not in ((), (columns,), (rows, columns), (1, columns), (rows, 1)):
         raise ValueError(f"{call}: expected shape (), ({columns},) or ({rows}, {columns}), got {array.shape}")
     if not np.all(np.isfinite(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{call}: expected finite numbers, got {array[index]} at index {index}")
     return np.ascontiguousarray(np.broadcast_to(array, (rows, columns)), dtype=float).copy()
+
+
+def state_table(call: str, value: ArrayLike, rows: int, columns: int, layout: Integers) -> Matrix:
+    """`table` of states, whose quaternions have to be of length one; layout: see `dojo_opt.manifold.tangent_layout`."""
+    states = table(call, value, rows, columns)
+    for first in np.unique(-layout[layout < 0] - 1):
+        part = states[:, first : first + 4]
+        length = np.linalg.norm(part, axis=1)
+        off = np.abs(length - 1.0)
+        if off.max(initial=0.0) > _UNIT:
+            row = int(off.argmax())
+            raise ValueError(
+                f"{call}: expected a unit quaternion (w, x, y, z) at [{first}:{first + 4}], got length {length[row]:g}"
+                + (f" in row {row}" if rows > 1 else "")
+            )
+        part[off > _ROUNDED] /= length[off > _ROUNDED, None]
+    return states
 
 
 def knot_list(call: str, knots: Any, horizon: int, last: bool) -> Integers:

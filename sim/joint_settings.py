@@ -36,6 +36,8 @@ def limits_of(call: str, joint: Joint) -> tuple[tuple[float, float], ...]:
     given = joint.limits
     if given is None:
         return (free,) * joint.nv
+    if not hasattr(given, "__len__"):
+        raise ValueError(f"{call}: expected (lo, hi), or one such pair per degree of freedom, got {given!r}")
     if len(given) == 2 and all(np.ndim(x) == 0 for x in given) and (joint.nv == 1 or any(x is not None for x in given)):
         given = (given,)
     if len(given) != joint.nv:

@@ -23,7 +23,7 @@ from sim.terrain.terrain import Terrain
 from sim.tree import check_loops, check_masses, sort_tree
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
@@ -74,6 +74,12 @@ class Mechanism:
         object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
         object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
         object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
+
+    def __repr__(self) -> str:
+        parts: dict[str, Any] = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
+        parts |= {"collisions": self.collisions, "loops": self.loops, "gears": self.gears}
+        sizes = "".join(f", {what} {len(found)}" for what, found in parts.items() if found)
+        return f"{type(self).__name__}({self.name}, nq {self.nq}, nv {self.nv}{sizes})"
 
     @property
     def nbody(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class SimulationError(RuntimeError):
         self.status = status
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Contacts:
     """Contacts over one step, (ncontact, ...), or over the steps of a trajectory, (T, ncontact, ...). World axes."""
 
@@ -38,6 +38,12 @@ class Contacts:
     point: Floats  # (..., ncontact, 3) where it acts, at the end of the step [m]
     gap: Floats  # (..., ncontact) distance from the ground at the end of the step [m]
     slip: Floats  # (..., ncontact) sliding speed [m/s]
+
+    def __repr__(self) -> str:
+        if self.impulse.ndim > 2:
+            return f"Contacts({'x'.join(map(str, self.impulse.shape[:-2]))} steps of {', '.join(self.names)})"
+        forces = zip(self.names, self.normal_force, strict=True)
+        return f"Contacts({', '.join(f'{name} {force:.3g} N' for name, force in forces)})"
 
     @property
     def force(self) -> Floats:
@@ -141,6 +147,15 @@ def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:
     return Contacts(mech.contact_names, *parts)
 
 
+def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
+    """(states, inputs) of a trajectory, or of such a pair."""
+    if isinstance(trajectory, Trajectory):
+        return trajectory.x, trajectory.u
+    if isinstance(trajectory, tuple | list) and len(trajectory) == 2:
+        return trajectory[0], trajectory[1]
+    raise TypeError(f"{call}: expected a Trajectory or (states, inputs), got {trajectory!r}")
+
+
 def error_of(
     mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
 ) -> SimulationError:
@@ -152,9 +167,10 @@ def error_of(
     reason = Status(int(status))
     text = f"{where}: {MESSAGES[reason]}"
     if reason in (Status.MAX_ITERATIONS, Status.NO_PROGRESS):
-        text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})."
+        text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})"
+        text += f", off the central path by {violation:.1e}." if violation > 0.0 else "."
         if contact >= 0:
-            text += f" Contact {mech.contact_names[int(contact)]!r} is worst, off by {violation:.1e}."
+            text += f" Contact {mech.contact_names[int(contact)]!r} is worst."
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)

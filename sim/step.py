@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from sim.contacts.report import worst_contact
-from sim.coupling.loop_motion import is_farther, lead_again, meet_ahead, predict_loops
-from sim.coupling.loop_work import loops_gained
-from sim.coupling.loops import start_loops
+from sim import late
 from sim.dynamics import begin_step
-from sim.late import Late
+from sim.late import is_farther, lead_again, loops_gained, meet_ahead, predict_loops, solve, start_loops, worst_contact
 from sim.model import Model, Vector
 from sim.options import Guess, Options, Outcome
-from sim.solve.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
 from sim.work import Work
 from solvers.jit import inlined
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -45,7 +40,7 @@ def solve_branch(
     return r
 
 
-@late(Late.STEP, int(Status.NOT_FINITE))
+@late.step.defined(otherwise=int(Status.NOT_FINITE))
 def step(
     model: Model, work: Work, options: Options, x: Vector, u: Vector, guess: Guess, out: Vector, report: Vector
 ) -> int:

@@ -39,6 +39,7 @@ PARTS = {
     "limits reversed": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, -1.0)), "arm", "limits"),
     "limits equal": (lambda: dojo.Joint("revolute", None, "arm", limits=(1.0, 1.0)), "arm", "limits"),
     "limits of a ball joint": (lambda: dojo.Joint("spherical", None, "arm", limits=[(0, 1), None, None]), "limits"),
+    "limits of one number": (lambda: dojo.Joint("revolute", None, "arm", limits=1.0), "arm", "limits", "(lo, hi)", "1.0"),
     "number of limits": (lambda: dojo.Joint("planar", None, "arm", limits=[(0, 1)] * 3), "arm", "limits"),
     "negative friction": (lambda: dojo.Contact("arm", friction=-0.1), "arm", "friction", "-0.1"),
     "negative radius": (lambda: dojo.Contact("arm", radius=-0.1), "arm", "radius"),
@@ -127,6 +128,8 @@ CALLS = {
     "start shape": (lambda: hopper().start(np.zeros(7), np.zeros(5)), "start", "(6,)", "(5,)"),
     "maximal shape": (lambda: hopper().maximal(np.zeros(3)), "maximal", "(13,)", "(3,)"),
     "minimal shape": (lambda: hopper().minimal(np.zeros((2, 13))), "minimal", "(1, 13)", "(2, 13)"),
+    "vjp of no trajectory": (lambda: hopper().vjp("run", np.zeros((2, 12))), "vjp(trajectory)", "'run'"),
+    "terrain of a number": (lambda: dojo.Terrain.from_function(3.0, x=(-1, 1), y=(-1, 1)), "from_function(f)", "3.0"),
     "energy nan": (lambda: hopper().energy(state(_8=np.nan)), "energy", "nan"),
 }
 
@@ -165,6 +168,20 @@ def test_huge_numbers_do_not_become_nan():
                 continue
             assert np.isfinite(result.x).all()
             assert result.status != 0 or scale < 1e12
+
+
+def test_an_unsolved_step_says_by_how_much_it_missed_the_central_path():
+    sim = dojo.Simulator(block(), time_step=0.01, max_iterations=1)
+    with pytest.raises(dojo.SimulationError, match=r"Residual .* \(tolerance 1e-08\), off the central path by \d"):
+        sim.step(state(_2=0.26, _9=-5.0), throw=True)
+
+
+def test_results_print_on_a_line():
+    sim = dojo.Simulator(block(), time_step=0.01)
+    t = sim.rollout(state(_2=0.25), np.zeros((4, 0)))
+    assert repr(sim.mechanism) == "Mechanism(mechanism, nq 7, nv 6, bodies 1, contacts 8)"
+    assert repr(t.contacts) == f"Contacts(4 steps of {', '.join(t.contacts.names)})"
+    assert re.fullmatch(r"Contacts\((block_\d \S+ N(, )?){8}\)", repr(sim.step(state(_2=0.25)).contacts))
 
 
 def test_a_step_that_failed_is_not_used():

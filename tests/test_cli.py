@@ -99,6 +99,17 @@ def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureF
     assert "are for closed loops (hopper_mpc, quadruped_mpc), and hop is a plan" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "command", [["run", "hop", "--out"], ["run", "hopper_mpc", "--html"], ["show", "block", "--plot"]]
+)
+def test_files_that_cannot_be_written_are_refused_first(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([*command, str(tmp_path / "nowhere" / "file.png")]) == 2
+    streams = capsys.readouterr()
+    assert "there is no folder" in streams.err and streams.out == ""
+
+
 def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     figure, page = tmp_path / "fall.png", tmp_path / "fall.html"
     command = ["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--out", str(figure), "--html", str(page)]
@@ -106,6 +117,12 @@ def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFix
     text = capsys.readouterr().out
     assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "let go for 0.1 s" in text
     assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
+
+
+@pytest.mark.parametrize("name", ["pendulum", "slider", "cartpole", "fourbar"])
+def test_show_lets_go_of_what_does_not_float(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", name, "--seconds", "0.02"]) == 0
+    assert "let go for 0.02 s" in capsys.readouterr().out
 
 
 def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,6 +137,8 @@ def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, caps
     [
         (["quadrupet"], "'quadrupet' is neither a .urdf nor an .xml file, nor a model; did you mean 'quadruped'?"),
         (["nowhere.urdf"], "nowhere.urdf"),
+        (["pendulum", "--seconds", "-1"], "--seconds: expected a number > 0, got -1"),
+        (["block", "--drop", "nan"], "--drop: expected finite numbers, got nan"),
         (["pendulum", "--drop", "1"], "--drop is for a floating base, and 'joint_0' is revolute"),
     ],
 )

@@ -78,9 +78,12 @@ def test_every_module_can_be_imported() -> None:
 # -- README and sizes --------------------------------------------------------------------------------------------------
 
 
-def test_commands_of_the_readme_exist() -> None:
-    text = (ROOT / "README.md").read_text()
-    for script in re.findall(r"python (examples/\w+\.py)", text):
+PAGES = ("README.md", "docs/guide.md", "docs/numbers.md")
+
+
+def test_commands_of_the_pages_exist() -> None:
+    text = "\n".join((ROOT / page).read_text() for page in PAGES)
+    for script in re.findall(r"python ((?:examples|benchmarks)/\w+\.py)", text):
         assert (ROOT / script).is_file(), script
     commands = re.findall(r"(?:python -m dojo_opt|dojo-opt) (run|report|models|show|warmup) ?(\w+)?", text)
     assert commands
@@ -91,8 +94,19 @@ def test_commands_of_the_readme_exist() -> None:
             assert name in cli.LOOPS or name.removeprefix("quadruped_") in cli.PROBLEMS
 
 
-def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
+@pytest.mark.parametrize("page", PAGES)
+def test_links_between_pages_lead_somewhere(page: str) -> None:
+    for target, section in re.findall(r"\]\(([\w./-]*)(?:#([\w-]*))?\)", (ROOT / page).read_text()):
+        file = (ROOT / page).parent / target if target else ROOT / page
+        assert file.is_file(), target
+        if section:
+            titles = re.findall(r"^#+ (.*)$", file.read_text(), flags=re.MULTILINE)
+            assert section in [re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles], section
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/guide.md"])
+def test_the_python_of_the_pages_runs(page: str, tmp_path: Path) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), flags=re.DOTALL)
     assert blocks
     python("\n".join(blocks), cwd=tmp_path)
 

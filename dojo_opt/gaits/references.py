@@ -16,6 +16,7 @@ from dojo_opt.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim import checks
+from sim.border import whole
 from sim.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -28,6 +29,7 @@ _PACE = {(True, False): 0.0, (False, False): 0.0, (True, True): 0.5, (False, Tru
 _BOUND = {(False, False): 0.0, (False, True): 0.0, (True, False): 0.5, (True, True): 0.5}
 _WALK = {(False, True): 0.0, (True, True): 0.25, (False, False): 0.5, (True, False): 0.75}
 _HOP = dict.fromkeys(_TROT, 0.0)
+_KEYWORDS = "speed period duty lateral heading_rate cycles step_height height footholds tilt".split()
 
 
 def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
@@ -78,6 +80,7 @@ def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **ga
 
 def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None) -> Gait:
     """All feet on the ground below the neutral state's, for `duration` [s], the base at rest at `height` [m]."""
+    _check_legs("gaits.stand", sim)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
     feet, ground = Feet(sim), _ground(sim)
     base = np.tile(sim.neutral()[:7], (steps + 2, 1))
@@ -101,7 +104,11 @@ def jump(
     The base sinks by `crouch` [m] within `before` [s], is pushed at constant acceleration back to where it stood, flies
     with its feet drawn in by `clearance` [m], and comes to rest in the same way, within `after` [s].
     """
-    call, h = "gaits.jump", sim.time_step
+    call = "gaits.jump"
+    _check_legs(call, sim)
+    h = sim.time_step
+    for name, value in (("distance", distance), ("clearance", clearance)):
+        checks.number(f"{call}({name}=...)", value)
     for name, value in (("height", height), ("crouch", crouch), ("before", before), ("after", after)):
         checks.number(f"{call}({name}=...)", value, above=0.0)
     speed = np.sqrt(2.0 * 9.81 * height)
@@ -141,6 +148,15 @@ def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: fl
     return forward, rise
 
 
+def _check_legs(call: str, sim: Simulator) -> None:
+    """Refuse what has no floating base with joints on it."""
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+    joints = sim.mechanism.joints
+    if joints[0].kind != "floating" or sim.nv == 6:
+        raise ValueError(f"{call}(sim): expected a robot with legs on a floating base, got {sim.mechanism!r}")
+
+
 def _ground(sim: Simulator) -> Array:
     """(k, 3) feet of the neutral state, put onto the ground."""
     feet = Feet(sim)
@@ -172,15 +188,19 @@ def _periodic(
     height: float | None = None,
     footholds: ArrayLike | None = None,
     tilt: float = 0.2,
+    **unknown: Any,
 ) -> Gait:
     """A periodic gait; see `trot`."""
     call = f"gaits.{name}"
+    checks.keywords(f"{call}(...)", unknown, _KEYWORDS)
+    _check_legs(call, sim)
+    for what, value in (("speed", speed), ("lateral", lateral), ("heading_rate", heading_rate)):
+        checks.number(f"{call}({what}=...)", value)
     if not 0.0 < duty < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
-    if int(cycles) != cycles or cycles < 1:
-        raise ValueError(f"{call}(cycles=...): expected a positive number of periods, got {cycles}")
+    whole(f"{call}(cycles=...)", cycles)
     checks.number(f"{call}(step_height=...)", step_height, at_least=0.0)
-    steps = _whole(f"{call}(period=...)", period, sim.time_step) * int(cycles)
+    steps = _whole(f"{call}(period=...)", period, sim.time_step) * cycles
     feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:
@@ -214,7 +234,6 @@ def _inertia(sim: Simulator) -> tuple[float, float, float]:
     """Mass [kg], and moments of inertia about x and y at the base [kg m^2], in the neutral configuration."""
     x = sim.neutral()
     mass = sum(body.mass for body in sim.mechanism.bodies)
-    rest = sim.momentum(x)[1]
     moments = []
     for axis in (0, 1):
         spun = x.copy()
@@ -223,5 +242,4 @@ def _inertia(sim: Simulator) -> tuple[float, float, float]:
         still = x.copy()
         still[:3] = 0.0
         moments.append((sim.momentum(spun)[1][axis] - sim.momentum(still)[1][axis]) / 1e-3)
-    del rest
     return float(mass), float(moments[0]), float(moments[1])

@@ -40,6 +40,8 @@ class Settings:
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:
             raise ValueError(f"MPC(guess=...): expected one of {GUESSES}, got {self.guess!r}")
+        if self.options is not None and not isinstance(self.options, Options):
+            raise TypeError(f"MPC(options=...): expected Options, got {self.options!r}")
         for name, above in (("kappa", 0.0), ("time_limit", 0.0), ("period", 0.0), ("kappa_grad", 0.0)):
             value = getattr(self, name)
             if value is not None and not value > above:

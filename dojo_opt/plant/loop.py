@@ -88,6 +88,8 @@ def closed_loop(
     """
     if not isinstance(plant, Plant):
         raise TypeError(f"closed_loop(plant): expected a Plant, as Plant(simulator), got {plant!r}")
+    if not callable(controller):
+        raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
     h = plant.sim.time_step
     steps = round(checks.number("closed_loop(duration)", duration, above=0.0) / h)
     every = 1 if control_step is None else round(checks.number("closed_loop(control_step=...)", control_step) / h)

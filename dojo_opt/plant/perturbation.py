@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.border import whole
+from sim.contact_settings import with_contacts
 from sim.mechanism import Mechanism
 from sim.parts import Input
-from sim.scene import with_contacts
 from sim.terrain.terrain import Terrain
 
 Vector = NDArray[np.float64]
@@ -63,16 +64,28 @@ class Perturbation:
         call = "Perturbation"
         for name in ("payload", "damping", "delay"):
             checks.number(f"{call}({name}=...)", getattr(self, name), at_least=0.0)
+        for name in ("slope_heading", "ground_height"):
+            checks.number(f"{call}({name}=...)", getattr(self, name))
+        for name in ("noise", "payload_inertia"):
+            if np.any(_array(f"{call}({name}=...)", getattr(self, name)) < 0.0):
+                raise ValueError(f"{call}({name}=...): expected numbers >= 0, got {getattr(self, name)!r}")
+        _array(f"{call}(offset=...)", self.offset)
+        if self.control_limits is not None:
+            _check_limits(f"{call}(control_limits=...)", self.control_limits)
+        whole(f"{call}(seed=...)", self.seed, 0)
         if self.friction is not None:
             checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
         if not abs(checks.number(f"{call}(slope=...)", self.slope)) < 0.5 * np.pi:
             raise ValueError(f"{call}(slope=...): expected less than a right angle, got {self.slope:g} rad")
+        if self.terrain is not None and not isinstance(self.terrain, Terrain):
+            raise TypeError(f"{call}(terrain=...): expected a Terrain, got {self.terrain!r}")
         if self.terrain is not None and (self.slope or self.ground_height):
             raise ValueError(f"{call}(terrain=...): give either it or a slope or ground_height")
-        for push in self.pushes:
+        pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
+        for push in pushes:
             if not isinstance(push, Push):
                 raise TypeError(f"{call}(pushes=...): expected a sequence of Push, got {push!r}")
-        object.__setattr__(self, "pushes", tuple(self.pushes))
+        object.__setattr__(self, "pushes", pushes)
 
     @property
     def normal(self) -> Vector:
@@ -92,10 +105,9 @@ class Perturbation:
     def mechanism(self, mechanism: Mechanism) -> Mechanism:
         """The mechanism of the plant; three inputs, forces along x, y, z, are added for every body that is pushed."""
         bodies = list(mechanism.bodies)
+        name = self.payload_body or bodies[0].name
+        checks.one_of("Perturbation(payload_body=...)", name, mechanism.body_names)
         if self.payload > 0.0 or np.any(self.payload_inertia):
-            name = checks.one_of(
-                "Perturbation(payload_body=...)", self.payload_body or bodies[0].name, mechanism.body_names
-            )
             i = mechanism.body_names.index(name)
             added = np.diag(np.broadcast_to(np.asarray(self.payload_inertia, dtype=float), (3,)))
             inertia = np.asarray(bodies[i].inertia) + added
@@ -146,6 +158,21 @@ class Perturbation:
         out[3:7] = _product(np.concatenate([[np.cos(half)], np.sin(half) * axis]), x[3:7])
         out[v : v + 3] = turn @ x[v : v + 3]
         return out
+
+
+def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
+    """A finite array of whatever shape."""
+    return checks.array(call, value, (None,) * np.ndim(value))
+
+
+def _check_limits(call: str, limits: Any) -> None:
+    """Refuse what is no (lower, upper) with lower <= upper; infinity is allowed."""
+    try:
+        lo, hi = (np.asarray(b, dtype=np.float64) for b in limits)
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected (lower, upper), got {limits!r}") from None
+    if not np.all(lo <= hi):
+        raise ValueError(f"{call}: expected lower <= upper, got {limits!r}")
 
 
 def _rotation(slope: float, heading: float) -> Matrix:

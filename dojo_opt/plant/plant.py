@@ -50,6 +50,8 @@ class Plant:
         if not isinstance(sim, Simulator):
             raise TypeError(f"Plant(sim): expected a Simulator, got {sim!r}")
         checks.keywords("Plant(...)", fields, Perturbation.__dataclass_fields__)
+        if perturbation is not None and not isinstance(perturbation, Perturbation):
+            raise TypeError(f"Plant(perturbation=...): expected a Perturbation, got {perturbation!r}")
         if perturbation is not None and fields:
             raise ValueError(f"Plant(perturbation=...): give either it or its fields, got also {', '.join(fields)}")
         self.sim = sim
@@ -59,15 +61,17 @@ class Plant:
         self.normal = p.normal
         contacts = self.simulator.mechanism.contacts
         self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
-        self._noise = np.array(np.broadcast_to(np.asarray(p.noise, dtype=float), (sim.ndx,)))
+        self._noise = _spread("Plant(noise=...)", p.noise, sim.ndx)
         lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
-        self._limits = tuple(np.broadcast_to(np.asarray(b, dtype=float), (sim.nu,)) for b in (lo, hi))
+        self._limits = tuple(_spread("Plant(control_limits=...)", b, sim.nu) for b in (lo, hi))
         self._late = round(p.delay / sim.time_step)
         if abs(self._late * sim.time_step - p.delay) > 1e-9:
             raise ValueError(
                 f"Plant(delay=...): expected a multiple of the time step {sim.time_step:g} s, got {p.delay:g} s"
             )
-        x = self.start if len(np.atleast_1d(p.offset)) == 0 else sim.integrate(self.start, p.offset)
+        x = self.start
+        if np.size(p.offset):
+            x = sim.integrate(x, checks.array("Plant(offset=...)", p.offset, (sim.ndx,)))
         self._x0 = p.on_ground(sim.mechanism, x)
         if p.terrain is not None:
             self._x0 = Feet(self.simulator, self.simulator.mechanism.contact_names).put_down(x)
@@ -149,6 +153,14 @@ class Plant:
     def _base(self, x: Vector) -> Vector:
         """Maximal state (13,) of the first body."""
         return np.asarray(self.sim.maximal(x)[0])
+
+
+def _spread(call: str, value: ArrayLike, size: int) -> Vector:
+    """A number for all, or one for each of `size`."""
+    given = np.asarray(value, dtype=np.float64)
+    if given.shape not in ((), (size,)):
+        raise ValueError(f"{call}: expected a number or shape ({size},), got {given.shape}")
+    return np.array(np.broadcast_to(given, (size,)))
 
 
 def stands_free(mechanism: Mechanism) -> bool:

@@ -17,6 +17,7 @@ from dojo_opt.plant.loop import closed_loop
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim import checks
+from sim.border import whole
 
 Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]
@@ -100,10 +101,17 @@ def monte_carlo(
     Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
     number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
     """
-    count = checks.number("monte_carlo(runs=...)", runs, above=0.0)
-    if count != int(count):
-        raise ValueError(f"monte_carlo(runs=...): expected a whole number, got {runs!r}")
-    children = np.random.SeedSequence(seed).spawn(int(count))
+    count = whole("monte_carlo(runs=...)", runs)
+    if not isinstance(plant, Plant):
+        raise TypeError(f"monte_carlo(plant): expected a Plant, as Plant(simulator), got {plant!r}")
+    for name, function in (("controller", controller), ("sampler", sampler)):
+        if not callable(function):
+            raise TypeError(f"monte_carlo({name}): expected a function, got {function!r}")
+    if executor is not None and not hasattr(executor, "submit"):
+        raise TypeError(f"monte_carlo(executor=...): expected an Executor, with submit(), got {executor!r}")
+    whole("monte_carlo(seed=...)", seed, 0)
+    checks.number("monte_carlo(duration)", duration, above=0.0)
+    children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), control_step, child) for child in children]
     if executor is None:
         return Study([_run(*task) for task in tasks], float(duration), seed)
@@ -121,6 +129,8 @@ def _run(
 ) -> Outcome:
     """One run; at module level, so that other processes can import it."""
     perturbation = sampler(np.random.default_rng(seed))
+    if not isinstance(perturbation, Perturbation):
+        raise TypeError(f"monte_carlo(sampler): expected it to return a Perturbation, got {perturbation!r}")
     own = controller.fresh() if hasattr(controller, "fresh") else copy.copy(controller)
     loop = closed_loop(own, plant.perturbed(perturbation), duration, control_step=control_step)
     return Outcome(

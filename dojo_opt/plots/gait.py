@@ -61,8 +61,9 @@ def gait_diagram(m: Motion, ax: Axes) -> Axes:
         spans = [(edges[a], edges[b] - edges[a]) for a, b in zip(changes[::2], changes[1::2], strict=True)]
         ax.broken_barh(spans, (row - 0.35, 0.7), facecolors=f"C{row}")
     ax.set_yticks(range(len(feet)), [m.mechanism.contact_names[k] for k in feet])
-    ax.set_xlim(0.0, float(edges[-1]))
-    ax.set_ylim(len(feet) - 0.5, -0.5)
+    if feet and edges[-1] > 0.0:
+        ax.set_xlim(0.0, float(edges[-1]))
+        ax.set_ylim(len(feet) - 0.5, -0.5)
     return finish(ax, "on the ground", "time [s]")
 
 

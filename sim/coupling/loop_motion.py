@@ -9,15 +9,14 @@ is closer to it is taken.
 
 from __future__ import annotations
 
+from sim import late
 from sim.coupling.loop_lead import lead_loops
-from sim.coupling.loop_velocity import close_velocity
 from sim.coupling.loops import direct_loops
 from sim.energy import factor_mass_matrix
-from sim.late import Late
+from sim.late import close_velocity
 from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -25,7 +24,7 @@ _CLOSER = 0.5  # share of a least pivot
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
 
 
-@late(Late.PREDICT_LOOPS, False)
+@late.predict_loops.defined(otherwise=False)
 def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
     """loop_velocity = 2 P v - v, and the directions of forces that it leads (loop_lead.py); False if a guess is not v.
 
@@ -52,7 +51,7 @@ def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, gues
     return not given
 
 
-@late(Late.LEAD_AGAIN, False)
+@late.lead_again.defined(otherwise=False)
 def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
     if work.loop_led[0] == 0:
@@ -65,7 +64,7 @@ def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     return True
 
 
-@late(Late.MEET_AHEAD, False)
+@late.meet_ahead.defined(otherwise=False)
 def meet_ahead(model: Model, work: Work) -> bool:
     """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
 
@@ -80,7 +79,7 @@ def meet_ahead(model: Model, work: Work) -> bool:
     return True
 
 
-@late(Late.FARTHER, False)
+@late.is_farther.defined(otherwise=False)
 def is_farther(model: Model, work: Work, status: int) -> bool:
     """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
     kept = 0.0

@@ -40,7 +40,7 @@ class MjcfReport:
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MjcfMechanism(Mechanism):
     """A Mechanism that `load_mjcf` made; `report` says what became of the file."""
 

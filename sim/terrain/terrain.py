@@ -82,6 +82,8 @@ class Terrain:
         f takes and returns arrays: f(X, Y) with X and Y of shape (nx, ny). A spline is off by about
         (spacing / wavelength)^4 of the height of a wave; `terrain.height(x, y)` tells.
         """
+        if not callable(f):
+            raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
         lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
         X, Y = np.meshgrid(*lines, indexing="ij")
         values = np.array(np.broadcast_to(np.asarray(f(X, Y), dtype=np.float64), X.shape))

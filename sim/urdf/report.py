@@ -61,7 +61,7 @@ class UrdfReport:
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class UrdfMechanism(Mechanism):
     """A Mechanism that `load_urdf` made; `report` says what became of the file."""
 

@@ -140,7 +140,7 @@ def test_save_and_load(tmp_path):
 @pytest.mark.parametrize(
     "settings, message",
     [
-        ({"max_iterations": -1}, r"ilqr\(max_iterations=...\): expected a number >= 0, got -1"),
+        ({"max_iterations": -1}, r"ilqr\(max_iterations=...\): expected a whole number >= 0, got -1"),
         ({"reopen": "open"}, r'ilqr\(reopen=...\): expected "feedback" or "gaps"'),
         ({"stages": ()}, "at least one stage"),
         ({"stages": ((0.0, 1e-3),)}, "expected positive kappa"),

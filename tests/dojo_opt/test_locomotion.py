@@ -195,7 +195,7 @@ def test_a_leap_that_is_too_high_is_no_success():
 
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])
 def test_periodic_gaits_choose_their_start(name, settings):
-    problem = getattr(problems, name)(periodic=True, cycles=1, **settings)
+    problem = getattr(problems, name)(periodic=True, **settings)
     plan = ilqr(problem)
     assert plan.success, plan.summary()
     assert plan.nit <= 40 and upright(plan.x).min() > 0.96

@@ -1,0 +1,118 @@
+"""What planner, plant and Monte Carlo are given is checked at the border: the message names the call and the culprit."""
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+
+HOP = dojo.problems.hop()
+SIM, START = HOP.sim, HOP.start
+PLANT = dojo.Plant(SIM)
+
+
+def turned(length):
+    """The start with a quaternion of another length."""
+    x = START.copy()
+    x[3] = length
+    return x
+
+
+def problem(**settings):
+    return dojo.Problem(SIM, **{"start": START, "horizon": 20, **settings})
+
+
+def study(**settings):
+    given = {"controller": lambda time, x: np.zeros(3), "plant": PLANT, "sampler": lambda rng: dojo.Perturbation()}
+    return dojo.monte_carlo(**{**given, "duration": 0.1, "runs": 1, **settings})
+
+
+def goal(x):
+    return problem(constraints=dojo.constraint.Goal(x))
+
+
+# fmt: off
+CALLS = {
+    "no simulator": (lambda: dojo.Problem(SIM.mechanism, START, 20), "Problem(sim)", "Simulator", "raiberthopper"),
+    "no horizon": (lambda: problem(horizon=None), "Problem(horizon=...)", "whole number", "None"),
+    "horizon zero": (lambda: problem(horizon=0), "Problem(horizon=...)", ">= 1", "0"),
+    "half a step": (lambda: problem(substeps=1.5), "Problem(substeps=...)", "1.5"),
+    "start as text": (lambda: problem(start="standing"), "Problem(start=...)", "numbers", "standing"),
+    "start without a turn": (lambda: problem(start=turned(0.0)), "Problem(start=...)", "[3:7]", "got length 0"),
+    "start that is stretched": (lambda: problem(start=turned(2.0)), "Problem(start=...)", "unit", "got length 2"),
+    "goal of zeros": (lambda: goal(np.zeros(15)), "Goal(target=...)", "unit quaternion", "got length 0"),
+    "reference of zeros": (lambda: problem(cost=dojo.cost.Tracking(np.vstack([START] * 20 + [turned(0.5)]), 1.0)),
+                           "Tracking(reference=...)", "unit quaternion", "in row 20"),
+    "limits as text": (lambda: problem(control_limits=("low", "high")), "Problem(control_limits=...)", "low"),
+    "tolerance as text": (lambda: dojo.ilqr(HOP, tolerance="fine"), "ilqr(tolerance=...)", "fine"),
+    "tolerance nan": (lambda: dojo.ilqr(HOP, tolerance=np.nan), "ilqr(tolerance=...)", "nan"),
+    "half an iteration": (lambda: dojo.ilqr(HOP, max_iterations=2.5), "ilqr(max_iterations=...)", "whole", "2.5"),
+    "callback": (lambda: dojo.ilqr(HOP, callback=3), "ilqr(callback=...)", "3"),
+    "stages": (lambda: dojo.ilqr(HOP, stages=(1e-3,)), "ilqr(stages=...)", "0.001"),
+    "options as a table": (lambda: dojo.ilqr(HOP, options={"verbose": True}), "ilqr(options=...)", "verbose"),
+    "warm start from a file name": (lambda: dojo.ilqr(HOP, warm_start="plan.npz"), "ilqr(warm_start=...)", "plan.npz"),
+    "options of mpc": (lambda: dojo.MPC(HOP, options=3), "MPC(options=...)", "3"),
+    "target in space": (lambda: dojo.problems.hop(target=(0.5, 0.5, 0.5)), "problems.hop(target=...)", "(2,)", "(3,)"),
+    "no substeps": (lambda: dojo.problems.hop(substeps=0), "problems.hop(substeps=...)", "0"),
+    "trot of a block": (lambda: dojo.gaits.trot(dojo.problems.block().sim), "gaits.trot(sim)", "legs", "block"),
+    "trot of a model": (lambda: dojo.gaits.trot("quadruped"), "gaits.trot(sim)", "'quadruped'"),
+    "speed as a word": (lambda: dojo.problems.trot(speed="fast"), "gaits.trot(speed=...)", "fast"),
+    "speed nan": (lambda: dojo.problems.trot(speed=np.nan), "gaits.trot(speed=...)", "nan"),
+    "unknown keyword": (lambda: dojo.problems.trot(sped=0.1), "gaits.trot(...)", "'sped'", "'speed'"),
+    "half a cycle": (lambda: dojo.problems.walk(cycles=0.5), "gaits.walk(cycles=...)", "0.5"),
+    "distance as a word": (lambda: dojo.problems.jump(distance="far"), "gaits.jump(distance=...)", "far"),
+    "rest of a mechanism": (lambda: dojo.equilibrium(SIM.mechanism), "equilibrium(sim)", "Simulator"),
+    "negative noise": (lambda: dojo.Plant(SIM, noise=-1.0), "Perturbation(noise=...)", "-1.0"),
+    "noise nan": (lambda: dojo.Plant(SIM, noise=np.nan), "Perturbation(noise=...)", "nan"),
+    "noise shape": (lambda: dojo.Plant(SIM, noise=np.ones(3)), "Plant(noise=...)", "(14,)", "(3,)"),
+    "offset shape": (lambda: dojo.Plant(SIM, offset=np.ones(3)), "Plant(offset=...)", "(14,)", "(3,)"),
+    "limits reversed": (lambda: dojo.Plant(SIM, control_limits=(1, -1)), "Perturbation(control_limits=...)", "(1, -1)"),
+    "limits nan": (lambda: dojo.Plant(SIM, control_limits=(np.nan, 1)), "Perturbation(control_limits=...)", "nan"),
+    "one limit": (lambda: dojo.Plant(SIM, control_limits=5.0), "Perturbation(control_limits=...)", "5.0"),
+    "limits shape": (lambda: dojo.Plant(SIM, control_limits=(np.zeros(2), np.ones(2))), "control_limits", "(3,)", "(2,)"),
+    "payload on a hand": (lambda: dojo.Plant(SIM, payload_body="hand"), "payload_body", "hand", "body, foot"),
+    "inertia taken away": (lambda: dojo.Plant(SIM, payload_inertia=-1.0), "payload_inertia", "-1.0"),
+    "heading nan": (lambda: dojo.Plant(SIM, slope_heading=np.nan), "Perturbation(slope_heading=...)", "nan"),
+    "height as text": (lambda: dojo.Plant(SIM, ground_height="up"), "Perturbation(ground_height=...)", "up"),
+    "terrain as a number": (lambda: dojo.Plant(SIM, terrain=0.1), "Perturbation(terrain=...)", "0.1"),
+    "seed": (lambda: dojo.Plant(SIM, seed=-1), "Perturbation(seed=...)", "-1"),
+    "perturbation": (lambda: dojo.Plant(SIM, perturbation=3.0), "Plant(perturbation=...)", "3.0"),
+    "controller": (lambda: dojo.closed_loop("mpc", PLANT, 0.1), "closed_loop(controller)", "'mpc'"),
+    "study without a sampler": (lambda: study(sampler=3), "monte_carlo(sampler)", "3"),
+    "study without a plant": (lambda: study(plant=SIM), "monte_carlo(plant)", "Plant"),
+    "sampler of numbers": (lambda: study(sampler=lambda rng: 0.5), "monte_carlo(sampler)", "Perturbation", "0.5"),
+    "executor": (lambda: study(executor=4), "monte_carlo(executor=...)", "4"),
+    "half a run": (lambda: study(runs=2.5), "monte_carlo(runs=...)", "2.5"),
+    "study seed": (lambda: study(seed=-1), "monte_carlo(seed=...)", "-1"),
+    "study duration": (lambda: study(duration=-1.0), "monte_carlo(duration)", "-1"),
+}
+# fmt: on
+
+
+@pytest.mark.parametrize("case", CALLS)
+def test_border(case):
+    call, *words = CALLS[case]
+    with pytest.raises((ValueError, TypeError)) as error:
+        call()
+    for word in words:
+        assert word in str(error.value), str(error.value)
+
+
+def test_quaternions_within_rounding_are_made_one():
+    x = turned(1.0 + 5e-7)
+    made = problem(start=x, cost=dojo.cost.Tracking(x, 1.0))
+    assert np.linalg.norm(made.start[3:7]) == 1.0
+    np.testing.assert_allclose(np.linalg.norm(made.costs[0].reference[:, 3:7], axis=1), 1.0, atol=1e-15)
+
+
+def test_one_push_needs_no_list():
+    push = dojo.Push(0.1, (0.0, 1.0, 0.0))
+    assert dojo.Perturbation(pushes=push).pushes == (push,)
+
+
+def test_a_problem_says_what_it_is_about():
+    assert repr(HOP) == "Problem(raiberthopper, 20 knots of 0.05 s, Tracking, Effort, Goal)"
+
+
+def test_options_are_public():
+    plan = dojo.ilqr(HOP, options=dojo.Options(max_iterations=2, stages=(dojo.Stage(1e-2, 1e-2),)))
+    assert plan.status == dojo.Status.MAX_ITERATIONS and plan.nit == 2
