@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import Any
 
@@ -37,11 +36,9 @@ class Journal:
         record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
         self._tick = tock
         self.records.append(record)
-        if self._options.verbose:
-            stream = self._options.stream or sys.stdout
-            if len(self.records) == 1:
-                print(table_header(), file=stream)
-            print(table_line(record), file=stream)
+        if len(self.records) == 1:
+            self._options.say(table_header())
+        self._options.say(table_line(record))
         if self._options.callback is not None:
             try:
                 self._options.callback(record)

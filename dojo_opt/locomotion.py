@@ -22,7 +22,7 @@ from sim.simulator import Simulator
 
 Array = NDArray[np.float64]
 
-__all__ = ["bound", "follow", "jump", "leap", "pace", "trot", "turn", "walk"]
+__all__ = ["bound", "follow", "jump", "pace", "trot", "turn", "walk"]
 
 TORQUE_LIMIT = 33.5  # of every hinge of the A1 [N m]
 # weights of squares per second: base place (x, y, z), its rotation vector, angles, base velocities, joint rates
@@ -173,63 +173,15 @@ def jump(
 
     settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction. Jumps planned with steps of
     20 ms land up to 72 mm off at 1 ms, those up and backwards worst. As for `leap`, `ilqr` therefore ends with every
-    step cut into `refinement`, and they land within 4 mm.
+    step cut into `refinement`, and they land within 4 mm. There the height is a constraint, at the top of the gait.
     """
     problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+    tracking = problem.specs[0][0]
+    assert isinstance(tracking, Tracking)
+    path = np.asarray(tracking.reference)
+    top = int(path[:, 2].argmax())
     problem.refinement = refinement
-    return problem
-
-
-def leap(
-    *,
-    distance: float = 0.3,
-    height: float = 0.2,
-    duration: float = 0.8,
-    damping: float = 0.5,
-    time_step: float = 0.02,
-    refinement: int = 5,
-    **model: Any,
-) -> Problem:
-    """The quadruped gets `distance` [m] ahead from rest with nothing but a goal: no gait, no contact sequence.
-
-    As in `hop`: the first half of `duration` [s] tracks the standing pose at the goal, `height` [m] up, the second half
-    the pose itself; squares of place weigh 1, 1, 20, attitude 2, angles .05 per second, the rest as in `follow`, and
-    the pose of the base at the end is a constraint. The guess is the rollout of the torques of standing: single
-    shooting. It asks for the height and does not insist: the base rises by .15, .20, .22 and .24 m for .15, .2, .25 and
-    .3 m. Of 28 leaps of -.2 to .5 m and .15 to .3 m high 27 are planned in .8 s; with more time to spend on the ground,
-    the planner more often ends in a fall. The other, .5 m at .25 m, is planned from a leap of .4 m (`warm_start=`).
-    Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, because their gains know it at one
-    instant only. `ilqr` therefore ends with every step cut into `refinement`, and such plans land at 1 ms, too.
-    """
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step, kappa=PLANNED)
-    horizon = max(2, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
-    start, torques = equilibrium(sim)
-    goal = start.copy()
-    goal[0] += distance
-    apex = goal.copy()
-    apex[2] += height
-    half = horizon // 2
-    legs = sim.nv - 6
-    parts = [
-        np.array([1.0, 1.0, 20.0]),
-        np.full(3, 2.0),
-        np.full(legs, 0.05),
-        np.full(6, VELOCITY),
-        np.full(legs, RATE),
-    ]
-    problem = Problem(
-        sim,
-        start,
-        horizon,
-        cost=[
-            Tracking(np.array([apex] * half + [goal] * (horizon + 1 - half)), time_step * np.concatenate(parts)),
-            Effort(time_step * EFFORT),
-        ],
-        constraints=[Goal(goal, components=np.arange(6))],
-        control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
-        controls0=torques,
-    )
-    problem.refinement = refinement
+    problem.refined_constraints = (Goal(path[top], components=[2], knots=top),)
     return problem
 
 

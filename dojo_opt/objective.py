@@ -24,6 +24,7 @@ class Objective:
     def __init__(self, problem: Problem, options: Options) -> None:
         size = problem.sim.ndx + problem.sim.nu
         self._sim = problem.sim
+        self.violation = problem.violation
         self.costs = problem.costs
         self.constraints = problem.constraints
         self.g = np.zeros((problem.horizon + 1, size))
@@ -32,17 +33,20 @@ class Objective:
         self._last: list[Matrix] = []
 
     def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
-        """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem."""
+        """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem.
+
+        Constraints that have been added since, after the others, start anew.
+        """
+        shapes = [term.slope.shape for term in self.constraints]
         for given in (multipliers, penalties):
-            if given and [a.shape for a in given] != [term.slope.shape for term in self.constraints]:
+            if [a.shape for a in given] != shapes[: len(given)]:
                 raise ValueError(
-                    "ilqr(warm_start=...): expected multipliers of shapes "
-                    f"{[term.slope.shape for term in self.constraints]}, got {[a.shape for a in given]}"
+                    f"ilqr(warm_start=...): expected multipliers of shapes {shapes}, got {[a.shape for a in given]}"
                 )
         for i, term in enumerate(self.constraints):
             first = self._options.penalty * self._unit(term)
-            term.slope[:] = multipliers[i] if multipliers else 0.0
-            term.weight[:] = 0.5 * (penalties[i] if penalties else first) * term.mask
+            term.slope[:] = multipliers[i] if i < len(multipliers) else 0.0
+            term.weight[:] = 0.5 * (penalties[i] if i < len(penalties) else first) * term.mask
         self._last = []
 
     def _unit(self, term: Term) -> Any:
@@ -77,14 +81,6 @@ class Objective:
         self.H.fill(0.0)
         for term in (*self.costs, *self.constraints):
             term.expand(xs, us, self.g, self.H)
-
-    def violation(self, xs: Matrix, us: Matrix) -> float:
-        """Largest violation of a constraint."""
-        worst = 0.0
-        for term in self.constraints:
-            term.update(xs, us)
-            worst = max(worst, float(term.violation().max(initial=0.0)))
-        return worst
 
     def worst(self, xs: Matrix, us: Matrix) -> tuple[float, str]:
         """Largest violation of a constraint, and which entry of which it is."""

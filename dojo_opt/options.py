@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
@@ -94,3 +95,8 @@ class Options:
         if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
             what = "a whole number" if whole else "a number"
             raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {value!r}")
+
+    def say(self, line: str) -> None:
+        """Print a line where the table goes, if `verbose`."""
+        if self.verbose:
+            print(line, file=self.stream or sys.stdout)

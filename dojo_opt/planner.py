@@ -8,7 +8,6 @@ survive.
 
 from __future__ import annotations
 
-import sys
 import time
 from dataclasses import replace
 from typing import Any
@@ -62,9 +61,12 @@ def ilqr(
     plan = Solver(problem, options).solve(controls, states, warm_start)
     if problem.refinement == 1 or not plan.success:
         return plan
+    options.say(f"Once more, every time step cut into {problem.refinement}:")
     finer = Solver(problem.refined(problem.refinement), options).solve(warm_start=plan)
     history, seconds = plan.history + finer.history, plan.seconds + finer.seconds
-    return replace(finer, nit=plan.nit + finer.nit, history=history, seconds=seconds)
+    both = replace(finer, nit=plan.nit + finer.nit, history=history, seconds=seconds)
+    options.say(f"{plan.nit} + {finer.nit} iterations, {1e3 * seconds:.1f} ms in all")
+    return both
 
 
 class Solver:
@@ -184,6 +186,7 @@ class Solver:
             detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
         violation, culprit = self.objective.worst(now.x, now.u)
         if status != Status.SOLVED and violation > options.violation:
+            detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
             detail += f" Violated most: {culprit}, by {violation:.2g}."
         plan = Plan(
             success=status == Status.SOLVED,
@@ -206,6 +209,5 @@ class Solver:
             penalties=[2.0 * term.weight for term in self.objective.constraints],
             problem=self.problem,
         )
-        if options.verbose:
-            print(plan.closing_line(), file=options.stream or sys.stdout)
+        options.say(plan.closing_line())
         return plan

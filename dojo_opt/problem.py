@@ -64,6 +64,7 @@ class Problem:
     `start` is then a guess. Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
 
     The attribute `refinement` is 1; set to more, `ilqr` ends by planning `refined(refinement)` from what it has found.
+    `refined_constraints` are constraints that only that one has: for what leads nowhere from a guess that is far off.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Problem:
         self.horizon = whole("Problem(horizon=...)", horizon)
         self.substeps = whole("Problem(substeps=...)", substeps)
         self.refinement = 1
+        self.refined_constraints: tuple[Spec, ...] = ()
         start = numbers("Problem(start=...)", start)
         if start.shape != (sim.nx,):
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
@@ -110,7 +112,7 @@ class Problem:
         return f"Problem({name}, {knots}, {', '.join(terms) or 'no terms'})"
 
     def refined(self, count: int = 5) -> Problem:
-        """The same problem with every time step cut into `count`: same knots, inputs and terms.
+        """The same problem with every time step cut into `count`: same knots, inputs, terms; `refined_constraints` too.
 
         A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
         shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
@@ -121,6 +123,7 @@ class Problem:
         finer.sim = self.sim.replace(time_step=self.sim.time_step / int(count))
         finer.substeps = self.substeps * int(count)
         finer.refinement = 1
+        finer.specs, finer.refined_constraints = (self.specs[0], (*self.specs[1], *self.refined_constraints)), ()
         finer.bind()
         return finer
 

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.locomotion import bound, follow, jump, leap, pace, trot, turn, walk
+from dojo_opt.leaps import leap
+from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from sim import checks

@@ -28,6 +28,7 @@ Matrix = NDArray[np.float64]
 __all__ = ["Hopping", "hopper_mpc", "plant", "quadruped_mpc"]
 
 _GRAVITY = 9.81  # [m/s^2]
+_QUADRUPED = {"learn_ground": True, "kappa": 1e-3, "friction": 0.4}
 _HOPPER = replace(OPTIONS, shooting=1.0)  # after a push most rollouts are lost, and gaps would stay open for ticks
 
 
@@ -112,7 +113,8 @@ def quadruped_mpc(
     damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of
     5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
     terrain: that the model knows, whose height under the base is added to that of the reference; level ground without.
-    settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it.
+    settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it, and plans count on a
+    friction of .4 where the robot's feet have .8: what they ask for is there on slippery ground, too.
     """
     knot, horizon, limit = 0.04, 20, 33.5
     sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps, kappa=PLANNED)
@@ -137,7 +139,7 @@ def quadruped_mpc(
         controls0=np.clip(held(times[:-1]), -limit, limit),
         states0=reference(times),
     )
-    return MPC(problem, reference={0: reference, 1: held}, **{"learn_ground": True, "kappa": 1e-3, **settings})
+    return MPC(problem, reference={0: reference, 1: held}, **{**_QUADRUPED, **settings})
 
 
 class _OnTerrain:
@@ -153,8 +155,8 @@ class _OnTerrain:
 
 
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
-    """The plant that belongs to an MPC: its own mechanism with a finer step and harder contact, and a perturbation."""
-    return Plant(mpc.sim.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
+    """The plant that belongs to an MPC: that of its problem with a finer step and harder contact, perturbed."""
+    return Plant(mpc.nominal.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
 
 
 if not TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time as clock
-from collections import deque
 from functools import partial
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.line_search import Iterate
+from dojo_opt.mpc.delay import Delay
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.mpc.horizon import shift_multipliers, tail, with_own_terms
 from dojo_opt.mpc.measurement import Measurement
@@ -32,7 +32,6 @@ Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
 _LOST = 10.0  # times the merit of the shifted plan: a rollout worse than that has left it
-_PREDICTION = 5e-3  # longest step of the prediction over the delay [s]
 
 __all__ = ["MPC"]
 
@@ -64,16 +63,15 @@ class MPC:
         checks.keywords("MPC(...)", settings, Settings.__dataclass_fields__)
         self.settings = Settings(**settings)
         self._again = partial(MPC, problem, int(iterations), reference=reference, plan=plan, **settings)
-        self.problem = with_own_terms(problem)
-        self.sim = self.problem.sim
+        friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
+        self.nominal = problem.sim  # what a plant is made from
+        self.problem = with_own_terms(problem, **friction)
+        self.sim = self.problem.sim  # what plans are made with
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(int(iterations)))
         self.references = References(self.problem, reference)
-        self._fine = None
-        if self.settings.delay:
-            self._steps = int(np.ceil(self.settings.delay / _PREDICTION - 1e-9))
-            self._fine = self.sim.replace(time_step=self.settings.delay / self._steps)
+        self._delay = Delay(self.sim, self.settings.delay)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
@@ -96,8 +94,7 @@ class MPC:
         self.log: list[Tick] = []
         self.policy: Policy | None = None
         self._measured = Measurement(self.sim, self.settings.mean_velocity)
-        self._issued: deque[tuple[float, Vector]] = deque()
-        self._first_input = self.problem.controls0[0]  # what acts until a command arrives: a guess
+        self._delay.forget(self.problem.controls0[0])
         self._due = -np.inf
         self.problem.start = self.start.copy()
         self._ground.forget()
@@ -128,31 +125,15 @@ class MPC:
         limits = self.problem.control_limits
         if limits is not None:
             np.clip(u, *limits, out=u)
-        if settings.delay:
-            self._first_input = u if not self._issued else self._first_input
-            self._issued.append((now + settings.delay, u))
-            while len(self._issued) > 1 and self._issued[1][0] <= now:
-                self._issued.popleft()
+        self._delay.issue(now, u)
         return u
-
-    def _ahead(self, now: float) -> Vector:
-        """State of the model at which the next plan starts: the measured one, moved on by the delay."""
-        if self._fine is None:
-            return self._measured.state()
-        ends, h = [], self._fine.time_step
-        x = self._measured.over(h)
-        for k in range(self._steps):
-            u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), self._first_input)
-            x = self._fine.step(x, u).x
-            ends.append((now + (k + 1) * h, x))
-        return self._measured.after(ends)
 
     def _begin(self, now: float) -> None:
         """The first plan."""
         begin = clock.perf_counter(), clock.thread_time()
         self._due = now + self.period
         self.references.move(now + self.settings.delay)
-        self.problem.start = self._ahead(now)
+        self.problem.start = self._delay.ahead(now, self._measured)
         plan = self._first or Solver(self.problem).solve()
         shape = (self.problem.horizon, self.sim.nu)
         if plan.u.shape != shape:
@@ -166,7 +147,7 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = self._solver.horizon.states("MPC(x)", self._ahead(now))
+        start = self._solver.horizon.states("MPC(x)", self._delay.ahead(now, self._measured))
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period

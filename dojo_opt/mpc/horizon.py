@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +49,13 @@ def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
             term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
 
 
-def with_own_terms(problem: Problem) -> Problem:
-    """The problem with a simulator and terms of its own: MPC moves their references and ground, and gives the start."""
+def with_own_terms(problem: Problem, **settings: Any) -> Problem:
+    """The problem with a simulator and terms of its own: MPC moves their references and ground, and gives the start.
+
+    settings: of `Simulator.replace`.
+    """
     own = copy.copy(problem)
-    own.sim = problem.sim.replace()
+    own.sim = problem.sim.replace(**settings)
     own.free_start = None
     own.bind()
     return own

@@ -33,6 +33,7 @@ class Settings:
     delay: float = 0.0  # from a measurement to the input it causes [s]; plans start that much later
     time_limit: float = float("inf")  # of a tick [s]; looked at before each iteration
     mean_velocity: bool = True  # see `dojo_opt.mpc.measurement`
+    friction: float | None = None  # that plans count on, instead of the model's; less than the ground has is safer
     learn_ground: bool = False  # take the height of the ground from the contacts that stand
     options: Options | None = None  # of the planner in a tick; its stages are made from kappa and kappa_grad
 
@@ -47,6 +48,8 @@ class Settings:
                 raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
         for name in ("gain_scale", "delay"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
+        if self.friction is not None:
+            checks.number("MPC(friction=...)", self.friction, at_least=0.0)
 
     def planner(self, iterations: int) -> Options:
         """Options of the planner for the iterations of one tick."""

@@ -110,6 +110,22 @@ def test_table_and_history():
     assert [r["iteration"] for r in plan.history] == list(range(1, plan.nit + 1))
 
 
+def test_the_refined_problem_may_ask_for_more_and_the_table_tells_both():
+    problem, stream = hop(), io.StringIO()
+    higher = ilqr(problem).x[10] + np.eye(15)[2] * 0.05
+    problem.refinement = 2
+    problem.refined_constraints = (Goal(higher, components="body z", knots=10),)
+    plan = ilqr(problem, verbose=True, stream=stream)
+    assert plan.success and plan.substeps == 2 and len(plan.multipliers) == 2
+    assert plan.x[10, 2] == pytest.approx(higher[2], abs=1e-3)
+    ends = [line.split(" iterations")[0] for line in stream.getvalue().splitlines() if " iterations, " in line]
+    counts = [int(part) for part in ends[-1].split(" + ")]
+    assert len(ends) == 3 and len(counts) == 2 and sum(counts) == plan.nit == len(plan.history)
+    problem.refined_constraints = (Goal(higher + np.eye(15)[2] * 5.0, components="body z", knots=10),)
+    plan = ilqr(problem)
+    assert not plan.success and "Violated most: Goal of body z" in plan.message
+
+
 def test_save_and_load(tmp_path):
     plan = ilqr(swingup(constraints=[Goal([np.pi, 0.0])]))
     plan.save(tmp_path / "plan.npz")

@@ -138,7 +138,7 @@ def test_jump_leaves_the_ground(guess, iterations):
     check(problem, plan, iterations)
     lands(problem, plan)
     assert lowest_foot(problem, plan).max() > 0.15
-    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.17
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(0.2, abs=0.01)
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.3, abs=2e-3)
 
 
@@ -150,13 +150,13 @@ def test_jumps_up_and_back_land_in_short_steps(distance, height):
     plan = ilqr(problem)
     check(problem, plan, 25)
     lands(problem, plan)
-    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.85 * height
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
 
 
 @pytest.mark.parametrize(
     "distance, height",
     [(0.3, 0.2), (0.2, 0.2)]
-    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
+    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.25), (0.3, 0.3), (-0.2, 0.2)]],
 )
 def test_leap_is_found_from_standing_and_a_goal(distance, height):
     """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms."""
@@ -164,8 +164,8 @@ def test_leap_is_found_from_standing_and_a_goal(distance, height):
     assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
     plan = ilqr(problem)
     assert plan.success and plan.nit <= 140, plan.summary()
-    assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(0.8)
-    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.75 * height
+    assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
     assert lowest_foot(problem, plan).max() > 0.1
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(distance, abs=2e-3)
     lands(problem, plan)
@@ -173,14 +173,24 @@ def test_leap_is_found_from_standing_and_a_goal(distance, height):
 
 @pytest.mark.slow
 def test_a_leap_leads_to_a_longer_one():
-    """The longer one is not planned directly."""
+    """A plan of a shorter one, without its refinement, is a guess for it."""
     shorter, longer = (problems.leap(distance=distance, height=0.25) for distance in (0.4, 0.5))
     shorter.refinement = 1
     plan = ilqr(longer, warm_start=ilqr(shorter))
     assert plan.success and plan.nit <= 90, plan.summary()
     assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.5, abs=2e-3)
-    assert plan.x[:, 2].max() - plan.x[0, 2] > 0.19
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(0.25, abs=0.01)
     lands(longer, plan)
+
+
+@pytest.mark.slow
+def test_a_leap_that_is_too_high_is_no_success():
+    """With motors of a third of the torque the robot cannot rise by .3 m, and the plan says that it misses something."""
+    problem = problems.leap(height=0.3)
+    problem.control_limits = (np.full(12, -12.0), np.full(12, 12.0))
+    plan = ilqr(problem)
+    assert not plan.success
+    assert "Violated most: Goal of trunk" in plan.message
 
 
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])

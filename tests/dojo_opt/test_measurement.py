@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from standing_hopper import HOPPER, standing_problem
 
-import dojo_opt as dojo
+from dojo_opt.mpc.delay import Delay
 from dojo_opt.mpc.measurement import Measurement
 
 
@@ -35,15 +35,15 @@ def test_measured_velocity_is_left_alone_when_no_sample_is_a_model_step_old():
 
 
 def test_prediction_over_the_delay_ends_a_free_fall_where_it_ends():
-    problem = standing_problem()
-    mpc = dojo.MPC(problem, delay=0.02)
+    sim = standing_problem().sim
+    measured, delay = Measurement(sim), Delay(sim, 0.02)
     plant = HOPPER.replace(time_step=1e-3, kappa=1e-8)
     x = HOPPER.neutral()
     x[2] += 2.0
     fall = plant.rollout(plant.start(x[:8], np.zeros(7)), np.zeros((100, 3)), throw=True)
     for t, state in zip(fall.time[:81], fall.x[:81], strict=True):
-        mpc._measured.add(float(t), state)
-    mpc._first_input = np.zeros(3)
-    ahead = mpc._ahead(0.08)
+        measured.add(float(t), state)
+    delay.forget(np.zeros(3))
+    ahead = delay.ahead(0.08, measured)
     assert ahead[2] == pytest.approx(fall.x[-1, 2], abs=1e-6)
     assert ahead[10] == pytest.approx(-9.81 * 0.075, abs=1e-4)

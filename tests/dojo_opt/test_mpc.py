@@ -21,6 +21,7 @@ from solvers.status import Status
         ({"delay": -0.1}, "delay"),
         ({"period": 0.0}, "period"),
         ({"gain_scale": float("nan")}, "gain_scale"),
+        ({"friction": -0.1}, "friction"),
     ],
 )
 def test_settings_are_checked(settings, message):

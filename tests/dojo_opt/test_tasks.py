@@ -44,6 +44,17 @@ def test_quadruped_trots_under_load_on_slippery_ground_and_pushed(quadruped):
     assert np.abs(loop.u[:, :12]).max() <= 33.5 + 1e-9
 
 
+def test_plans_count_on_less_friction_than_the_plant_has(quadruped):
+    """The model's forces stay inside the narrower cone; the robot and its plant keep what their feet have."""
+    mpc, _ = quadruped
+    plan = mpc.sim.rollout(mpc.policy.x[0], mpc.policy.u).contacts
+    assert np.linalg.norm(plan.impulse[..., :2], axis=-1).max() > 0.1
+    assert np.all(np.linalg.norm(plan.impulse[..., :2], axis=-1) <= 0.4 * plan.impulse[..., 2] + 1e-6)
+    assert {c.friction for c in dojo.tasks.plant(mpc, 4e-3).simulator.mechanism.contacts} == {0.8}
+    wide = dojo.tasks.quadruped_mpc(friction=0.8)
+    assert {c.friction for c in wide.sim.mechanism.contacts} == {0.8}
+
+
 def test_quadruped_learns_the_slope_it_walks_up():
     for learn in (True, False):
         mpc = dojo.tasks.quadruped_mpc(learn_ground=learn)

@@ -1,0 +1,56 @@
+"""Delay: inputs that are on their way to the robot, and the state in which the next one will find it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.mpc.measurement import Measurement
+from sim.simulator import Simulator
+
+Vector = NDArray[np.float64]
+
+_PREDICTION = 5e-3  # longest step of the prediction [s]
+
+__all__ = ["Delay"]
+
+
+class Delay:
+    """The time from a measurement to the input it causes, `length` [s], bridged by the model."""
+
+    def __init__(self, sim: Simulator, length: float) -> None:
+        self._length = length
+        self._issued: deque[tuple[float, Vector]] = deque()
+        self._before = np.zeros(sim.nu)
+        self._fine = None
+        if length:
+            self._steps = int(np.ceil(length / _PREDICTION - 1e-9))
+            self._fine = sim.replace(time_step=length / self._steps)
+
+    def forget(self, guess: Vector) -> None:
+        """No input is on its way; guess: (nu,) what acts until the first one arrives [N, N m]."""
+        self._issued.clear()
+        self._before = guess
+
+    def issue(self, now: float, u: Vector) -> None:
+        """Send the input u (nu,) off at `now` [s]; what the first one says is taken to have acted before it, too."""
+        if self._fine is None:
+            return
+        self._before = u if not self._issued else self._before
+        self._issued.append((now + self._length, u))
+        while len(self._issued) > 1 and self._issued[1][0] <= now:
+            self._issued.popleft()
+
+    def ahead(self, now: float, measured: Measurement) -> Vector:
+        """State (nx,) of the model when an input sent at `now` arrives: the measured one, moved on by the delay."""
+        if self._fine is None:
+            return measured.state()
+        ends, h = [], self._fine.time_step
+        x = measured.over(h)
+        for k in range(self._steps):
+            u = next((u for t, u in reversed(self._issued) if t <= now + (k + 0.5) * h), self._before)
+            x = self._fine.step(x, u).x
+            ends.append((now + (k + 1) * h, x))
+        return measured.after(ends)
