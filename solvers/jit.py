@@ -26,6 +26,7 @@ import numba
 from numba import prange
 from numba.core.errors import NumbaError as CompilationError
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
 from solvers.code import EntryCompiler, InnerCompiler
@@ -136,6 +137,14 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         return self.entry(*args)
+
+    def __reduce__(self) -> Any:
+        """By its name; a kernel made inside a function by its code, as Numba sends its dispatchers."""
+        return self.py_func.__qualname__ if self.keep else custom_reduce(Kernel, {"func": self.py_func})
+
+    @classmethod
+    def _rebuild(cls, func: Callable[..., Any]) -> Any:
+        return local_kernel(func)
 
     @cached_property
     def entry(self) -> _Form:
