@@ -20,12 +20,13 @@ from sim.contacts.friction import (
     contact_impulse,
     keep_in_cone,
     recover_contact,
+    resume_contact,
     start_contact,
 )
 from sim.contacts.restitution import subtract_floors
 from sim.coupling.loops import keep_loops, move_loops
 from sim.elimination import dot_six, subtree_sums
-from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
+from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits, resume_limits
 from sim.late import Late
 from sim.model import Matrix, Model
 from sim.options import Goal
@@ -83,6 +84,15 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
         work.bound[j, 0] = s
         work.bound[j, 1] = k0 / s
     return k0
+
+
+@kernel
+def resume_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
+    """All cone variables on the central path of kappa, near the present gaps and the impulses kept."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            resume_contact(model, work, h, c, kappa)
+    resume_limits(model, work, h / LIMIT_INERTIA, kappa)
 
 
 @kernel

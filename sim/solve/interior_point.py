@@ -27,7 +27,7 @@ from sim.options import FAILED, Guess, Options, Outcome
 from sim.pairs.choice import overlapping
 from sim.pairs.far import begin_pairs
 from sim.pairs.work import pairs_gained
-from sim.solve.central_path import AGAIN, first_attempt, start
+from sim.solve.central_path import AGAIN, Beginning, begin, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
@@ -72,11 +72,11 @@ def try_from(
     inputs: tuple[Vector, Vector, Vector],
     attempt: int,
     iterations: int,
-    balance: tuple[float, float],
+    beginning: Beginning,
 ) -> Outcome:
     """One attempt; NO_PROGRESS when it is given up.
 
-    inputs: (q, v, u);  iterations: those of the attempts before;  balance: residuals of the start of attempt 0.
+    inputs: (q, v, u);  iterations: those of the attempts before;  beginning: where attempt 0 starts.
     """
     q, v, u = inputs
     h = options.h
@@ -84,7 +84,8 @@ def try_from(
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     worse = _WORSE if attempt < _LED else _WORSE_LED
-    smoothing = kappa
+    smoothing = beginning.kappa
+    balance = beginning.balance
     if attempt != 0:
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
@@ -144,16 +145,16 @@ def interior_point(
     find_impacts(model, work, options.h)
     while True:
         work.pair_free[0] = 0
-        first, balance = first_attempt(model, work, options, (q, v, u), guess)
-        for attempt in range(first, _ATTEMPTS):
-            out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
+        beginning = begin(model, work, options, (q, v, u), guess)
+        for attempt in range(beginning.attempt, _ATTEMPTS):
+            out = try_from(model, work, options, (q, v, u), attempt, out.iterations, beginning)
             misplaced = misplacement(model, work, options, v, out.status)
             for choice in range(_CHOICES):
                 if misplaced != 1 or work.pair_free[0] == 1:
                     break
                 if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = 2
-                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
+                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, beginning)
                 misplaced = misplacement(model, work, options, v, out.status)
             if misplaced == 0 and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
