@@ -59,9 +59,8 @@ class Beginning(NamedTuple):
 def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess) -> Beginning:
     """Attempt 0, whose iterate it leaves, where anything is known of the solution; attempt 1 elsewhere.
 
-    At kappa itself where the guess all but balances there, with the impulses of the gaps, kappa / gap, with which a
-    step whose solution is known starts; or with those of the step before: the gap of a pressing contact changes too
-    much, its impulse does not. Otherwise near those, on the path of a larger kappa.
+    With the impulses of the step before where they are known (`resume`), with those of the gaps, kappa / gap, where the
+    guess all but balances with them.
     """
     q, v, u = inputs
     h = options.h
@@ -91,25 +90,23 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
 def resume(
     model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> Beginning:
-    """`begin` with the impulses of the step before."""
+    """Attempt 0 with the impulses of the step before: the gap of a pressing contact changes much, its impulse does not.
+
+    At kappa itself where they all but balance; otherwise near them and the gaps, on the path of a larger kappa.
+    """
     q, v, u = inputs
     h = options.h
     if not place(model, work, h, q, velocity, 1.0):
         return Beginning(1, options.kappa, (1e300, 1e300))
+    kappa = max(options.kappa, _RESUMED)
+    resume_inequalities(model, work, h, kappa)
+    away, _ = residuals(model, work, h, q, v, u)
     move_inequalities(model, work, 0.0)
     last = residuals(model, work, h, q, v, u)
-    start_inequalities(model, work, h, options.kappa, 0.0)
-    hard = residuals(model, work, h, q, v, u)
-    soft = max(options.kappa, _RESUMED)
-    resume_inequalities(model, work, h, soft)
-    resumed = residuals(model, work, h, q, v, u)
-    if min(last[0], hard[0]) >= _BALANCED * resumed[0]:
-        return Beginning(0, soft, resumed)
-    if last[0] < hard[0]:
-        move_inequalities(model, work, 0.0)
-    else:
-        start_inequalities(model, work, h, options.kappa, 0.0)
-    return Beginning(0, options.kappa, residuals(model, work, h, q, v, u))
+    if last[0] < _BALANCED * away:
+        return Beginning(0, options.kappa, last)
+    resume_inequalities(model, work, h, kappa)
+    return Beginning(0, kappa, residuals(model, work, h, q, v, u))
 
 
 @inlined

@@ -26,7 +26,14 @@ from sim.contacts.friction import (
 from sim.contacts.restitution import subtract_floors
 from sim.coupling.loops import keep_loops, move_loops
 from sim.elimination import dot_six, subtree_sums
-from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits, resume_limits
+from sim.joints.limits import (
+    add_limit_blocks,
+    add_limit_impulse,
+    limit_constants,
+    limit_gaps,
+    recover_limits,
+    resume_limits,
+)
 from sim.late import Late
 from sim.model import Matrix, Model
 from sim.options import Goal
