@@ -4,7 +4,7 @@
 
 is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma follows from it, so the
 cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method, in columns 2:4 of
-`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law / psi.
+`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law as a change of -beta.
 
 With b = mu gamma the same path is also
 
@@ -23,7 +23,7 @@ from sim.work import Work
 from solvers.jit import kernel
 
 _CREEPING = 3.0  # times the slip of the path at the present friction: in less, a contact sticks
-_INSIDE = 0.1  # least share of b^2 that b^2 - |beta|^2 has there
+_INSIDE = 0.3  # least share of b^2 that b^2 - |beta|^2 has there
 
 
 @kernel
@@ -77,15 +77,15 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) 
     against = z[2] * k[1] + z[3] * k[2]
     creeping = room * sqrt(k[1] * k[1] + k[2] * k[2]) < _CREEPING * kappa * b0
     if creeping and room > _INSIDE * b0 * b0 and against <= 0.0:
-        _condense_sticking(z, k, b0, kappa, share, W, q)
+        condense_sticking(z, k, b0, kappa, share, W, q)
     else:
-        _condense_sliding(z, k, b0, kappa, share, W, q)
+        condense_sliding(z, k, b0, kappa, share, W, q)
     W[3] = mu * W[0] * q[0]
     W[6] = mu * W[0] * q[1]
 
 
 @kernel
-def _condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual,   r = psi - a"""
     psi, r = cone_slip(b0, k[1], k[2], kappa)
     a = psi - r
@@ -103,7 +103,7 @@ def _condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: floa
 
 
 @kernel
-def _condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """(kappa I - 2 v_t beta^T) dbeta = -c dv_t - share 2 b v_t db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
     by the inverse  (I + e v_t beta^T)/kappa,   e = 2/(kappa - 2 v_t.beta).
