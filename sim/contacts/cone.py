@@ -65,8 +65,12 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) -> None:
-    """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact."""
+def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, near: bool) -> None:
+    """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
+
+    Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
+    the other.
+    """
     z = work.cone[c]
     k = work.contact_kin[c]
     W = work.contact_W[c]
@@ -76,7 +80,7 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) 
     room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
     against = z[2] * k[1] + z[3] * k[2]
     creeping = room * sqrt(k[1] * k[1] + k[2] * k[2]) < _CREEPING * kappa * b0
-    if creeping and room > _INSIDE * b0 * b0 and against <= 0.0:
+    if near and creeping and room > _INSIDE * b0 * b0 and against <= 0.0:
         condense_sticking(z, k, b0, kappa, share, W, q)
     else:
         condense_sliding(z, k, b0, kappa, share, W, q)
