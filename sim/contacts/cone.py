@@ -4,16 +4,26 @@
 
 is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma follows from it, so the
 cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method, in columns 2:4 of
-`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law / psi.
+`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law as a change of -beta.
+
+With b = mu gamma the same path is also
+
+    (b^2 - |beta|^2) v_t + kappa beta = 0
+
+which is linear in v_t: of a contact that sticks, whose slip is not far from the path, Newton's method finds the slip by
+this form in one step, by the other in several.
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Model
+from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
+
+_CREEPING = 3.0  # times the slip of the path at the present friction: in less, a contact sticks
+_INSIDE = 0.3  # least share of b^2 that b^2 - |beta|^2 has there
 
 
 @kernel
@@ -55,10 +65,11 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) -> None:
-    """d(beta)/d(gap, slip) by the law linearised at kappa, b = mu gamma and r = psi - a:
+def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, near: bool) -> None:
+    """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
 
-    psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual
+    Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
+    the other.
     """
     z = work.cone[c]
     k = work.contact_kin[c]
@@ -66,6 +77,20 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) 
     q = work.contact_scale[c]
     mu = model.contact_friction[c]
     b0 = mu * z[1]
+    room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
+    against = z[2] * k[1] + z[3] * k[2]
+    creeping = room * sqrt(k[1] * k[1] + k[2] * k[2]) < _CREEPING * kappa * b0
+    if near and creeping and room > _INSIDE * b0 * b0 and against <= 0.0:
+        condense_sticking(z, k, b0, kappa, share, W, q)
+    else:
+        condense_sliding(z, k, b0, kappa, share, W, q)
+    W[3] = mu * W[0] * q[0]
+    W[6] = mu * W[0] * q[1]
+
+
+@kernel
+def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+    """psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual,   r = psi - a"""
     psi, r = cone_slip(b0, k[1], k[2], kappa)
     a = psi - r
     b1, b2 = within_cone(b0, z[2], z[3])
@@ -79,8 +104,26 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float) 
     q[1] = -i * share * (k[2] + b2 * g)
     q[2] = i * (b0 * k[1] + psi * z[2])
     q[3] = i * (b0 * k[2] + psi * z[3])
-    W[3] = mu * W[0] * q[0]
-    W[6] = mu * W[0] * q[1]
+
+
+@kernel
+def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+    """(kappa I - 2 v_t beta^T) dbeta = -c dv_t - share 2 b v_t db - (c v_t + kappa beta),   c = b^2 - |beta|^2
+
+    by the inverse  (I + e v_t beta^T)/kappa,   e = 2/(kappa - 2 v_t.beta).
+    """
+    x, y, b1, b2 = k[1], k[2], z[2], z[3]
+    n = b1 * b1 + b2 * b2
+    c = b0 * b0 - n
+    e = 2.0 / (kappa - 2.0 * (x * b1 + y * b2))
+    W[4] = -c / kappa * (1.0 + e * x * b1)
+    W[5] = -c / kappa * e * x * b2
+    W[7] = -c / kappa * e * y * b1
+    W[8] = -c / kappa * (1.0 + e * y * b2)
+    q[0] = -share * b0 * e * x
+    q[1] = -share * b0 * e * y
+    q[2] = (0.5 * c + n) * e * x + b1
+    q[3] = (0.5 * c + n) * e * y + b2
 
 
 @kernel

@@ -117,13 +117,15 @@ def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f
     ax = work.pos2[i, 0] - work.origin[0] + k[3]
     ay = work.pos2[i, 1] - work.origin[1] + k[4]
     az = work.pos2[i, 2] - work.origin[2] + k[5]
+    x0, y0, z0 = transposed_times(F, W[0], W[3], W[6])  # columns of F^T W
+    x1, y1, z1 = transposed_times(F, W[1], W[4], W[7])
+    x2, y2, z2 = transposed_times(F, W[2], W[5], W[8])
     for j in range(6):
         q = 18 + j if j < 3 else 6 + j
         c0, c1, c2 = k[q], k[q + 3], k[q + 6]
-        gn = W[0] * c0 + W[1] * c1 + W[2] * c2
-        g1 = W[3] * c0 + W[4] * c1 + W[5] * c2
-        g2 = W[6] * c0 + W[7] * c1 + W[8] * c2
-        x, y, z = transposed_times(F, gn, g1, g2)
+        x = x0 * c0 + x1 * c1 + x2 * c2
+        y = y0 * c0 + y1 * c1 + y2 * c2
+        z = z0 * c0 + z1 * c1 + z2 * c2
         A[j] -= x
         A[6 + j] -= y
         A[12 + j] -= z

@@ -24,7 +24,7 @@ from sim.late import (
 from sim.model import Law, Model
 from sim.options import Goal
 from sim.work import Work
-from solvers.cones import orthant_step, return_pair
+from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.jit import kernel
 
 _IMPACT = int(Law.IMPACT)
@@ -44,11 +44,34 @@ def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) 
     z = work.cone[c]
     z[0] = max(work.contact_kin[c, 0], floor)
     z[1] = kappa / z[0]
+    _start_friction(model, work, c, kappa)
+
+
+@kernel
+def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
+    """Variables of contact c on the central path of kappa, near its gap and the impulse that it had (in cone_trial)."""
+    z = work.cone[c]
+    z[0], z[1] = onto_path(work.contact_kin[c, 0], work.cone_trial[c, 1], h * _response(model, c), kappa)
+    _start_friction(model, work, c, kappa)
+
+
+@kernel
+def _start_friction(model: Model, work: Work, c: int, kappa: float) -> None:
+    """Friction of contact c on the central path of kappa at its slip."""
     law = law_of(model, c)
     if law == _NONLINEAR:
         start_cone(model, work, c, kappa)
     elif law == _LINEAR:
         start_pyramid(model, work, c, kappa)
+
+
+@kernel
+def _response(model: Model, c: int) -> float:
+    """1/m, m the mass of the body of contact c (1 kg where it has none): the change of speed that an impulse makes to a
+    free body.
+    """
+    m = model.body_mass[model.contact_body[c]]
+    return 1.0 / m if m > 0.0 else 1.0
 
 
 @kernel
@@ -137,21 +160,20 @@ def contact_boundary(model: Model, work: Work, c: int) -> float:
 def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
     """The pairs of contact c that left their cones put back onto the central path of kappa.
 
-    Gaps weigh against impulses as h/m, slips as 1/m, m the mass of the body (1 kg where it has none): the change that
-    an impulse makes to a free body.
+    Gaps weigh against impulses as h/m, slips as 1/m.
     """
-    m = model.body_mass[model.contact_body[c]]
-    weight = 1.0 / m if m > 0.0 else 1.0
+    weight = _response(model, c)
     return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
     if law_of(model, c) == _LINEAR:
         return_pyramid(model, work, c, weight, kappa)
 
 
 @kernel
-def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float) -> None:
+def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float, near: bool) -> None:
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
     share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
+    near: whether a contact that sticks may take the form of its law that is linear in the slip.
     """
     W = work.contact_W[c]
     for e in range(9):
@@ -159,7 +181,7 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float, share: floa
     W[0] = -work.cone[c, 1] / work.cone[c, 0]
     law = law_of(model, c)
     if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa, share)
+        condense_cone(model, work, c, kappa, share, near)
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
 

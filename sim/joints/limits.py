@@ -13,7 +13,7 @@ from sim.late import cone_block, cone_derivative, cone_gap
 from sim.model import Model, Vector
 from sim.options import Goal
 from sim.work import Work
-from solvers.cones import return_pair
+from solvers.cones import onto_path, return_pair
 from solvers.jit import kernel
 
 
@@ -76,6 +76,14 @@ def limit_constants(model: Model, work: Work, goal: Goal) -> None:
         w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         add_limit_impulse(model, work, k, w, work.dnu)
+
+
+@kernel
+def resume_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+    """All pairs on the central path of kappa, near their gaps and the impulses that they had (in bound_trial)."""
+    for k in range(model.limit_dof.shape[0]):
+        b = work.bound[k]
+        b[0], b[1] = onto_path(work.bound_gap[k], work.bound_trial[k, 1], weight, kappa)
 
 
 @kernel

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from sim.dynamics import momentum_balance
 from sim.late import choose_pairs
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import Guess, Options
-from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, start_inequalities
+from sim.solve.inequalities import (
+    inequality_kinematics,
+    keep_inequalities,
+    move_inequalities,
+    resume_inequalities,
+    start_inequalities,
+)
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
 from sim.work import Work
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
+_RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
+_BALANCED = 0.3  # the residual at kappa, over that of such a start, of a motion that may start at kappa
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949
@@ -37,43 +47,66 @@ def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float
     return False
 
 
-@kernel
-def first_attempt(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
-) -> tuple[int, tuple[float, float]]:
-    """0, the start at kappa itself, where the guess all but balances; 1 everywhere else; and the residuals of 0.
+class Beginning(NamedTuple):
+    """Where the first attempt begins."""
 
-    Its impulses are those of the gaps, kappa / gap, with which a step whose solution is known starts there; or those of
-    the step before where they balance better: the gap of a pressing contact changes too much, its impulse does not.
-    Leaves the iterate at the start of attempt 0.
+    attempt: int
+    kappa: float  # of the central path on which attempt 0 starts
+    balance: tuple[float, float]  # residuals there
+
+
+@kernel
+def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess) -> Beginning:
+    """Attempt 0, whose iterate it leaves, where anything is known of the solution; attempt 1 elsewhere.
+
+    With the impulses of the step before where they are known (`resume`), with those of the gaps, kappa / gap, where the
+    guess all but balances with them.
     """
     q, v, u = inputs
+    h = options.h
+    kappa = options.kappa
     if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
-        if place(model, work, options.h, q, guess.velocity, 1.0):
-            return 0, residuals(model, work, options.h, q, v, u)
-        return 1, (1e300, 1e300)
+        if place(model, work, h, q, guess.velocity, 1.0):
+            return Beginning(0, kappa, residuals(model, work, h, q, v, u))
+        return Beginning(1, kappa, (1e300, 1e300))
     keep_inequalities(model, work)
-    if not place(model, work, options.h, q, v, 1.0):
-        return 1, (1e300, 1e300)
-    start_inequalities(model, work, options.h, options.kappa, 1.0)
-    soft, _ = residuals(model, work, options.h, q, v, u)
-    placed = True  # a rollout guesses the incoming velocity: there already
+    if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
+        return resume(model, work, options, inputs, guess.velocity)
+    if not place(model, work, h, q, v, 1.0):
+        return Beginning(1, kappa, (1e300, 1e300))
+    start_inequalities(model, work, h, kappa, 1.0)
+    usual, _ = residuals(model, work, h, q, v, u)
+    placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and guess.velocity[d] == v[d]
-    if not placed and not place(model, work, options.h, q, guess.velocity, 1.0):
-        return 1, (1e300, 1e300)
-    start_inequalities(model, work, options.h, options.kappa, 0.0)
-    hard = residuals(model, work, options.h, q, v, u)
-    first = 0 if hard[0] < _AT_REST * soft else 1
-    if guess.impulses:
-        move_inequalities(model, work, 0.0)
-        last = residuals(model, work, options.h, q, v, u)
-        if last[0] < min(hard[0], _AT_REST * soft):
-            return 0, last
-        if first == 0:
-            start_inequalities(model, work, options.h, options.kappa, 0.0)
-            hard = residuals(model, work, options.h, q, v, u)
-    return first, hard
+    if not placed and not place(model, work, h, q, guess.velocity, 1.0):
+        return Beginning(1, kappa, (1e300, 1e300))
+    start_inequalities(model, work, h, kappa, 0.0)
+    hard = residuals(model, work, h, q, v, u)
+    return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard)
+
+
+@inlined
+def resume(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+) -> Beginning:
+    """Attempt 0 with the impulses of the step before: the gap of a pressing contact changes much, its impulse does not.
+
+    At kappa itself where they all but balance; otherwise near them and the gaps, on the path of a larger kappa.
+    """
+    q, v, u = inputs
+    h = options.h
+    if not place(model, work, h, q, velocity, 1.0):
+        return Beginning(1, options.kappa, (1e300, 1e300))
+    kappa = max(options.kappa, _RESUMED)
+    resume_inequalities(model, work, h, kappa)
+    away, _ = residuals(model, work, h, q, v, u)
+    move_inequalities(model, work, 0.0)
+    last = residuals(model, work, h, q, v, u)
+    if last[0] < _BALANCED * away:
+        return Beginning(0, options.kappa, last)
+    resume_inequalities(model, work, h, kappa)
+    return Beginning(0, kappa, residuals(model, work, h, q, v, u))
 
 
 @inlined

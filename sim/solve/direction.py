@@ -36,7 +36,7 @@ def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smo
         share = 0.5**halvings if halvings < shares else 1.0
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share)
+        condense_inequalities(model, work, h, smoothing, share, near)
         sign = factor(model, work)
         if sign >= 0:
             break

@@ -21,10 +21,18 @@ from sim.contacts.friction import (
     contact_impulse,
     keep_in_cone,
     recover_contact,
+    resume_contact,
     start_contact,
 )
 from sim.elimination import dot_six, subtree_sums
-from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
+from sim.joints.limits import (
+    add_limit_blocks,
+    add_limit_impulse,
+    limit_constants,
+    limit_gaps,
+    recover_limits,
+    resume_limits,
+)
 from sim.late import (
     add_frame_matrix,
     apply_pairs,
@@ -90,6 +98,15 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
 
 
 @kernel
+def resume_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
+    """All cone variables on the central path of kappa, near the present gaps and the impulses kept."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            resume_contact(model, work, h, c, kappa)
+    resume_limits(model, work, h / LIMIT_INERTIA, kappa)
+
+
+@kernel
 def apply_inequalities(model: Model, work: Work) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
@@ -113,34 +130,35 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
-    """A += contacts, joint_block += limits: their slacks and impulses eliminated.  share: see `condense_into`."""
-    condense_into(model, work, h, kappa, share, work.A)
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float, near: bool) -> None:
+    """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_into`."""
+    condense_into(model, work, h, kappa, share, near, work.A)
     add_limit_blocks(model, work, h)
 
 
 @kernel
-def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, out: Matrix) -> None:
+def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, near: bool, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)
 
     share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
     turning of the arms of the impulses; 1 for the derivative.
+    near: the solution, see `condense_cone`.
     """
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
-            condense_contact(model, work, c, kappa, share)
+            condense_contact(model, work, c, kappa, share, near)
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
                 add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
-    condense_pairs(model, work, h, kappa, share)
+    condense_pairs(model, work, h, kappa, share, near)
 
 
 @late.add_stiffness.defined()
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
-    condense_into(model, work, h, kappa, 1.0, work.A3)
+    condense_into(model, work, h, kappa, 1.0, False, work.A3)
     add_slip_jacobians(model, work, h)
     add_limit_blocks(model, work, h)
 

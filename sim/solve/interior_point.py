@@ -6,7 +6,8 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
   beta by Newton, at a `smoothing` that follows down to kappa (contacts/friction.py); only gaps and normal impulses have
   to stay positive. Conic scalings jam on thin cones.
 * The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
-  the impulses of kappa itself, a robot at rest or a good guess, starts there (central_path.py).
+  the impulses of kappa itself, a robot at rest or a good guess, starts there; one that goes on first tries the
+  impulses of the step before, at a smaller kappa0 (central_path.py).
 * The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
 * No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
@@ -35,7 +36,7 @@ from sim.options import (
     Options,
     Outcome,
 )
-from sim.solve.central_path import AGAIN, first_attempt, start
+from sim.solve.central_path import AGAIN, Beginning, begin, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
@@ -80,11 +81,11 @@ def try_from(
     inputs: tuple[Vector, Vector, Vector],
     attempt: int,
     iterations: int,
-    balance: tuple[float, float],
+    beginning: Beginning,
 ) -> Outcome:
     """One attempt; NO_PROGRESS when it is given up.
 
-    inputs: (q, v, u);  iterations: those of the attempts before;  balance: residuals of the start of attempt 0.
+    inputs: (q, v, u);  iterations: those of the attempts before;  beginning: where attempt 0 starts.
     """
     q, v, u = inputs
     h = options.h
@@ -92,7 +93,8 @@ def try_from(
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     worse = _WORSE if attempt < _LED else _WORSE_LED
-    smoothing = kappa
+    smoothing = beginning.kappa
+    balance = beginning.balance
     if attempt != 0:
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
@@ -153,17 +155,17 @@ def interior_point(
     while True:
         work.pair_free[0] = AT_START
         work.pair_free[1] = 0
-        first, balance = first_attempt(model, work, options, (q, v, u), guess)
-        for attempt in range(first, _ATTEMPTS):
+        beginning = begin(model, work, options, (q, v, u), guess)
+        for attempt in range(beginning.attempt, _ATTEMPTS):
             work.pair_free[1] = 1 if attempt >= _LENIENT else 0
-            out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
+            out = try_from(model, work, options, (q, v, u), attempt, out.iterations, beginning)
             misplaced = misplacement(model, work, options, v, out.status)
             for choice in range(_CHOICES):
                 if misplaced != OVERLAPPING or work.pair_free[0] == AT_EVERY_POSE:
                     break
                 if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = BESIDE_KEPT
-                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
+                out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, beginning)
                 misplaced = misplacement(model, work, options, v, out.status)
             if misplaced == PLACED and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
