@@ -116,8 +116,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     state = np.array(sim.neutral() if x is None else x, dtype=float)
     state[sim.nq :] = 0.0
     free = np.asarray(~B.any(axis=1))
-    u: Array = np.zeros(sim.nu)
-    left: Array = np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
         down, up, share = _under(feet, state)
@@ -127,8 +125,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
         rows = np.concatenate([(up[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
         force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
-        left = load - up.T @ force
-        u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
         error = wanted - gap[loaded]
