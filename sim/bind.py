@@ -43,6 +43,8 @@ _LOOPS = (
     loops.move_loops,
 )
 _MOTION_OF_LOOPS = (
+    loop_motion.loops_regular,
+    loop_motion.stay_regular,
     loop_motion.predict_loops,
     loop_motion.meet_ahead,
     loop_motion.is_farther,

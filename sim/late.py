@@ -95,3 +95,6 @@ class Late(IntEnum):
     SWING_TURN = 69
     # energy from collisions of polytopes and cylinders
     PAIRS_GAINED = 70
+    # steps that need no care for singular configurations
+    LOOPS_REGULAR = 71
+    STAY_REGULAR = 72
