@@ -118,9 +118,9 @@ _HOME: dict[str, str | None] = {
     "String": "sim.shapes",
     "Terrain": "sim.terrain.terrain",
     "Trajectory": "sim.results",
-    "UrdfError": "sim.urdf",
-    "UrdfMechanism": "sim.urdf",
-    "UrdfWarning": "sim.urdf",
+    "UrdfError": "sim.urdf.xml",
+    "UrdfMechanism": "sim.urdf.report",
+    "UrdfWarning": "sim.urdf.report",
     "closed_loop": "dojo_opt.plant.loop",
     "constraint": None,
     "cost": None,
@@ -129,7 +129,7 @@ _HOME: dict[str, str | None] = {
     "ilqr": "dojo_opt.planner",
     "kernel": "dojo_opt.residual",
     "load_mjcf": "sim.mjcf",
-    "load_urdf": "sim.urdf",
+    "load_urdf": "sim.urdf.load",
     "models": None,
     "monte_carlo": "dojo_opt.plant.study",
     "plots": None,
@@ -170,7 +170,9 @@ if TYPE_CHECKING:
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
     from sim.terrain.terrain import Terrain
-    from sim.urdf import UrdfError, UrdfMechanism, UrdfWarning, load_urdf
+    from sim.urdf.load import load_urdf
+    from sim.urdf.report import UrdfMechanism, UrdfWarning
+    from sim.urdf.xml import UrdfError
     from solvers.status import Status
 
 

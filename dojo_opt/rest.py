@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from dojo_opt.feet import Feet
 from sim.simulator import Simulator
@@ -40,6 +39,14 @@ def input_map(sim: Simulator) -> Array:
             continue
         out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = 1.0
     return out
+
+
+def least_pushes(pushes: Array, load: Array, even: float) -> Array:
+    """(k,) factors f >= 0 of the rows of `pushes` (k, n) with least |pushes^T f - load|^2 + even^2 |f|^2."""
+    from scipy.optimize import nnls  # .3 s, which only legged robots at rest or on a gait need
+
+    rows = np.concatenate([pushes.T, even * np.eye(len(pushes))])
+    return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
 
 
 def stop_torques(sim: Simulator, x: Array) -> Array:
@@ -123,8 +130,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         touching = gap < gap.min() + _NEAR
         afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * share * np.maximum(gap, _NEAR)))
         load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
-        rows = np.concatenate([(up[:, free] * touching[:, None]).T, _EVEN * np.eye(len(down))])
-        force, _ = nnls(rows, np.concatenate([load[free], np.zeros(len(down))]))
+        force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
         error = wanted - gap[loaded]

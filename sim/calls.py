@@ -67,14 +67,15 @@ class Calls(StateCalls):
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
 
-    def _path(self, knots: int, *, keep: bool) -> Path:
-        """What a rollout of so many knots fills in."""
+    def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
+        """What a rollout of so many knots fills in; without `cones`, there is nothing of contacts and limits in it."""
         kept = knots if keep else 0
+        ncontact, nlimit = (self.sizes.ncontact, self.sizes.nlimit) if cones else (0, 0)
         return Path(
             np.zeros((knots + 1, self.nx)),
             np.zeros((knots, self.nu)),
-            np.zeros((kept, self.sizes.ncontact, CONE)),
-            np.zeros((kept, self.sizes.nlimit, BOUND)),
+            np.zeros((kept, ncontact, CONE)),
+            np.zeros((kept, nlimit, BOUND)),
             np.zeros(REPORT),
         )
 

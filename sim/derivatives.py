@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, cast, overload
+from typing import TYPE_CHECKING, Any, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,17 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.parameters.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
-from sim.parameters.selection import select, with_values
-from sim.parameters.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
 from sim.results import Linearization, Trajectory, error_of, path_of
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
 
+if TYPE_CHECKING:
+    from sim.parameters.calls import ParameterCalls
+    from sim.parameters.parameters import Parameters
+
 Floats = NDArray[np.float64]
 Blocks = dict[str, Floats]
-_VARIABLES = ("state", "input")
 
 
 class Derivatives(States):
@@ -76,11 +76,8 @@ class Derivatives(States):
             raise error_of(self.mechanism, "Simulator.linearize", report, self.tolerance)
         if wrt is None:
             return A, B
-        asked = _names("Simulator.linearize(wrt=...)", wrt)
-        if _parameters(asked):
-            self._check_order("Simulator.linearize(wrt=...)")
-        found, plan = self._select("Simulator.linearize(wrt=...)", _parameters(asked))
-        J = parameter_columns(self._calls, self.mechanism, (state, us), A, plan)
+        asked, found, plan = self._by_parameters.select("Simulator.linearize(wrt=...)", wrt)
+        J = self._by_parameters.columns((state, us), A, plan)
         blocks = {"state": A, "input": B}
         return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
 
@@ -96,11 +93,10 @@ class Derivatives(States):
         state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, ("T", self.nu))
         level = self._border.kappa(call, kappa)
         blocks: Blocks = {}
-        if names := _parameters(_names(f"Simulator.{call}(wrt=...)", wrt)):
-            self._check_order(f"Simulator.{call}(wrt=...)")
-            found, plan = self._select(f"Simulator.{call}(wrt=...)", names)
-            knot, xs, A, B, J, reports = roll_parameters(self._calls, self.mechanism, state, inputs, plan, level)
-            blocks = {name: J[:, :, found.rows[name]] for name in names}
+        if wrt and (selected := self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt))[1].names:
+            _, found, plan = selected
+            knot, xs, A, B, J, reports = self._by_parameters.roll(state, inputs, plan, level)
+            blocks = {name: J[:, :, rows] for name, rows in found.rows.items()}
         else:
             knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, level)
         if knot < len(inputs):
@@ -170,12 +166,9 @@ class Derivatives(States):
         inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
-        asked = _names(f"{call}(wrt=...)", wrt)
-        if _parameters(asked):
-            self._check_order(f"{call}(wrt=...)")
-        found, plan = self._select(f"{call}(wrt=...)", _parameters(asked))
+        asked, found, plan = self._by_parameters.select(f"{call}(wrt=...)", wrt)
         path = (self._border.states(f"{call}(trajectory)", rows), inputs)
-        knot, line = adjoint_sweep(self._calls, self.mechanism, path, loss, plan, self._border.kappa("vjp", kappa))
+        knot, line = self._by_parameters.sweep(path, loss, plan, self._border.kappa("vjp", kappa))
         if knot >= 0:
             raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
         blocks = {"state": line.costate[0], "input": line.inputs}
@@ -202,49 +195,20 @@ class Derivatives(States):
                                         a body's inertia is that of its own shape, and stays
         """
         call = "Simulator.parameters(wrt)"
-        return self._select(call, tuple(p.name for p in self._known) if wrt is None else _names(call, wrt))[0]
+        return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Any:
         """The same, also its kappa, with other values of parameters; a ValueError names what nothing can have."""
-        mech, time_step = with_values("Simulator.with_parameters(...)", self.mechanism, self.time_step, values)
+        mech, time_step = self._by_parameters.with_values("Simulator.with_parameters(...)", values)
         return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
 
     def replace(self, **settings: Any) -> Any:
         """See Simulator."""
         raise NotImplementedError
 
-    def _check_order(self, call: str) -> None:
-        """Derivatives by parameters are those of steps of order 2."""
-        if self.order != 2:
-            raise ValueError(f"{call}: expected a simulator of order 2, got order {self.order}")
-
     @cached_property
-    def _known(self) -> list[Parameter]:
-        """All parameters."""
-        return all_parameters(self.mechanism, self.time_step)
+    def _by_parameters(self) -> ParameterCalls:
+        """Calls by parameters, and sweeps; their modules are imported by those who ask for them."""
+        from sim.parameters.calls import ParameterCalls
 
-    @cached_property
-    def _selections(self) -> dict[tuple[str, ...], tuple[Parameters, Plan]]:
-        """Those made so far: finding parameters by name takes longer than their derivatives."""
-        return {}
-
-    def _select(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, Plan]:
-        """Parameters by name, and the terms of their columns."""
-        if names not in self._selections:
-            self._selections[names] = select(call, self._known, names)
-        return self._selections[names]
-
-
-def _names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
-    """The names, one or several, all different."""
-    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
-    for name in names:
-        if not isinstance(name, str):
-            raise ValueError(f"{call}: expected names, got {name!r}")
-        checks.one_of(f"{call}: kind", name.split(":")[0].split("[")[0], (*_VARIABLES, *KINDS))
-    checks.distinct(call, names)
-    return names
-
-
-def _parameters(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in names if name not in _VARIABLES)
+        return ParameterCalls(self._calls, self.mechanism, self.time_step)

@@ -8,7 +8,6 @@ import numpy as np
 
 from sim.build import mechanism_sizes
 from sim.contacts.left_out import reach
-from sim.high_order.tableau import tableau
 from sim.mechanism import Mechanism
 from sim.pairs.touch import Touch
 from sim.parts import WORLD, Contact, Joint
@@ -139,6 +138,8 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
     solver = "interior point" if points or nlimit else "Newton's method; interior point left out"
     if order > 2:
+        from sim.high_order.tableau import tableau
+
         far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
         solver = (
             f"{solver}; while contacts and limits are far none: {far}" if mech.contacts or nlimit else f"none: {far}"

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from sim.angular_momentum import angular_momentum
 from sim.coordinates import node_poses
-from sim.coupling.loop_velocity import close_velocity
 from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints.ball_spring import relative_to_rest
+from sim.late import close_velocity
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.rotation import cross, quat_exp, quat_mul
@@ -176,6 +176,28 @@ def potential_energy(model: Model, work: Work, x: Vector) -> float:
             stretch = x[model.dof_qadr[d]] - model.dof_rest[d]
             energy += 0.5 * model.dof_spring[d] * stretch * stretch
     return energy
+
+
+@kernel
+def momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: Matrix, v: Vector) -> float:
+    """p.v of an interval [J], twice its kinetic energy; rotations by their sines."""
+    energy = 0.0
+    for i in range(model.body_parent.shape[0]):
+        J = work.inertia_world[i]
+        for r in range(3):
+            energy += model.body_mass[i] * move[i, r] * move[i, r] / (h * h)
+            for k in range(3):
+                energy += 4.0 * turn[i, 1 + r] * J[3 * r + k] * turn[i, 1 + k] / (h * h)
+    for d in range(v.shape[0]):
+        energy += model.dof_armature[d] * v[d] * v[d]
+    return energy
+
+
+@kernel
+def twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
+    """p.v of the intervals 1-2 and 2-3 together [J]."""
+    before = momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
+    return before + momentum_velocity(model, work, h, work.move, work.turn, work.nu)
 
 
 @kernel

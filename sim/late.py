@@ -1,100 +1,117 @@
-"""Kernels called by their address (solvers/late.py), which bind.py fills in."""
+"""Kernels called by their address (solvers/late.py), and where they are written: sim/bind.py fills in the addresses.
+
+Callers import the names below instead of the modules, which are imported when a scene binds one of their kernels, or
+when a call of one is compiled.
+"""
 
 from __future__ import annotations
 
-from enum import IntEnum, unique
+from solvers.late import LateTable
 
+_late = LateTable()
 
-@unique
-class Late(IntEnum):
-    """Where the address of each late kernel is in `Model.late`."""
+# what all scenes do, compiled once
+step = _late("sim.step:step")
+solve = interior_point = _late("sim.solve.interior_point:interior_point")  # the unknown of a step
+newton = _late("sim.solve.newton:newton", instead_of=solve)  # in scenes without contacts and limits
+gradient = _late("sim.gradients:gradient")
 
-    # what all scenes do, compiled once
-    STEP = 0
-    SOLVE = 1  # the unknown of a step: interior point or Newton
-    GRADIENT = 2
-    # contacts and limits
-    REPORT_CONTACTS = 3
-    WORST_CONTACT = 4
-    STIFFNESS = 5
-    LIMIT_DERIVATIVES = 6
-    # joints with two rotations, and cones
-    SWING_POSE = 7
-    SWING_CURVATURE = 8
-    CONE_GAP = 9
-    CONE_BLOCK = 10
-    CONE_DERIVATIVE = 11
-    # loops, and pairs of bodies in contact
-    FACTOR_COUPLING = 12
-    SOLVE_COUPLING = 13
-    SOLVE_COUPLING_PANEL = 14
-    COUPLING_COMPOSITES = 15
-    COUPLING_DERIVATIVES = 16
-    START_LOOPS = 17
-    APPLY_LOOPS = 18
-    KEEP_LOOPS = 19
-    MOVE_LOOPS = 20
-    PAIR_KINEMATICS = 21
-    PAIR_RATE = 22
-    CONDENSE_PAIRS = 23
-    APPLY_PAIRS = 24
-    PAIR_CONSTANTS = 25
-    REPORT_PAIRS = 26
-    # friction pyramids
-    START_PYRAMID = 27
-    PYRAMID_ERROR = 28
-    PYRAMID_PRODUCTS = 29
-    PYRAMID_PRODUCTS_AHEAD = 30
-    PYRAMID_BOUNDARY = 31
-    RETURN_PYRAMID = 32
-    CONDENSE_PYRAMID = 33
-    PYRAMID_CONSTANT = 34
-    RECOVER_PYRAMID = 35
-    # springs of quaternion joints
-    SPRING_IMPULSE = 36
-    SPRING_BLOCK = 37
-    SPRING_DERIVATIVE = 38
-    # terrain
-    TERRAIN_PLACE = 39
-    TERRAIN_TURN = 40
-    TERRAIN_MATRIX = 41
-    TERRAIN_GAP = 42
-    TERRAIN_FAR = 43
-    # restitution
-    FIND_IMPACTS = 44
-    SUBTRACT_FLOORS = 45
-    GAINED_ENERGY = 46
-    BOUNCE_COMPOSITES = 47
-    BOUNCE_DERIVATIVES = 48
-    # which pairs, and which of their elements
-    BEGIN_PAIRS = 49
-    ENLIST_PAIRS = 50
-    CHOOSE_PAIRS = 51
-    OVERLAPPING = 52
-    FAR_PAIR_IMPULSES = 53
-    PAIRS_CAME_NEAR = 54
-    ALL_NEAR = 55
-    # gears
-    APPLY_GEARS = 56
-    # derivatives by the heights of a terrain, and by radii on it
-    HEIGHT_GRADIENT = 57
-    RADIUS_ON_TERRAIN = 58
-    # loops that pass singular configurations
-    CLOSE_VELOCITY = 59
-    PREDICT_LOOPS = 60
-    LOOPS_GAINED = 61
-    LEAD_AGAIN = 62
-    MEET_AHEAD = 63
-    FARTHER = 64
-    # cylinders against polytopes and cylinders
-    CYLINDER_DISTANCE = 65
-    COLLIDE_CYLINDERS = 66
-    CHOOSE_CYLINDERS = 67
-    CYLINDER_BEFORE = 68
-    # joints with two rotations, over an interval
-    SWING_TURN = 69
-    # energy from collisions of polytopes and cylinders
-    PAIRS_GAINED = 70
-    # steps that need no care for singular configurations
-    LOOPS_REGULAR = 71
-    STAY_REGULAR = 72
+# contacts and limits
+report_contacts = _late("sim.contacts.report:report_contacts")
+worst_contact = _late("sim.contacts.report:worst_contact")
+add_stiffness = _late("sim.solve.inequalities:add_stiffness")
+add_limit_derivatives = _late("sim.joints.limits:add_limit_derivatives")
+
+# joints with two rotations, and cones
+swing_pose = _late("sim.joints.swing:swing_pose")
+swing_curvature = _late("sim.joints.swing:swing_curvature")
+cone_gap = _late("sim.joints.cone_limit:cone_gap")
+cone_block = _late("sim.joints.cone_limit:cone_block")
+cone_derivative = _late("sim.joints.cone_limit:cone_derivative")
+
+# loops, and pairs of bodies in contact
+factor_coupling = _late("sim.coupling.system:factor_coupling")
+solve_coupling = _late("sim.coupling.system:solve_coupling")
+solve_coupling_panel = _late("sim.coupling.system:solve_coupling_panel")
+add_coupling_composites = _late("sim.coupling.gradient:add_coupling_composites")
+add_coupling_derivatives = _late("sim.coupling.gradient:add_coupling_derivatives")
+start_loops = _late("sim.coupling.loops:start_loops")
+apply_loops = _late("sim.coupling.loops:apply_loops")
+keep_loops = _late("sim.coupling.loops:keep_loops")
+move_loops = _late("sim.coupling.loops:move_loops")
+pair_kinematics = _late("sim.pairs.contact:pair_kinematics")
+pair_rate = _late("sim.pairs.jacobian:pair_rate")
+condense_pairs = _late("sim.pairs.stiffness:condense_pairs")
+apply_pairs = _late("sim.pairs.stiffness:apply_pairs")
+pair_constants = _late("sim.pairs.stiffness:pair_constants")
+report_pairs = _late("sim.pairs.report:report_pairs")
+
+# friction pyramids
+start_pyramid = _late("sim.contacts.pyramid:start_pyramid")
+pyramid_error = _late("sim.contacts.pyramid:pyramid_error")
+pyramid_products = _late("sim.contacts.pyramid:pyramid_products")
+pyramid_products_ahead = _late("sim.contacts.pyramid:pyramid_products_ahead")
+pyramid_boundary = _late("sim.contacts.pyramid:pyramid_boundary")
+return_pyramid = _late("sim.contacts.pyramid:return_pyramid")
+condense_pyramid = _late("sim.contacts.pyramid:condense_pyramid")
+pyramid_constant = _late("sim.contacts.pyramid:pyramid_constant")
+recover_pyramid = _late("sim.contacts.pyramid:recover_pyramid")
+
+# springs of quaternion joints
+spring_impulse = _late("sim.joints.ball_spring:spring_impulse")
+add_spring_block = _late("sim.joints.ball_spring:add_spring_block")
+add_ball_spring_derivatives = _late("sim.joints.ball_spring:add_ball_spring_derivatives")
+
+# terrain
+place_on_terrain = _late("sim.terrain.contact:place_on_terrain")
+turn_on_terrain = _late("sim.terrain.contact:turn_on_terrain")
+add_frame_matrix = _late("sim.terrain.contact:add_frame_matrix")
+terrain_gap = _late("sim.terrain.contact:terrain_gap")
+evaluate_on_terrain = _late("sim.terrain.far:evaluate_on_terrain")
+
+# restitution
+find_impacts = _late("sim.contacts.restitution:find_impacts")
+subtract_floors = _late("sim.contacts.restitution:subtract_floors")
+gained_energy = _late("sim.contacts.restitution:gained_energy")
+add_bounce_composites = _late("sim.contacts.restitution_gradient:add_bounce_composites")
+add_bounce_derivatives = _late("sim.contacts.restitution_gradient:add_bounce_derivatives")
+
+# which pairs, and which of their elements
+begin_pairs = _late("sim.pairs.far:begin_pairs")
+enlist_pairs = _late("sim.pairs.far:enlist_pairs")
+choose_pairs = _late("sim.pairs.choice:choose_pairs")
+overlapping = _late("sim.pairs.choice:overlapping")
+far_pair_impulses = _late("sim.pairs.far:far_pair_impulses")
+pairs_came_near = _late("sim.pairs.far:pairs_came_near")
+all_near = _late("sim.pairs.far:all_near")
+
+# gears
+apply_gears = _late("sim.coupling.gears:apply_gears")
+
+# derivatives by the heights of a terrain, and by radii on it
+add_height_gradient = _late("sim.parameters.terrain:add_height_gradient")
+add_surface_radius = _late("sim.parameters.surface:add_surface_radius")
+
+# loops that pass singular configurations
+close_velocity = _late("sim.coupling.loop_velocity:close_velocity")
+loops_regular = _late("sim.coupling.loop_motion:loops_regular")
+stay_regular = _late("sim.coupling.loop_motion:stay_regular")
+predict_loops = _late("sim.coupling.loop_motion:predict_loops")
+loops_gained = _late("sim.coupling.loop_work:loops_gained")
+lead_again = _late("sim.coupling.loop_motion:lead_again")
+meet_ahead = _late("sim.coupling.loop_motion:meet_ahead")
+is_farther = _late("sim.coupling.loop_motion:is_farther")
+
+# cylinders against polytopes and cylinders
+cylinder_distance = _late("sim.pairs.cylinders:cylinder_distance")
+collide_cylinders = _late("sim.pairs.cylinders:collide_cylinders")
+choose_cylinders = _late("sim.pairs.cylinders:choose_cylinders")
+cylinder_before = _late("sim.pairs.cylinders:cylinder_before")
+
+# joints with two rotations, over an interval
+swing_turn = _late("sim.joints.swing:swing_turn")
+
+# energy from collisions of polytopes and cylinders
+pairs_gained = _late("sim.pairs.work:pairs_gained")
+
+COUNT = _late.count  # of addresses

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.late import Late
+from sim import late
 from sim.model import Model
 from sim.work import Work
 from solvers.record import Field, record, table
@@ -120,7 +120,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "2npair": 2 * sizes.npair,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
-        "nlate": len(Late),
+        "nlate": late.COUNT,
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols

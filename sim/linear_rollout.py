@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from sim.gradients import gradient
+from sim.late import gradient, step
 from sim.layout import model_view, work_view
 from sim.model import Vector
 from sim.options import Guess
 from sim.rollout import Linearized, begin
-from sim.step import step
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status

@@ -41,4 +41,11 @@ class Outcome(NamedTuple):
     violation: float  # largest |product - kappa| of complementary pairs
 
 
+# Work.pair_free: elements of the shapes in contact are chosen where an attempt starts; anew at every pose; or where it
+# starts, with those that pressed kept beside them
+AT_START, AT_EVERY_POSE, BESIDE_KEPT = 0, 1, 2
+
+# what a solution says of them: they are those that touch; others overlap; a point has gone through the other shape
+PLACED, OVERLAPPING, ASTRAY = 0, 1, 2
+
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

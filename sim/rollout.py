@@ -12,12 +12,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.contacts.report import report_contacts
-from sim.gradients import gradient
+from sim.late import gradient, report_contacts, step
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Vector
 from sim.options import Guess, Options
-from sim.step import step
 from sim.work import Work
 from solvers.jit import kernel, parallel_kernel, prange
 from solvers.record import Table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -198,14 +198,3 @@ def _standing(mech: Mechanism) -> Floats:
         if rises:
             q[first : first + 3] += max(rises) * rotation_matrix(joint.orientation)[2]
     return q
-
-
-def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
-    """The mechanism with another friction or law, of all contacts or by name."""
-    if isinstance(value, Mapping):
-        for name in value:
-            checks.one_of(f"Simulator.replace({field}=...)", name, mech.contact_names)
-        contacts = [replace(c, **{field: value.get(c.name, getattr(c, field))}) for c in mech.contacts]
-    else:
-        contacts = [replace(c, **{field: value}) for c in mech.contacts]
-    return replace(mech, contacts=contacts)

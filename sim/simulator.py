@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
+from sim.contact_settings import with_contacts
 from sim.contacts.left_out import left_out
 from sim.derivatives import Derivatives
 from sim.describe import describe
@@ -19,7 +20,6 @@ from sim.mechanism import Mechanism
 from sim.policies import Feedback, roll
 from sim.reactions import Reactions, reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of, fastest
-from sim.scene import with_contacts
 from sim.settings import Settings, default_kappa
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
@@ -175,7 +175,7 @@ class Simulator(Derivatives):
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
         gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
         error = error_of(mech, where, report, self.tolerance, max(gaps, default=None))
-        if error.status == Status.ANGULAR_STEP and x is not None:
+        if error.status == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
             return SimulationError(f"{error} {fastest(mech, self.replace(time_step=1e-6).maximal(x))}", error.status)
         return error
 

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from sim.contacts.report import worst_contact
-from sim.coupling.loop_motion import (
+from sim import late
+from sim.dynamics import begin_step
+from sim.late import (
     is_farther,
     lead_again,
+    loops_gained,
     loops_regular,
     meet_ahead,
     predict_loops,
+    solve,
+    start_loops,
     stay_regular,
+    worst_contact,
 )
-from sim.coupling.loop_work import loops_gained
-from sim.coupling.loops import start_loops
-from sim.dynamics import begin_step
-from sim.late import Late
 from sim.model import Model, Vector
 from sim.options import Guess, Options, Outcome
-from sim.solve.interior_point import interior_point as solve  # or `newton`, which takes its place in scenes without
 from sim.work import Work
 from solvers.jit import inlined
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -48,6 +47,7 @@ def solve_branch(
         r = solve(model, work, options, q, v, u, guess)
         if stay_regular(model, work, r.status):
             return _checked(model, work, options, v, r)
+        guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)
     r = solve(model, work, options, q, v, u, guess)
@@ -62,7 +62,7 @@ def solve_branch(
     return _checked(model, work, options, v, r)
 
 
-@late(Late.STEP, int(Status.NOT_FINITE))
+@late.step.defined(otherwise=int(Status.NOT_FINITE))
 def step(
     model: Model, work: Work, options: Options, x: Vector, u: Vector, guess: Guess, out: Vector, report: Vector
 ) -> int:

@@ -11,7 +11,7 @@ class Work(NamedTuple):
     """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards."""
 
     origin: Vector  # (3,) the reference point O
-    # configuration 2
+    # configurations 1, 2 and 3, and the motion between them
     theta1: Vector  # (nq,) coordinates at 1
     theta3: Vector  # (nq,) coordinates at 3
     nu: Vector  # (nv,) the unknown v25
@@ -64,7 +64,7 @@ class Work(NamedTuple):
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (1,) 1: elements are chosen anew at every pose; 2: those that press are kept beside new ones
+    pair_free: Integers  # (1,) where elements are chosen: AT_START, AT_EVERY_POSE or BESIDE_KEPT, see options.py
     far: Matrix  # (nground, 24) see contacts/far.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

@@ -8,11 +8,15 @@ the optimiser may drop arguments nobody reads and copies nobody calls.
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core import typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import PassManager
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
 from solvers.notice import compiling
 
@@ -54,10 +58,58 @@ class EntryLibrary(JITCodeLibrary):
         super()._optimize_final_module()
 
 
+_NUMBERS = (types.float64, types.int64)
+_SAME = (operator.add, operator.sub, operator.mul, operator.iadd, operator.isub, operator.imul)
+_COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
+
+
+def _number_of(name: Any, results: dict[types.Type, types.Type]) -> None:
+    """Say what an operator makes of two numbers of one type, as Numba does after asking NumPy and half a dozen others:
+    5 of 100 s of a cold start.
+    """
+
+    class Plain(AbstractTemplate):
+        key = name
+        metadata = {"target": "cpu"}  # the more special are asked first
+
+        def generic(self, args: Any, kws: Any) -> Any:
+            alike = len(args) == 2 and args[0] is args[1] and args[0] in results
+            return signature(results[args[0]], *args) if alike else None
+
+    infer_global(name)(Plain)
+
+
+for _operator in _SAME:
+    _number_of(_operator, {kind: kind for kind in _NUMBERS})
+for _operator in _COMPARED:
+    _number_of(_operator, dict.fromkeys(_NUMBERS, types.boolean))
+_number_of(operator.truediv, {types.float64: types.float64})
+
+_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions
+    untyped_passes.WithLifting,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.RewriteDynamicRaises,
+    untyped_passes.MakeFunctionToJitFunction,
+    untyped_passes.FindLiterallyCalls,
+    untyped_passes.LiteralUnroll,
+    untyped_passes.LiteralPropagationSubPipelinePass,
+    typed_passes.NopythonRewrites,
+    typed_passes.DumpParforDiagnostics,
+)
+
+
 class _Compiler(Compiler):
-    """Numba's compiler, into a library of our own."""
+    """Numba's compiler, into a library of our own, without the passes that are idle."""
 
     library: type[JITCodeLibrary] = JITCodeLibrary
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Which passes, in which order."""
+        (default,) = super().define_pipelines()
+        chosen = PassManager(default.pipeline_name)
+        chosen.passes = [entry for entry in default.passes if entry[0] not in _IDLE]
+        chosen.finalize()
+        return [chosen]
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""

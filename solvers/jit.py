@@ -18,6 +18,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -109,45 +110,70 @@ if _FOLDER is not None:
 cpu_target.typing_context.refresh()
 
 
-class Kernel(CPUDispatcher):
-    """A compiled function in two forms: an entry, compiled when Python calls it, and `inner`, for other kernels."""
+class _Form(CPUDispatcher):
+    """One of the two forms of a kernel."""
 
-    def __init__(self, func: Callable[..., Any], inner: Any, **flags: Any) -> None:
-        options = {"nopython": True, "boundscheck": None, **_FLAGS, "_nrt": False, **flags}
-        super().__init__(func, targetoptions=options, pipeline_class=InnerCompiler if inner is None else EntryCompiler)
-        self.inner = inner
-        if inner is not None:  # kernels see the inner form
-            self.typingctx._remove_global(self)
-            self.typingctx.insert_global(self, inner._type)
+    def __init__(self, func: Callable[..., Any], compiler: Any, **flags: Any) -> None:
+        options = {"nopython": True, "boundscheck": None, **_FLAGS, "_nrt": False, "no_cfunc_wrapper": True, **flags}
+        super().__init__(func, targetoptions=options, pipeline_class=compiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """How kernels see it: a constant argument is a number like any other, not a reason to compile anew."""
         return super().get_call_template([unliteral(a) for a in args], {k: unliteral(a) for k, a in kws.items()})
 
+
+class Kernel:
+    """A compiled function in two forms: an entry, which Python calls, and `inner`, for other kernels.
+
+    Each is made when it is first asked for: a dispatcher of Numba takes a third of a millisecond to make, and of the
+    hundreds of kernels that a plan imports Python calls a dozen.
+    """
+
+    def __init__(self, func: Callable[..., Any], keep: bool = True, **flags: Any) -> None:
+        update_wrapper(self, func)
+        self.py_func, self.keep = func, keep
+        self.targetoptions = flags  # where Numba looks for `inline`
+
+    def __call__(self, *args: Any) -> Any:
+        return self.entry(*args)
+
+    @cached_property
+    def entry(self) -> _Form:
+        """The form with a way in for Python."""
+        form = _Form(self.py_func, EntryCompiler)
+        return _cached(form) if self.keep else form
+
+    @cached_property
+    def inner(self) -> _Form:
+        """The form without."""
+        form = _Form(self.py_func, InnerCompiler, no_cpython_wrapper=True, **self.targetoptions)
+        return _cached(form, "inner") if self.keep else form
+
     @property
     def _numba_type_(self) -> Any:
-        return self._type if self.inner is None else self.inner._type
+        return self.inner._type
 
     @property
-    def compiled(self) -> set[Any]:
-        """Signatures compiled or loaded so far, of both forms."""
-        return {*self.overloads, *(() if self.inner is None else self.inner.overloads)}
+    def signatures(self) -> set[Any]:
+        """Those compiled or loaded so far, of both forms."""
+        return {s for form in ("entry", "inner") if form in vars(self) for s in vars(self)[form].overloads}
 
 
-def _cached(kernel: Any, form: str = "entry") -> Any:
-    """The kernel, with its cache in our folder, in which any edit of a source starts anew; one folder per form."""
+def _cached(form: Any, name: str = "entry") -> Any:
+    """The form, with its cache in our folder, in which any edit of a source starts anew; one folder per form."""
     if _FOLDER is not None:
         users_folder = numba.config.CACHE_DIR
         try:
-            numba.config.CACHE_DIR = str(_FOLDER / form)
-            kernel.enable_caching()
+            numba.config.CACHE_DIR = str(_FOLDER / name)
+            form.enable_caching()
         finally:
             numba.config.CACHE_DIR = users_folder
+    return form
+
+
+def _registered(kernel: Any) -> Any:
+    _REGISTRY.append(kernel)
     return kernel
-
-
-def _inner(func: Callable[..., Any], **flags: Any) -> Kernel:
-    return cast(Kernel, _cached(Kernel(func, None, no_cpython_wrapper=True, no_cfunc_wrapper=True, **flags), "inner"))
 
 
 def kernel(func: F) -> F:
@@ -156,16 +182,12 @@ def kernel(func: F) -> F:
     A kernel cannot allocate: it fails to compile if it tries. That removes the reference counting of every array in
     every call (`_nrt=False`; in a prototype, one step of a 13-body tree went from 103 to 61 us).
     """
-    if numba.config.DISABLE_JIT:
-        return func
-    compiled = _cached(Kernel(func, _inner(func), no_cfunc_wrapper=True))
-    _REGISTRY.append(compiled)
-    return cast(F, compiled)
+    return func if numba.config.DISABLE_JIT else cast(F, _registered(Kernel(func)))
 
 
 def inlined(func: F) -> F:
     """A kernel whose text becomes part of its callers, which read better with it apart. Called from kernels only."""
-    return func if numba.config.DISABLE_JIT else cast(F, _inner(func, inline="always"))
+    return func if numba.config.DISABLE_JIT else cast(F, Kernel(func, inline="always"))
 
 
 inner_kernel = kernel  # where only kernels call it
@@ -173,19 +195,16 @@ inner_kernel = kernel  # where only kernels call it
 
 def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
     """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result."""
-    compiled = _cached(Kernel(func, _inner(func), no_cpython_wrapper=True, no_cfunc_wrapper=True))
-    _REGISTRY.append(compiled)
-    compiled.compile(signature)
-    return compiled.overloads[signature]
+    form = _registered(_cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
+    form.compile(signature)
+    return form.overloads[signature]
 
 
 def local_kernel(func: F) -> F:
     """A kernel made inside a function, around another kernel: Numba never finds such a closure in its cache again, so
     it is compiled once per process and leaves no file behind.
     """
-    compiled = Kernel(func, Kernel(func, None, no_cpython_wrapper=True, no_cfunc_wrapper=True), no_cfunc_wrapper=True)
-    _REGISTRY.append(compiled)
-    return cast(F, compiled)
+    return cast(F, _registered(Kernel(func, keep=False)))
 
 
 def users_kernel(func: F) -> F:
@@ -193,7 +212,7 @@ def users_kernel(func: F) -> F:
 
     A function that is compiled already stays as it is.
     """
-    if numba.config.DISABLE_JIT or isinstance(func, CPUDispatcher):
+    if numba.config.DISABLE_JIT or isinstance(func, CPUDispatcher | Kernel):
         return func
     return cast(F, numba.njit(**_FLAGS)(func))
 
@@ -202,17 +221,12 @@ def parallel_kernel(func: F) -> F:
     """Compile `func` with `prange` over the cores; allowed to allocate. Only for loops over whole knots or rollouts."""
     if numba.config.DISABLE_JIT:
         return func
-    compiled = _cached(numba.njit(parallel=True, **_FLAGS)(func))
-    _REGISTRY.append(compiled)
-    return cast(F, compiled)
+    return cast(F, _registered(_cached(numba.njit(parallel=True, **_FLAGS)(func))))
 
 
 def compiled_signatures() -> dict[str, int]:
     """Kernels compiled or loaded so far in this process, by qualified name, with their number of signatures."""
-    counts = {
-        f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.compiled if isinstance(k, Kernel) else k.signatures)
-        for k in _REGISTRY
-    }
+    counts = {f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.signatures) for k in _REGISTRY}
     return {name: count for name, count in counts.items() if count}
 
 

@@ -9,10 +9,12 @@ What a late kernel takes and returns is read from its annotations, because a cal
 
     int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/record.py), NamedTuples
 
-    @late(Late.FACTOR_COUPLING, otherwise=True)
+    factor_coupling = _late("sim.coupling.system:factor_coupling")  # sim/late.py: for callers
+
+    @late.factor_coupling.defined(otherwise=True)
     def factor_coupling(model: Model, work: Work) -> bool: ...
 
-    model.late[Late.FACTOR_COUPLING] = factor_coupling.address()
+    model.late[factor_coupling.index] = factor_coupling.address()
 """
 
 from __future__ import annotations
@@ -20,6 +22,8 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Iterable
+from functools import cached_property
+from importlib import import_module
 from types import GenericAlias
 from typing import Any
 
@@ -32,7 +36,7 @@ from numba.extending import intrinsic
 from solvers.jit import entry
 from solvers.record import RECORDS, load_word
 
-__all__ = ["LateKernel", "late"]
+__all__ = ["LateKernel", "LateTable"]
 
 _TYPES: dict[str, types.Type] = {
     "int": types.int64,
@@ -71,15 +75,36 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
 
 
 class LateKernel:
-    """A kernel at an address; compiled when it is first asked for."""
+    """A kernel at an address; imported, and compiled, when it is first asked for."""
 
-    def __init__(self, func: Callable[..., Any], index: int, otherwise: Any) -> None:
-        self.func, self.index, self.otherwise = func, int(index), otherwise
+    def __init__(self, home: str, index: int) -> None:
+        self.home, self.index = home, index
+        self.otherwise: Any = None
+        self._func: Callable[..., Any] | None = None
         self._code: Any = None
-        self._call = _caller(self)
+
+    def defined(self, otherwise: Any = None) -> Callable[[Callable[..., Any]], LateKernel]:
+        """A decorator for the text of the kernel; `otherwise` stands for calls of it where its address is 0."""
+
+        def define(func: Callable[..., Any]) -> LateKernel:
+            if f"{func.__module__}:{func.__name__}" != self.home:
+                raise TypeError(f"late kernel {self.home}: expected there, got {func.__module__}:{func.__name__}")
+            self._func, self.otherwise = func, otherwise
+            return self
+
+        return define
+
+    @property
+    def func(self) -> Callable[..., Any]:
+        """The text."""
+        if self._func is None:
+            import_module(self.home.split(":")[0])
+        if self._func is None:
+            raise TypeError(f"late kernel {self.home}: not defined there")
+        return self._func
 
     def __call__(self, *args: Any) -> Any:
-        raise TypeError(f"{self.func.__name__} is called from kernels only")
+        raise TypeError(f"{self.home} is called from kernels only")
 
     @property
     def compiled(self) -> bool:
@@ -97,19 +122,32 @@ class LateKernel:
             declared = self.signature()
             code = entry(self.func, declared.args)
             if code.signature.return_type != declared.return_type:
-                name, found = self.func.__name__, code.signature.return_type
-                raise TypeError(f"late kernel {name}: expected to return {declared.return_type}, got {found}")
+                found = code.signature.return_type
+                raise TypeError(f"late kernel {self.home}: expected to return {declared.return_type}, got {found}")
             self._code = code
         return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
+
+    @cached_property
+    def _call(self) -> Any:
+        call = _caller(self)
+        cpu_target.typing_context.refresh()  # which learns of intrinsics only so
+        return call
 
     @property
     def _numba_type_(self) -> Any:
         return cpu_target.typing_context.resolve_value_type(self._call)
 
 
-def late(index: int, otherwise: Any = None) -> Callable[[Callable[..., Any]], Any]:
-    """A kernel called by the address at this index of `late`; `otherwise` stands for it where that is 0."""
-    return lambda func: LateKernel(func, index, otherwise)
+class LateTable:
+    """Late kernels by their homes, "module:name"; each has an index of its own, but for one `instead_of` another."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, home: str, instead_of: Any = None) -> Any:
+        index = self.count if instead_of is None else instead_of.index
+        self.count += instead_of is None
+        return LateKernel(home, index)
 
 
 def _caller(kernel: LateKernel) -> Any:

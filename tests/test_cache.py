@@ -118,6 +118,44 @@ for mech in scenes:
     assert python(program).split() == ["x......", "xx.....", "xx.x...", "xxxx..."]
 
 
+FEATURES = (  # what few scenes have: rooms and files with kernels of their own
+    "sim.collision.", "sim.coupling.", "sim.high_order.", "sim.pairs.", "sim.parameters.", "sim.terrain.",
+    "sim.contacts.pyramid", "sim.contacts.restitution", "sim.joints.cone_limit", "sim.joints.swing",
+)  # fmt: skip
+NOUNS = (  # what users write and mechanisms ask their parts for
+    "sim.collision.broad", "sim.collision.kinds", "sim.contacts.clusters", "sim.contacts.left_out",
+    "sim.coupling.closing", "sim.coupling.closure", "sim.pairs.touch",
+    "sim.joints.swing_coordinates", "sim.terrain.ball_surface", "sim.terrain.spline", "sim.terrain.terrain",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("program", "foreign"),
+    [
+        ("dojo.ilqr(dojo.problems.hop())", FEATURES),
+        (
+            "sim = dojo.Simulator(dojo.models.pendulum())\n"
+            "sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())",
+            (*FEATURES, "sim.contacts.", "sim.solve.interior_point", "sim.solve.inequalities", "solvers.cones"),
+        ),
+    ],
+    ids=["hop", "pendulum"],
+)
+def test_what_few_scenes_have_is_neither_compiled_nor_imported(program: str, foreign: tuple[str, ...]) -> None:
+    text = f"""
+import json, sys, numpy as np, dojo_opt as dojo
+from solvers.jit import compiled_signatures
+{program}
+print(json.dumps([list(compiled_signatures()), list(sys.modules)]))
+"""
+    compiled, _ = json.loads(python(text))
+    _, imported = json.loads(python(text))  # the first may have compiled, which imports what is called
+    assert [name for name in compiled if name.startswith(foreign)] == []
+    assert [name for name in imported if name.startswith(foreign) and name not in NOUNS] == []
+    assert {"sim.step", "sim.calls"} <= set(imported)
+
+
 @pytest.mark.slow
 def test_kernels_have_one_signature_each() -> None:
     program = """

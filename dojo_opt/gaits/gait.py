@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from dojo_opt.feet import Feet
-from dojo_opt.rest import input_map
+from dojo_opt.rest import input_map, least_pushes
 from sim.parts import Input, Joint
 from sim.simulator import Simulator
 
@@ -58,9 +57,7 @@ class Gait:
             push = np.einsum("kec,kcv->kev", edges[carrying], J[t, carrying]).reshape(-1, sim.nv)
             left = tau[t]
             if len(push):
-                rows = np.concatenate([push[:, base].T, _EVEN * np.eye(len(push))])
-                share, _ = nnls(rows, np.concatenate([left[base], np.zeros(len(push))]))
-                left = left - push.T @ share
+                left = left - push.T @ least_pushes(push[:, base], left[base], _EVEN)
             us[t] = np.linalg.lstsq(B, left, rcond=None)[0]
         return us
 

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.border import whole
+from sim.contact_settings import with_contacts
 from sim.mechanism import Mechanism
 from sim.parts import Input
-from sim.scene import with_contacts
 from sim.terrain.terrain import Terrain
 
 Vector = NDArray[np.float64]

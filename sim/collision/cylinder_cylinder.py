@@ -12,7 +12,7 @@ Codes: 16 + 8 i + what it is, i: the end; or which rims, the side of the normal 
 
 from __future__ import annotations
 
-from sim.collision.box import column, to_a
+from sim.collision.box import column
 from sim.collision.clip import BORDER
 from sim.collision.cylinder_crossings import (
     crossing,
@@ -23,19 +23,16 @@ from sim.collision.cylinder_crossings import (
 )
 from sim.collision.exchange import exchange
 from sim.collision.kept import original
-from sim.collision.polytope_cylinder import MISSED, RIM_POINTS
+from sim.collision.kinds import CROSSINGS, RIM_POINTS
+from sim.collision.polytope_cylinder import MISSED
 from sim.collision.rim import (
-    STEEP,
-    plane_gap,
     plane_rim,
-    point_towards,
+    rim_below,
 )
 from sim.collision.witness import TIE, absent, dot
 from sim.model import Integers, Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
-
-CROSSINGS = 9
 
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
 
@@ -75,21 +72,15 @@ def survey(
 
 
 @inner_kernel
-def rim_point(
+def rim_at_end(
     k: int, end: float, deepest: float, own: tuple[float, float], other: tuple[float, float], R: Vector, r: Vector
 ) -> int:
     """Code of point k of the rims of a cylinder with sizes `own`, at the end of another one (`other`), whose pose in
     its frame is R, r; 0 where it is not below that end, or deeper than the shapes are.
     """
-    n, s = end_plane(end, other, R, r)
-    if k > 1 and abs(n[2]) < STEEP:
-        return 0
-    if plane_gap(k, n, s, own[0], own[1]) < deepest:
-        return 0
-    y = point_towards(k, n, own[0], own[1])
-    x = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
+    below, x = rim_below(k, end_plane(end, other, R, r), own, deepest, R, r)
     a = other[0] * (1.0 + BORDER)
-    return 16 + (8 if end > 0.0 else 0) if x[0] * x[0] + x[1] * x[1] <= a * a else 0
+    return 16 + (8 if end > 0.0 else 0) if below and x[0] * x[0] + x[1] * x[1] <= a * a else 0
 
 
 @inner_kernel
@@ -112,8 +103,8 @@ def choose_elements(
     deepest = min(s, 0.0) - TIE * (sizes[4] + sizes[5])
     a, b = (sizes[0], sizes[1]), (sizes[4], sizes[5])
     for k in range(RIM_POINTS):
-        codes[first + k] = rim_point(k, up, deepest, b, a, R, r)
-        codes[first + RIM_POINTS + k] = rim_point(k, down, deepest, a, b, turned[:9], turned[9:])
+        codes[first + k] = rim_at_end(k, up, deepest, b, a, R, r)
+        codes[first + RIM_POINTS + k] = rim_at_end(k, down, deepest, a, b, turned[:9], turned[9:])
     codes[begin] = which
     for k in range(begin + 1, begin + CROSSINGS):
         if codes[k] == 0 or codes[k] == which:

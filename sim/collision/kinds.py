@@ -7,6 +7,10 @@ from enum import IntEnum
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
 OUT = 43  # length of what `collide` writes
+EDGES = 8  # points of two polytopes beside their corners: pairs of edges that cross
+SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
+CROSSINGS = 9  # points of a cylinder and another shape that are no corners: places where edges, axes and rims cross
+RIM_POINTS = 8  # points on a rim that a plane may touch
 
 
 class Shape(IntEnum):
@@ -66,7 +70,7 @@ _COUNT = {
     Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
     Pair.BOX_HALFSPACE: 8,  # corners
     Pair.CYLINDER_HALFSPACE: 8,  # lowest points of two rims, three fixed points on each
-    Pair.CYLINDER_CYLINDER: 25,  # eight points on the rims of each, nine places where axes and rims cross
+    Pair.CYLINDER_CYLINDER: 2 * RIM_POINTS + CROSSINGS,  # on the rims of each; where axes and rims cross
 }
 
 

@@ -36,8 +36,6 @@ from sim.model import Matrix, Vector
 from sim.rotation import Vec3, cross
 from solvers.jit import inner_kernel
 
-EDGES = 8
-SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
 _MANY = 4096
 _CROSSING = 1e-2  # sine of the angle from which on two edges cross
 _LEANING = 0.05  # part of a face normal by which the normal of two edges may lie outside of the arc of their faces

@@ -12,10 +12,11 @@ Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with
 
 from __future__ import annotations
 
-from sim.collision.box import to_a, to_b
+from sim.collision.box import to_b
 from sim.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
 from sim.collision.hull import above, row
 from sim.collision.kept import original
+from sim.collision.kinds import CROSSINGS, RIM_POINTS
 from sim.collision.polytope_cylinder_crossings import (
     corner_of,
     crossings,
@@ -24,18 +25,14 @@ from sim.collision.polytope_cylinder_crossings import (
     separation_along,
 )
 from sim.collision.rim import (
-    STEEP,
-    plane_gap,
     plane_rim,
-    point_towards,
+    rim_below,
 )
 from sim.collision.witness import TIE, absent, dot
 from sim.model import Integers, Matrix, Vector
 from sim.rotation import Vec3
 from solvers.jit import inner_kernel
 
-CROSSINGS = 9
-RIM_POINTS = 8
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 
 END, FACE, CORNER, CROSS = 0, 1, 2, 3
@@ -106,7 +103,7 @@ def choose_elements(
             where = which & 7
         codes[first + k] = 16 + where
     for k in range(rims):
-        codes[first + na + k] = rim_point(k, face, deepest, sizes, hull, R, r)
+        codes[first + na + k] = rim_at_face(k, face, deepest, sizes, hull, R, r)
     if kind == CROSS:
         codes[begin] = which
     for k in range(begin + 1, begin + CROSSINGS):
@@ -126,16 +123,10 @@ def choose_elements(
 
 
 @inner_kernel
-def rim_point(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+def rim_at_face(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     """Code of point k of the rims where it is below the face of a, and no deeper than the shapes are; 0 elsewhere."""
-    n, s = face_plane(hull, face, R, r)
-    if k > 1 and abs(n[2]) < STEEP:
-        return 0
-    if plane_gap(k, n, s, sizes[4], sizes[5]) < deepest:
-        return 0
-    y = point_towards(k, n, sizes[4], sizes[5])
-    x = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
-    return 16 + 8 * (face - int(sizes[0])) if above(hull, int(sizes[0]), face, x) else 0
+    below, x = rim_below(k, face_plane(hull, face, R, r), (sizes[4], sizes[5]), deepest, R, r)
+    return 16 + 8 * (face - int(sizes[0])) if below and above(hull, int(sizes[0]), face, x) else 0
 
 
 @inner_kernel

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin, sqrt
 
+from sim.collision.box import to_a
 from sim.collision.witness import along, axis, dot, put
 from sim.model import Vector
 from sim.rotation import Vec3, cross
@@ -87,6 +88,21 @@ def plane_gap(which: int, n: Vec3, s: float, rho: float, half: float) -> float:
         sigma = sqrt(n[0] * n[0] + n[1] * n[1] + LEVEL * LEVEL)
         return s - rho * (sigma - LEVEL) - (half if which == 1 else -half) * n[2]
     return s - dot(n, point_towards(which, n, rho, half))
+
+
+@inner_kernel
+def rim_below(
+    which: int, plane: tuple[Vec3, float], size: tuple[float, float], deepest: float, R: Vector, r: Vector
+) -> tuple[bool, Vec3]:
+    """Whether point `which` of the rims of b, of radius and half length `size`, may touch a plane (n, s) of a: no
+    deeper than the shapes are, no fixed point of a cylinder that does not stand; and where it is in the frame of a.
+    """
+    n, s = plane
+    y = point_towards(which, n, size[0], size[1])
+    x = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
+    if which > 1 and abs(n[2]) < STEEP:
+        return False, x
+    return not plane_gap(which, n, s, size[0], size[1]) < deepest, x
 
 
 @inner_kernel

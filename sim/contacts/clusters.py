@@ -9,6 +9,8 @@ from sim.model import Model
 
 Floats = NDArray[np.float64]
 
+STIFFNESS = 1000.0  # largest e (far.py) of a contact that is left out, in units of the tolerance
+
 
 def pack_clusters(model: Model) -> None:
     """Contacts that follow one another on one body, against one direction: the ball around them (far.py)."""

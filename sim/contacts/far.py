@@ -28,15 +28,13 @@ Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: larges
 
 from __future__ import annotations
 
+from sim.contacts.clusters import STIFFNESS
+from sim.late import enlist_pairs, pairs_came_near, terrain_gap
 from sim.model import Model
 from sim.options import Options
-from sim.pairs.far import enlist_pairs, pairs_came_near
 from sim.rotation import rotate
-from sim.terrain.contact import terrain_gap
 from sim.work import Work
 from solvers.jit import kernel
-
-STIFFNESS = 1000.0  # largest e, in units of the tolerance
 
 
 @kernel

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from sim.contacts.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
 from sim.contacts.contact import contact_rate
-from sim.contacts.pyramid import (
+from sim.late import (
     condense_pyramid,
+    pair_rate,
     pyramid_boundary,
     pyramid_constant,
     pyramid_error,
@@ -22,7 +23,6 @@ from sim.contacts.pyramid import (
 )
 from sim.model import Law, Model
 from sim.options import Goal
-from sim.pairs.jacobian import pair_rate
 from sim.work import Work
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel

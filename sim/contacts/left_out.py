@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.contacts.far import STIFFNESS
+from sim.contacts.clusters import STIFFNESS
 from sim.model import Model
 from sim.results import SimulationError
 from solvers.status import MESSAGES

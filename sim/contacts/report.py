@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.contact import contact_kinematics
 from sim.contacts.friction import contact_error, contact_impulse, slip_violation
-from sim.late import Late
+from sim.late import report_pairs
 from sim.model import Matrix, Model, Vector
-from sim.pairs.contact import is_absent
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 
-@late(Late.WORST_CONTACT, -1.0)
+@late.worst_contact.defined(otherwise=-1.0)
 def worst_contact(model: Model, work: Work, kappa: float) -> float:
     """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
     worst = -1.0
@@ -28,7 +27,7 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     return worst
 
 
-@late(Late.REPORT_CONTACTS)
+@late.report_contacts.defined()
 def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
@@ -38,24 +37,12 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
         first = work.far_first[m]
         contact_kinematics(model, work, h, first, model.cluster_end[first])
     for c in range(model.contact_height.shape[0]):
-        _report_contact(model, work, c, work.contact_frame[c], out[c])
+        report_contact(model, work, c, work.contact_frame[c], out[c])
     report_pairs(model, work, out)
 
 
-@late(Late.REPORT_PAIRS)
-def report_pairs(model: Model, work: Work, out: Matrix) -> None:
-    """The rows of the pairs: impulse on the first body."""
-    for j in range(model.pair_kind.shape[0]):
-        c = model.contact_height.shape[0] + j
-        _report_contact(model, work, c, work.pair_frame[j], out[c])
-        if is_absent(work, j):
-            out[c, 6] = work.pair_out[j, 0]
-            for e in range(3):
-                out[c, e] = 0.0
-
-
 @kernel
-def _report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
     """One row, with the frame F of its normal and tangents."""
     i = model.contact_body[c]
     k = work.contact_kin[c]

@@ -30,15 +30,16 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim import late
 from sim.contacts.contact import contact_jacobian, contact_kinematics
 from sim.contacts.friction import contact_impulse
-from sim.late import Late
+from sim.late import pair_kinematics
 from sim.model import Model
-from sim.pairs.contact import is_absent, pair_arm, pair_force, pair_kinematics
+from sim.options import AT_EVERY_POSE, AT_START
+from sim.pairs.contact import is_absent, pair_arm, pair_force
 from sim.rotation import Vec3, cross, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none
 _FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are
@@ -58,9 +59,9 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             work.rot3[i, k] = rot[i, k]
     for m in range(work.counts[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
-    work.pair_free[0] = 1  # what touched there, whatever it is now
+    work.pair_free[0] = AT_EVERY_POSE  # what touched there, whatever it is now
     pair_kinematics(model, work, h)
-    work.pair_free[0] = 0
+    work.pair_free[0] = AT_START
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]
@@ -105,7 +106,7 @@ def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
             b[1] = e if impact else 0.0
 
 
-@late(Late.FIND_IMPACTS)
+@late.find_impacts.defined()
 def find_impacts(model: Model, work: Work, h: float) -> None:
     """Which near contacts are impacts in this step, and their floors."""
     for c in range(work.bounce.shape[0]):
@@ -117,7 +118,7 @@ def find_impacts(model: Model, work: Work, h: float) -> None:
     raise_floors(model, work, h, 1.0)
 
 
-@late(Late.SUBTRACT_FLOORS)
+@late.subtract_floors.defined()
 def subtract_floors(model: Model, work: Work) -> None:
     """contact_kin: gaps above the floors."""
     for m in range(work.counts[2]):
@@ -162,7 +163,7 @@ def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
     return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
 
 
-@late(Late.GAINED_ENERGY, False)
+@late.gained_energy.defined(otherwise=False)
 def gained_energy(model: Model, work: Work, h: float) -> bool:
     """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
 

@@ -7,15 +7,14 @@ of the branch that was taken. Scenes without restitution do not compile these ke
 
 from __future__ import annotations
 
+from sim import late
 from sim.coupling.gradient import add_column
-from sim.late import Late
 from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import pair_arm, pair_force
 from sim.rotation import Vec3, cross, join, transposed_times
 from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
-from solvers.late import late
 
 
 @kernel
@@ -36,7 +35,7 @@ def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
     return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
 
 
-@late(Late.BOUNCE_COMPOSITES)
+@late.add_bounce_composites.defined()
 def add_bounce_composites(model: Model, work: Work) -> None:
     """A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O."""
     for m in range(work.counts[2]):
@@ -64,7 +63,7 @@ def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
             A[18 + 6 * r + k] += t[r] * x
 
 
-@late(Late.BOUNCE_DERIVATIVES)
+@late.add_bounce_derivatives.defined()
 def add_bounce_derivatives(model: Model, work: Work) -> None:
     """dR_dq, dR_dv -= the same across the two bodies of an impact."""
     ground = model.contact_height.shape[0]

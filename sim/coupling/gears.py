@@ -7,11 +7,10 @@ They come after the rows of pairs and loops. Their directions are constant, so t
 
 from __future__ import annotations
 
-from sim.late import Late
+from sim import late
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 
 @kernel
@@ -20,7 +19,7 @@ def gear_row(model: Model, k: int) -> int:
     return int(model.coupling_row[model.coupling_body.shape[0]]) + k
 
 
-@late(Late.APPLY_GEARS, 0.0)
+@late.apply_gears.defined(otherwise=0.0)
 def apply_gears(model: Model, work: Work, h: float) -> float:
     """residual -= impulses of gears; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap.
 

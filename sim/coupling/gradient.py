@@ -8,11 +8,11 @@ dR_dq pair by pair of joints.
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.coupling.gears import gear_derivatives
 from sim.coupling.loop_stiffness import loop_stiffness
 from sim.coupling.rows import is_loop
-from sim.late import Late
 from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import add_earlier_slip, centre_shift
@@ -20,10 +20,9 @@ from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
-from solvers.late import late
 
 
-@late(Late.COUPLING_COMPOSITES)
+@late.add_coupling_composites.defined()
 def add_coupling_composites(model: Model, work: Work, h: float) -> None:
     """A3, A2 += the terms of one branch; fills coupling_K2. After `pose2_to_origin`, before `sum_composites`.
 
@@ -71,7 +70,7 @@ def _take_back(model: Model, work: Work, k: int, f: Vec3) -> None:
                 work.A2[i, 18 + 6 * r + c] += m[r]
 
 
-@late(Late.COUPLING_DERIVATIVES)
+@late.add_coupling_derivatives.defined()
 def add_coupling_derivatives(model: Model, work: Work) -> None:
     """dR_dq += the terms across branches; couple_panel = the gaps of loops by the columns of dR_dq."""
     for k in range(model.coupling_body.shape[0]):

@@ -15,15 +15,14 @@ counted along the motion, whose first step takes the long way.
 
 from __future__ import annotations
 
+from sim import late
 from sim.coupling.loop_lead import lead_loops
-from sim.coupling.loop_velocity import close_velocity
-from sim.coupling.loops import direct_loops, start_loops
+from sim.coupling.loops import direct_loops
 from sim.energy import factor_mass_matrix
-from sim.late import Late
+from sim.late import close_velocity, start_loops
 from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -32,7 +31,7 @@ _REGULAR = 5e-3  # a pivot above this is far from where branches meet
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
 
 
-@late(Late.LOOPS_REGULAR, True)
+@late.loops_regular.defined(otherwise=True)
 def loops_regular(model: Model, work: Work) -> bool:
     """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
     work.loop_led[0] = 0
@@ -48,7 +47,7 @@ def loops_regular(model: Model, work: Work) -> bool:
     return regular
 
 
-@late(Late.STAY_REGULAR, True)
+@late.stay_regular.defined(otherwise=True)
 def stay_regular(model: Model, work: Work, status: int) -> bool:
     """Whether this step is as far, too; if not, the forces of loops are those that a step begins with."""
     deficiency = work.couple_rank[1] - work.couple_rank[0]
@@ -58,7 +57,7 @@ def stay_regular(model: Model, work: Work, status: int) -> bool:
     return False
 
 
-@late(Late.PREDICT_LOOPS, False)
+@late.predict_loops.defined(otherwise=False)
 def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
     """loop_velocity = 2 P v - v, and the directions of forces that it leads (loop_lead.py); False if a guess is not v.
 
@@ -85,7 +84,7 @@ def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, gues
     return not given
 
 
-@late(Late.LEAD_AGAIN, False)
+@late.lead_again.defined(otherwise=False)
 def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
     if work.loop_led[0] == 0:
@@ -98,7 +97,7 @@ def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     return True
 
 
-@late(Late.MEET_AHEAD, False)
+@late.meet_ahead.defined(otherwise=False)
 def meet_ahead(model: Model, work: Work) -> bool:
     """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
 
@@ -113,7 +112,7 @@ def meet_ahead(model: Model, work: Work) -> bool:
     return True
 
 
-@late(Late.FARTHER, False)
+@late.is_farther.defined(otherwise=False)
 def is_farther(model: Model, work: Work, status: int) -> bool:
     """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
     kept = 0.0

@@ -2,39 +2,17 @@
 
 from __future__ import annotations
 
+from sim import late
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import is_loop
-from sim.late import Late
-from sim.model import Matrix, Model, Vector
+from sim.energy import momentum_velocity
+from sim.model import Model, Vector
 from sim.options import Options
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
-
-
-@kernel
-def _momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: Matrix, v: Vector) -> float:
-    """p.v of an interval [J], twice its kinetic energy; rotations by their sines."""
-    energy = 0.0
-    for i in range(model.body_parent.shape[0]):
-        J = work.inertia_world[i]
-        for r in range(3):
-            energy += model.body_mass[i] * move[i, r] * move[i, r] / (h * h)
-            for k in range(3):
-                energy += 4.0 * turn[i, 1 + r] * J[3 * r + k] * turn[i, 1 + k] / (h * h)
-    for d in range(v.shape[0]):
-        energy += model.dof_armature[d] * v[d] * v[d]
-    return energy
-
-
-@kernel
-def twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
-    """p.v of the intervals 1-2 and 2-3 together [J]."""
-    before = _momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
-    return before + _momentum_velocity(model, work, h, work.move, work.turn, work.nu)
 
 
 @kernel
@@ -84,7 +62,7 @@ def _closing_work(model: Model, work: Work, tolerance: float) -> float:
     return total
 
 
-@late(Late.LOOPS_GAINED, False)
+@late.loops_gained.defined(otherwise=False)
 def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the forces of loops did work on the way 1-2-3, which those of a motion do to O(h^3) only.
 
@@ -96,8 +74,8 @@ def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     gain = 0.5 * _loop_work(model, work) / h
     if not gain > 0.0:
         return False
-    before = _momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
-    after = _momentum_velocity(model, work, h, work.move, work.turn, work.nu)
+    before = momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
+    after = momentum_velocity(model, work, h, work.move, work.turn, work.nu)
     most = _SHARE * 0.5 * (before + after)
     if not (gain > most and after > before):
         return False

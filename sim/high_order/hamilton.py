@@ -19,8 +19,8 @@ from __future__ import annotations
 from sim.dynamics import world_inertia
 from sim.elimination import project
 from sim.joints.ball_spring import relative_to_rest
-from sim.joints.swing import swing_curvature
 from sim.kinematics import tree_poses
+from sim.late import swing_curvature
 from sim.mass import solve_mass
 from sim.model import InputKind, Integers, Model, Vector
 from sim.outer import outer_wrenches

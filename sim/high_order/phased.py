@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from sim import rollout
 from sim.bind import bind_smooth, bind_step
-from sim.calls import BOUND, CONE, CONTACT, REPORT, Calls, Floats
+from sim.calls import CONTACT, REPORT, Calls, Floats
 from sim.high_order import legendre, phases
 from sim.high_order.calls import HighOrder
 from sim.high_order.hamilton_gradient import Slopes
@@ -131,8 +131,7 @@ class Phased(HighOrder):
     ) -> tuple[int, Path]:
         """As Calls.closed_loop; nothing of what the policy knows of its steps is used."""
         knots = len(policy.us)
-        kept = np.zeros((knots if keep else 0, 0, CONE)), np.zeros((knots if keep else 0, 0, BOUND))
-        path = Path(np.zeros((knots + 1, self.nx)), np.zeros((knots, self.nu)), *kept, np.zeros(REPORT))
+        path = self._path(knots, keep=keep, cones=False)
         path.xs[0] = x
         total = 0.0
         for t in range(knots):

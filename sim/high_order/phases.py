@@ -16,8 +16,8 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from sim.contacts.far import cluster_gap
-from sim.contacts.report import report_contacts
 from sim.high_order.runge_kutta import Scheme, advance, begin
+from sim.late import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.rollout import Cube

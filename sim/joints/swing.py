@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from sim.late import Late
+from sim import late
 from sim.model import Model, Vector
 from sim.rotation import (
     Quat,
@@ -29,7 +29,6 @@ from sim.rotation import (
 )
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _SMALL = 0.1  # below this square of the half angle, its series are exact to rounding
@@ -42,7 +41,7 @@ def swing(model: Model, i: int, p1: float, p2: float) -> Vec3:
     return p1 * V[0] + p2 * V[3], p1 * V[1] + p2 * V[4], p1 * V[2] + p2 * V[5]
 
 
-@late(Late.SWING_POSE, _STILL)
+@late.swing_pose.defined(otherwise=_STILL)
 def swing_pose(model: Model, i: int, p1: float, p2: float) -> tuple[Quat, Vec3, Vec3]:
     """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p."""
     t = swing(model, i, p1, p2)
@@ -73,7 +72,7 @@ def half_angle_change(a: float, b: float, x: float) -> tuple[float, float]:
     return w, 0.5 * (2.0 * cos(0.5 * s) * sin(0.5 * d) - 2.0 * half_angle(4.0 * small * small)[1] * d) / large
 
 
-@late(Late.SWING_TURN, _STILL[0])
+@late.swing_turn.defined(otherwise=_STILL[0])
 def swing_turn(model: Model, i: int, p1: float, p2: float, d1: float, d2: float) -> Quat:
     """exp(t)^* exp(t + d) of joint i at p, whose increment is d: in the child's axes, rounded to eps |d|.
 
@@ -125,7 +124,7 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
     )
 
 
-@late(Late.SWING_CURVATURE)
+@late.swing_curvature.defined()
 def swing_curvature(model: Model, work: Work, i: int, p1: float, p2: float) -> None:
     """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 

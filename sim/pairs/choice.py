@@ -16,17 +16,18 @@ energy.)
 
 from __future__ import annotations
 
+from sim import late
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
 from sim.collision.kinds import SWAPPED, Pair
-from sim.late import Late
+from sim.late import choose_cylinders, cylinder_before, cylinder_distance
 from sim.model import Model
-from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
+from sim.options import ASTRAY, AT_EVERY_POSE, BESIDE_KEPT, OVERLAPPING, PLACED
+from sim.pairs.cylinders import on_cylinder
 from sim.pairs.memory import NEAR, gap_before, has_no_room, keep, least_size, remember
 from sim.pairs.pose import place_shapes
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose
@@ -69,7 +70,7 @@ def distance(model: Model, work: Work, first: int) -> float:
 def choose_shapes(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]
-    if work.pair_free[0] == 2:
+    if work.pair_free[0] == BESIDE_KEPT:
         remember(model, work, first)
     if on_cylinder(kind):
         choose_cylinders(model, work, first)
@@ -94,14 +95,14 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
-    if work.pair_free[0] == 2:
+    if work.pair_free[0] == BESIDE_KEPT:
         keep(model, work, first)
         for k in range(first, j):
             sizes = model.pair_sizes[k]
             collide_chosen(kind, k - first, work.pair_code[k], sizes, model.hull, pose[:9], pose[9:], work.pair_out[k])
 
 
-@late(Late.CHOOSE_PAIRS)
+@late.choose_pairs.defined()
 def choose_pairs(model: Model, work: Work) -> None:
     """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
@@ -139,21 +140,21 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     return False
 
 
-@late(Late.OVERLAPPING, 0)
+@late.overlapping.defined(otherwise=PLACED)
 def overlapping(model: Model, work: Work) -> int:
-    """Whether the solution at configuration 3 is none: 1 where shapes overlap, in elements that were not chosen; 2
-    where a point has passed through the other shape; 0 else.
+    """PLACED, or why the solution at configuration 3 is none: OVERLAPPING in elements that were not chosen, or ASTRAY
+    where a point has passed through the other shape.
     """
-    found = 0
+    found = PLACED
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
-            if signed and work.pair_free[0] == 1:
+            if signed and work.pair_free[0] == AT_EVERY_POSE:
                 continue
             place_shapes(model, work, j, work.pos3, work.rot3)
             if not signed and passed_through(model, work, j):
-                return 2
-            part = _LAST_RESORT if work.pair_free[0] == 1 else _OVERLAP
+                return ASTRAY
+            part = _LAST_RESORT if work.pair_free[0] == AT_EVERY_POSE else _OVERLAP
             if distance(model, work, j) < -part * least_size(model, j):
-                found = 1
+                found = OVERLAPPING
     return found

@@ -14,16 +14,17 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim import late
 from sim.collision.collide import collide_chosen
-from sim.late import Late
+from sim.late import collide_cylinders
 from sim.model import Matrix, Model
+from sim.options import AT_EVERY_POSE
 from sim.pairs.choice import choose_shapes
-from sim.pairs.cylinders import collide_cylinders, on_cylinder
+from sim.pairs.cylinders import on_cylinder
 from sim.pairs.pose import place_shapes
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
 
@@ -57,14 +58,14 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    if work.pair_free[0] == 1:
+    if work.pair_free[0] == AT_EVERY_POSE:
         choose_shapes(model, work, first)
     elif on_cylinder(kind):
         collide_cylinders(model, work, first)
         return
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        if work.pair_free[0] != 1:
+        if work.pair_free[0] != AT_EVERY_POSE:
             collide_chosen(
                 kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
             )
@@ -77,7 +78,7 @@ def is_absent(work: Work, j: int) -> bool:
     return work.pair_out[j, 0] > _NO_POINT
 
 
-@late(Late.PAIR_KINEMATICS)
+@late.pair_kinematics.defined()
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
     """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
     ground = model.contact_height.shape[0]

@@ -4,6 +4,7 @@ do for the others. Scenes without such collisions do not compile these kernels.
 
 from __future__ import annotations
 
+from sim import late
 from sim.collision.cylinders import (
     choose_on_cylinder,
     collide_with_cylinder,
@@ -11,12 +12,11 @@ from sim.collision.cylinders import (
     separation_of_cylinder,
 )
 from sim.collision.kinds import SWAPPED, Pair
-from sim.late import Late
 from sim.model import Model
+from sim.options import BESIDE_KEPT
 from sim.pairs.memory import gap_before, keep, last_point
 from sim.work import Work
 from solvers.jit import inner_kernel
-from solvers.late import late
 
 
 @inner_kernel
@@ -25,7 +25,7 @@ def on_cylinder(kind: int) -> bool:
     return kind % SWAPPED >= Pair.POLYTOPE_CYLINDER
 
 
-@late(Late.CYLINDER_DISTANCE, 0.0)
+@late.cylinder_distance.defined(otherwise=0.0)
 def cylinder_distance(model: Model, work: Work, first: int) -> float:
     """Distance of the shapes of a collision at pair_relative."""
     pose = work.pair_relative[first]
@@ -51,13 +51,13 @@ def put_all(model: Model, work: Work, first: int) -> None:
         collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_out[j])
 
 
-@late(Late.COLLIDE_CYLINDERS)
+@late.collide_cylinders.defined()
 def collide_cylinders(model: Model, work: Work, first: int) -> None:
     """`put_all`"""
     put_all(model, work, first)
 
 
-@late(Late.CHOOSE_CYLINDERS)
+@late.choose_cylinders.defined()
 def choose_cylinders(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
     the step began.
@@ -79,12 +79,12 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
             if g[0] < before[12]:
                 work.pair_code[j] = 0
-    if work.pair_free[0] == 2:
+    if work.pair_free[0] == BESIDE_KEPT:
         keep(model, work, first)
     put_all(model, work, first)
 
 
-@late(Late.CYLINDER_BEFORE)
+@late.cylinder_before.defined()
 def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
     """pair_trial: the elements of point j where the step began."""
     before = work.pair_before[first]

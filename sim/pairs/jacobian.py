@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.late import Late
+from sim import late
 from sim.model import Model, Vector
 from sim.pairs.contact import point_velocity, shape_b, tangents
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 
 @kernel
@@ -138,7 +137,7 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
             Cb[6 * e + 3 + k] += gm[k] + ge[k]
 
 
-@late(Late.PAIR_RATE, (0.0, 0.0, 0.0))
+@late.pair_rate.defined(otherwise=(0.0, 0.0, 0.0))
 def pair_rate(model: Model, work: Work, c: int) -> Vec3:
     """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
     j = c - model.contact_height.shape[0]

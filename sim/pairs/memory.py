@@ -5,9 +5,8 @@ of the other in the first. Collisions of polytopes and of cylinders have room fo
 from __future__ import annotations
 
 from sim.collision.box import to_a, to_b
-from sim.collision.cylinder_cylinder import RIM_POINTS
 from sim.collision.kept import elsewhere
-from sim.collision.kinds import SWAPPED, Pair
+from sim.collision.kinds import RIM_POINTS, SWAPPED, Pair
 from sim.collision.witness import dot
 from sim.model import Matrix, Model, Vector
 from sim.work import Work

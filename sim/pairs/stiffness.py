@@ -7,8 +7,8 @@ with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows 
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.friction import condense_contact, contact_constant, contact_error, contact_impulse
-from sim.late import Late
 from sim.model import Matrix, Model, Vector
 from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
@@ -17,7 +17,6 @@ from sim.pairs.jacobian import pair_jacobian
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 
 @kernel
@@ -103,7 +102,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         add_wrench_column(Kb, k, f, df, P, dP)
 
 
-@late(Late.CONDENSE_PAIRS)
+@late.condense_pairs.defined()
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float) -> None:
     """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  share: as in `condense_into`."""
     ground = model.contact_height.shape[0]
@@ -120,7 +119,7 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: floa
                 add_pair_stiffness(model, work, c - ground, share)
 
 
-@late(Late.APPLY_PAIRS, 0.0)
+@late.apply_pairs.defined(otherwise=0.0)
 def apply_pairs(model: Model, work: Work) -> float:
     """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
     ground = model.contact_height.shape[0]
@@ -135,7 +134,7 @@ def apply_pairs(model: Model, work: Work) -> float:
     return r
 
 
-@late(Late.PAIR_CONSTANTS)
+@late.pair_constants.defined()
 def pair_constants(model: Model, work: Work, goal: Goal) -> None:
     """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
     ground = model.contact_height.shape[0]

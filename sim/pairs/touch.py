@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from sim.collision import kinds
 from sim.collision.broad import bounding_radius
-from sim.collision.polytope import EDGES, SPARE
-from sim.collision.polytope_cylinder import CROSSINGS, RIM_POINTS
+from sim.collision.kinds import CROSSINGS, EDGES, RIM_POINTS, SPARE
 from sim.parts import WORLD
 from sim.polytope import Polytope, hull_table
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix

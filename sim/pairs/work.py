@@ -14,10 +14,10 @@ press bodies together that were moving apart.
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.contacts.restitution import impulse_work
-from sim.coupling.loop_work import twice_kinetic
-from sim.late import Late
+from sim.energy import twice_kinetic
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.pairs.contact import is_absent, pair_arm, pair_force
@@ -25,7 +25,6 @@ from sim.pairs.memory import NEAR, least_size
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
 _LEFT = 2e-4  # part of the smallest size: more than the overlap that the end of a step may have (choice.py)
@@ -56,7 +55,7 @@ def power_after(model: Model, work: Work, h: float, j: int) -> float:
     return f[0] * (ux - vx) + f[1] * (uy - vy) + f[2] * (uz - vz)
 
 
-@late(Late.PAIRS_GAINED, False)
+@late.pairs_gained.defined(otherwise=False)
 def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
     h = options.h

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.coupling.system import solve_coupling_panel
+from sim import late
 from sim.elimination_panel import solve_panel
-from sim.late import Late
+from sim.late import solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.parameters.columns import clear_columns
@@ -27,7 +27,6 @@ from sim.terrain.contact import centre
 from sim.terrain.height_field import cell, height_field, weight
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 from solvers.record import Table
 
 
@@ -104,7 +103,7 @@ def height_jacobian(model_at: Table, work_at: Table, at: At, places: Matrix, out
     spread_contacts(model, work, places, out)
 
 
-@late(Late.HEIGHT_GRADIENT)
+@late.add_height_gradient.defined()
 def add_height_gradient(model: Model, work: Work, h: float, y: Vector, places: Matrix, out: Matrix) -> None:
     """out (1, ncoefficient) += y.(-dR/d(coefficients)); places: (1, 3 nground), overwritten."""
     for m in range(places.shape[1]):

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from sim.dynamics import momentum_balance
+from sim.late import choose_pairs
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import Guess, Options
-from sim.pairs.choice import choose_pairs
 from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, start_inequalities
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from sim.coupling.system import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance_jacobian
 from sim.elimination import factor, solve
 from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
+from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
 from sim.options import Goal
 from sim.solve.complementarity import boundary_step, products_ahead

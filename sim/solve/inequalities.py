@@ -6,6 +6,7 @@ and its matrix.
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.contact import (
     add_contact_matrix,
     add_contact_wrench,
@@ -22,21 +23,24 @@ from sim.contacts.friction import (
     recover_contact,
     start_contact,
 )
-from sim.contacts.restitution import subtract_floors
-from sim.coupling.loops import keep_loops, move_loops
 from sim.elimination import dot_six, subtree_sums
 from sim.joints.limits import add_limit_blocks, add_limit_impulse, limit_constants, limit_gaps, recover_limits
-from sim.late import Late
+from sim.late import (
+    add_frame_matrix,
+    apply_pairs,
+    condense_pairs,
+    far_pair_impulses,
+    keep_loops,
+    move_loops,
+    pair_constants,
+    pair_kinematics,
+    subtract_floors,
+)
 from sim.model import Matrix, Model
 from sim.options import Goal
-from sim.pairs.contact import pair_kinematics
-from sim.pairs.far import far_pair_impulses
-from sim.pairs.stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pose_jacobians import add_slip_jacobian
-from sim.terrain.contact import add_frame_matrix
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 _KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
 LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
@@ -133,7 +137,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
     condense_pairs(model, work, h, kappa, share)
 
 
-@late(Late.STIFFNESS)
+@late.add_stiffness.defined()
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
     condense_into(model, work, h, kappa, 1.0, work.A3)

@@ -18,15 +18,23 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 
 from __future__ import annotations
 
+from sim import late
 from sim.contacts.far import came_near, choose_far
 from sim.contacts.friction import slip_noise
-from sim.contacts.restitution import find_impacts, gained_energy
-from sim.late import Late
+from sim.late import begin_pairs, find_impacts, gained_energy, overlapping, pairs_gained
 from sim.model import Model, Vector
-from sim.options import FAILED, Guess, Options, Outcome
-from sim.pairs.choice import overlapping
-from sim.pairs.far import begin_pairs
-from sim.pairs.work import pairs_gained
+from sim.options import (
+    ASTRAY,
+    AT_EVERY_POSE,
+    AT_START,
+    BESIDE_KEPT,
+    FAILED,
+    OVERLAPPING,
+    PLACED,
+    Guess,
+    Options,
+    Outcome,
+)
 from sim.solve.central_path import AGAIN, first_attempt, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
@@ -35,7 +43,6 @@ from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
-from solvers.late import late
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -123,14 +130,14 @@ def try_from(
 
 @inlined
 def misplacement(model: Model, work: Work, options: Options, v: Vector, status: int) -> int:
-    """Why a solution is none, as `overlapping`; 2 also where collisions gave energy."""
+    """What a solution says of the elements chosen, as `overlapping`; ASTRAY also where collisions gave energy."""
     if status != _SOLVED:
-        return 0
+        return PLACED
     found = overlapping(model, work)
-    return 2 if found == 0 and pairs_gained(model, work, options, v) else found
+    return ASTRAY if found == PLACED and pairs_gained(model, work, options, v) else found
 
 
-@late(Late.SOLVE, FAILED)
+@late.interior_point.defined(otherwise=FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:
@@ -143,22 +150,23 @@ def interior_point(
     choose_far(model, work, options)
     find_impacts(model, work, options.h)
     while True:
-        work.pair_free[0] = 0
+        work.pair_free[0] = AT_START
         first, balance = first_attempt(model, work, options, (q, v, u), guess)
         for attempt in range(first, _ATTEMPTS):
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, balance)
             misplaced = misplacement(model, work, options, v, out.status)
             for choice in range(_CHOICES):
-                if misplaced != 1 or work.pair_free[0] == 1:
+                if misplaced != OVERLAPPING or work.pair_free[0] == AT_EVERY_POSE:
                     break
                 if choice > 0 or attempt > _REPLACED:
-                    work.pair_free[0] = 2
+                    work.pair_free[0] = BESIDE_KEPT
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, balance)
                 misplaced = misplacement(model, work, options, v, out.status)
-            if misplaced == 0 and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
+            if misplaced == PLACED and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
-            out = Outcome(_COLLISION_STEP if misplaced else _NO_PROGRESS, out.iterations, out.residual, out.violation)
-            work.pair_free[0] = (attempt + 1) // 2 % 2
+            why = _NO_PROGRESS if misplaced == PLACED else _COLLISION_STEP
+            out = Outcome(why, out.iterations, out.residual, out.violation)
+            work.pair_free[0] = AT_EVERY_POSE if (attempt + 1) // 2 % 2 == 1 else AT_START
         if came_near(model, work):
             continue
         if out.status != _SOLVED or not gained_energy(model, work, options.h):

@@ -17,13 +17,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.late import Late
+from sim import late
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.terrain.height_field import height_field
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.late import late
 
 
 @kernel
@@ -44,7 +43,7 @@ def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
     return x + pos[i, 0], y + pos[i, 1], z + pos[i, 2]
 
 
-@late(Late.TERRAIN_PLACE)
+@late.place_on_terrain.defined()
 def place_on_terrain(model: Model, work: Work, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
     x, y, z = centre(model, c, work.pos3, work.rot3)
@@ -54,7 +53,7 @@ def place_on_terrain(model: Model, work: Work, c: int) -> None:
     work.contact_kin[c, 0] = i * (z - F - model.contact_height[c])
 
 
-@late(Late.TERRAIN_GAP, 0.0)
+@late.terrain_gap.defined(otherwise=0.0)
 def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
     """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
@@ -81,7 +80,7 @@ def frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
     return a + s * n[0], b + s * n[1], c + s * n[2]
 
 
-@late(Late.TERRAIN_TURN)
+@late.turn_on_terrain.defined()
 def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
     """contact_turn = Omega, rotation of the frame by the twist about O; (gap, slip) rows of contact_kin on terrain.
 
@@ -122,7 +121,7 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
             k[9 + 3 * e + j] += s0 * W[3 + j] + s1 * W[9 + j] + s2 * W[15 + j]
 
 
-@late(Late.TERRAIN_MATRIX)
+@late.add_frame_matrix.defined()
 def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= d(wrench about O)/d(twist) by the turning of the frame, of the impulse f = n fn + t1 f1 + t2 f2:
 

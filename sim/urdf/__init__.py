@@ -1,7 +1,1 @@
-"""Mechanisms from URDF files: `load_urdf`, and what it says about a file."""
-
-from sim.urdf.load import load_urdf
-from sim.urdf.report import Frame, Note, UrdfMechanism, UrdfReport, UrdfWarning
-from sim.urdf.xml import UrdfError
-
-__all__ = ["Frame", "Note", "UrdfError", "UrdfMechanism", "UrdfReport", "UrdfWarning", "load_urdf"]
+"""Mechanisms from URDF files: load.py, and what report.py and xml.py say about a file."""

@@ -12,9 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.collision.kinds import SIZES, Pair, Shape, count, pair
-from sim.collision.polytope import EDGES, SPARE
-from sim.collision.polytope_cylinder import CROSSINGS, RIM_POINTS
+from sim.collision.kinds import CROSSINGS, EDGES, RIM_POINTS, SIZES, SPARE, Pair, Shape, count, pair
 from sim.polytope import Polytope, hull_table
 from sim.shapes import Box, Capsule, Cylinder, Sphere
 
