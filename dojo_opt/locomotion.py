@@ -65,12 +65,10 @@ def follow(
     legs = sim.nv - 6
     weight = np.concatenate([np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, ANGLE)])
     weight = np.concatenate([weight, np.full(6, VELOCITY), np.full(legs, RATE)])
-    states, controls = reference, np.zeros(0)
     if guess == "reference":
-        controls = gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
+        states, controls = reference, gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
     else:
-        feet = replace(sim.mechanism, contacts=Feet(sim, gait.foot_names).contacts)
-        still, torques = equilibrium(sim.replace(mechanism=feet, kappa=CONTINUATION[0].kappa_eval))
+        still, torques = _standing(gait)
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
     if control_limits is not None:
         controls = np.clip(controls, *control_limits)
@@ -89,6 +87,13 @@ def follow(
         controls0=controls,
         states0=states,
     )
+
+
+def _standing(gait: Gait) -> tuple[Array, Array]:
+    """State and torques of a robot that stands on the feet of a gait, at the smoothing a planner begins with."""
+    sim = gait.simulator
+    feet = replace(sim.mechanism, contacts=Feet(sim, gait.foot_names).contacts)
+    return equilibrium(sim.replace(mechanism=feet, kappa=CONTINUATION[0].kappa_eval))
 
 
 def _stride(sim: Simulator, reference: Array) -> Array:

@@ -123,8 +123,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     state = np.array(sim.neutral() if x is None else x, dtype=float)
     state[sim.nq :] = 0.0
     free = np.asarray(~B.any(axis=1))
-    u: Array = np.zeros(sim.nu)
-    left: Array = np.zeros(sim.nv)
     weight = float(np.abs(potential_gradient(sim, state)).max())
     for _ in range(iterations):
         down, up, share = _under(feet, state)
@@ -133,8 +131,6 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * share * np.maximum(gap, _NEAR)))
         load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
         force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
-        left = load - up.T @ force
-        u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
         loaded = force > 1e-3 * weight
         wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
         error = wanted - gap[loaded]

@@ -22,6 +22,8 @@ _LOOPS = (
     late.move_loops,
 )
 _MOTION_OF_LOOPS = (
+    late.loops_regular,
+    late.stay_regular,
     late.predict_loops,
     late.meet_ahead,
     late.is_farther,

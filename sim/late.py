@@ -94,6 +94,8 @@ add_surface_radius = _late("sim.parameters.surface:add_surface_radius")
 
 # loops that pass singular configurations
 close_velocity = _late("sim.coupling.loop_velocity:close_velocity")
+loops_regular = _late("sim.coupling.loop_motion:loops_regular")
+stay_regular = _late("sim.coupling.loop_motion:stay_regular")
 predict_loops = _late("sim.coupling.loop_motion:predict_loops")
 loops_gained = _late("sim.coupling.loop_work:loops_gained")
 lead_again = _late("sim.coupling.loop_motion:lead_again")

@@ -73,7 +73,7 @@ WORK_FLOATS = _shapes(
     pair_before npair 13, pair_apart npair, pair_far_state 3, far_pose nbody 7, far_wrench nbody 6,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 3,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,

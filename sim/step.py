@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from sim import late
 from sim.dynamics import begin_step
-from sim.late import is_farther, lead_again, loops_gained, meet_ahead, predict_loops, solve, start_loops, worst_contact
+from sim.late import (
+    is_farther,
+    lead_again,
+    loops_gained,
+    loops_regular,
+    meet_ahead,
+    predict_loops,
+    solve,
+    start_loops,
+    stay_regular,
+    worst_contact,
+)
 from sim.model import Model, Vector
 from sim.options import Guess, Options, Outcome
 from sim.work import Work
@@ -19,11 +30,24 @@ _LEADS = 2  # times that directions of loops are found anew
 
 
 @inlined
+def _checked(model: Model, work: Work, options: Options, v: Vector, r: Outcome) -> Outcome:
+    """The outcome of a step, refused where the forces of loops gave energy (coupling/loop_work.py)."""
+    if r.status == _SOLVED and loops_gained(model, work, options, v):
+        return Outcome(_LOOP_STEP, r.iterations, r.residual, r.violation)
+    return r
+
+
+@inlined
 def solve_branch(
     model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
 ) -> Outcome:
     """`solve` on the branch of the loops' motion (coupling/loop_motion.py and loop_lead.py).   inputs: (q, v, u)."""
     q, v, u = inputs
+    if loops_regular(model, work):
+        r = solve(model, work, options, q, v, u, guess)
+        if stay_regular(model, work, r.status):
+            return _checked(model, work, options, v, r)
+        guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)
     r = solve(model, work, options, q, v, u, guess)
@@ -35,9 +59,7 @@ def solve_branch(
         if r.status != _SOLVED or not lead_again(model, work, options.h, q):
             break
         r = solve(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses))
-    if r.status == _SOLVED and loops_gained(model, work, options, v):
-        return Outcome(_LOOP_STEP, r.iterations, r.residual, r.violation)
-    return r
+    return _checked(model, work, options, v, r)
 
 
 @late.step.defined(otherwise=int(Status.NOT_FINITE))

@@ -107,7 +107,7 @@ class Work(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
-    couple_rank: Vector  # (3,) rank and size of the dense system, and its least pivot that counts
+    couple_rank: Vector  # (4,) rank and size of the dense system, its least pivot that counts, least deficiency
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops

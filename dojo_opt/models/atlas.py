@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import pi
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
 from sim import checks
 from sim.mechanism import Mechanism
-from sim.parts import Input, Joint
+from sim.parts import Contact, Input, Joint
 from sim.shapes import Box
 
 TRUNK = {
@@ -129,20 +130,7 @@ def atlas(
         links |= {f"{side}_{part}": link for part, link in ARM.items()}
         mounts += [_arm_mount(side, s, row) for row in ARM_JOINTS]
     made = joints(links, mounts, spring=spring, damper=damper, limits=limits)
-    com = np.asarray(links["l_foot"].com)
-    contacts = [
-        touch(
-            links,
-            f"{side}_foot",
-            com + (x, y, SOLE_HEIGHT),
-            SOLE_RADIUS,
-            f"{side}_sole_{k}",
-            friction=friction,
-            law=law,
-        )
-        for side in "lr"
-        for k, (x, y) in enumerate(SOLE)
-    ]
+    contacts = _soles(links, friction=friction, law=law)
     base = Joint("floating", None, "pelvis", name="base", child_point=-np.asarray(TRUNK["pelvis"].com))
     bend = {"leg_hpy": -crouch, "leg_kny": 2 * crouch, "leg_aky": -crouch}
     bend |= {"arm_ely": 0.1, "arm_elx": 0.1} if arms else {}
@@ -152,6 +140,17 @@ def atlas(
     inputs = [Input(j.name) for j in made]
     mech = Mechanism(bodies(links), [base, *made], contacts, inputs, gravity=gravity, name="atlas", neutral=neutral)
     return grounded(mech, 2)
+
+
+def _soles(links: Mapping[str, Link], *, friction: float, law: str) -> list[Contact]:
+    """Four balls under each foot, at the same places under both."""
+    com = np.asarray(links["l_foot"].com)
+    places = [com + (x, y, SOLE_HEIGHT) for x, y in SOLE]
+    return [
+        touch(links, f"{side}_foot", place, SOLE_RADIUS, f"{side}_sole_{k}", friction=friction, law=law)
+        for side in "lr"
+        for k, place in enumerate(places)
+    ]
 
 
 def _mirrored(link: Link, s: float) -> Link:

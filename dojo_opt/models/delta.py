@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,13 +50,8 @@ def delta(
         yaw = 2.0 * np.pi * k / 3
         radial, tangent = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (yaw, yaw + np.pi / 2))
         bodies.append(Body(f"arm_{k}", arm_mass, shape=Box(arm, 0.04, 0.04)))
-        mount: dict[str, Any] = {
-            "parent_point": base_radius * radial + np.array([0.0, 0.0, height]),
-            "child_point": (-arm / 2, 0.0, 0.0),
-            "axis": (0.0, 1.0, 0.0),
-            "orientation": np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]),
-        }
-        joints.append(Joint("revolute", None, f"arm_{k}", f"motor_{k}", damper=damper, limits=limits, **mount))
+        motor = _motor(k, yaw, base_radius * radial + np.array([0.0, 0.0, height]), arm)
+        joints.append(replace(motor, damper=damper, limits=limits))
         lowered = np.array([[np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0], [-np.sin(angle), 0.0, np.cos(angle)]])
         arm_axes = np.array([radial, tangent, [0.0, 0.0, 1.0]]).T @ lowered
         rod_axes = rotation_matrix(from_z((-out * radial - np.array([0.0, 0.0, drop])) / forearm))
@@ -77,6 +71,13 @@ def delta(
         name="delta",
         neutral={f"motor_{k}": angle for k in range(3)},
     )
+
+
+def _motor(k: int, yaw: float, place: Floats, arm: float) -> Joint:
+    """The hinge of arm k, `arm` long [m], at a place of the world (3,) [m]; at zero the arm points along yaw [rad]."""
+    frame = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
+    inner = (-arm / 2, 0.0, 0.0)
+    return Joint("revolute", None, f"arm_{k}", f"motor_{k}", place, inner, axis=(0.0, 1.0, 0.0), orientation=frame)
 
 
 def _rod_joints(

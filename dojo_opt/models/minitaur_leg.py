@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,28 +50,30 @@ def minitaur_leg(
     neutral: dict[str, ArrayLike] = {"base": (0.0, float(reach) + foot_radius, 0.0)}
     hips, knees = [], []
     for side, sign in (("front", 1.0), ("back", -1.0)):
-        thigh, shank = f"{side}_thigh", f"{side}_shank"
-        bodies += [
-            Body(thigh, upper_mass, shape=Box(0.015, 0.015, upper)),
-            Body(shank, lower_mass, shape=Box(0.012, 0.012, lower)),
-        ]
-        top, bottom, start = (0.0, 0.0, upper / 2), (0.0, 0.0, -upper / 2), (0.0, 0.0, lower / 2)
-        motor: dict[str, Any] = {"axis": Y, "damper": damper, "armature": rotor}
-        hips.append(Joint("revolute", "body", thigh, f"{side}_hip", child_point=top, **motor))
-        bounds = sorted((sign * straight, sign * folded))
-        knees.append(Joint("revolute", thigh, shank, f"{side}_knee", bottom, start, axis=Y, limits=bounds))
+        bodies.append(Body(f"{side}_thigh", upper_mass, shape=Box(0.015, 0.015, upper)))
+        bodies.append(Body(f"{side}_shank", lower_mass, shape=Box(0.012, 0.012, lower)))
+        hip, hinge = _hip_and_knee(side, upper, lower)
+        hips.append(replace(hip, damper=damper, armature=rotor))
+        knees.append(replace(hinge, limits=sorted((sign * straight, sign * folded))))
         neutral |= {f"{side}_hip": -sign * angle, f"{side}_knee": sign * knee}
     end = (0.0, 0.0, -lower / 2)
     pin = Joint("revolute", "front_shank", "back_shank", "foot", end, end, axis=Y, close=True)
+    foot = Contact("front_shank", end, foot_radius, friction, law, name="foot")
+    hull = Contact("body", radius=0.05, friction=friction, law=law, name="hull")
     return Mechanism(
         bodies,
         [Joint("planar_axis", None, "body", "base", axis=Y), *hips, *knees, pin],
-        contacts=[
-            Contact("front_shank", end, foot_radius, friction, law, name="foot"),
-            Contact("body", radius=0.05, friction=friction, law=law, name="hull"),
-        ],
+        contacts=[foot, hull],
         inputs=[Input("front_hip"), Input("back_hip")],
         gravity=gravity,
         name="minitaur_leg",
         neutral=neutral,
     )
+
+
+def _hip_and_knee(side: str, upper: float, lower: float) -> tuple[Joint, Joint]:
+    """The joints of one half of the leg, whose thigh and shank of these lengths [m] hang from their upper ends."""
+    thigh, shank = f"{side}_thigh", f"{side}_shank"
+    top, bottom, start = (0.0, 0.0, upper / 2), (0.0, 0.0, -upper / 2), (0.0, 0.0, lower / 2)
+    hip = Joint("revolute", "body", thigh, f"{side}_hip", child_point=top, axis=Y)
+    return hip, Joint("revolute", thigh, shank, f"{side}_knee", bottom, start, axis=Y)

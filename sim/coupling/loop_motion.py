@@ -5,6 +5,12 @@ solution on each, as near to one another as configuration 3 to the place where t
 branch of configurations 1 and 2, which Newton's method finds from a start closer to it than that: the leapfrog start
 2 P v - v (loop_velocity.py), off by O(h^3), where the incoming velocity is off by O(h^2). Of two solutions the one that
 is closer to it is taken.
+
+All that costs as much as the step, and where no branches are near it changes nothing. The least pivot of the dense
+system (system.py) is the product of the distances of configurations 2 and 3 from singular ones: where it is not small
+in the step before, the step is solved from its guess as if there were no branches, and where it is not small then
+either, that is the solution. At a singular configuration itself a constraint depends on others; how many always do is
+counted along the motion, whose first step takes the long way.
 """
 
 from __future__ import annotations
@@ -13,7 +19,7 @@ from sim import late
 from sim.coupling.loop_lead import lead_loops
 from sim.coupling.loops import direct_loops
 from sim.energy import factor_mass_matrix
-from sim.late import close_velocity
+from sim.late import close_velocity, start_loops
 from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
@@ -21,7 +27,34 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _CLOSER = 0.5  # share of a least pivot
+_REGULAR = 5e-3  # a pivot above this is far from where branches meet
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
+
+
+@late.loops_regular.defined(otherwise=True)
+def loops_regular(model: Model, work: Work) -> bool:
+    """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
+    work.loop_led[0] = 0
+    if model.loop_ntrans.shape[0] == 0:
+        return True
+    if work.counts[3] == 0:
+        work.couple_rank[3] = 1e300
+        return False
+    deficiency = work.couple_rank[1] - work.couple_rank[0]
+    work.couple_rank[3] = min(work.couple_rank[3], deficiency)
+    regular = deficiency == work.couple_rank[3] and work.couple_rank[2] > _REGULAR
+    work.couple_rank[2] = 0.0
+    return regular
+
+
+@late.stay_regular.defined(otherwise=True)
+def stay_regular(model: Model, work: Work, status: int) -> bool:
+    """Whether this step is as far, too; if not, the forces of loops are those that a step begins with."""
+    deficiency = work.couple_rank[1] - work.couple_rank[0]
+    if status == _SOLVED and work.couple_rank[2] > _REGULAR and deficiency <= work.couple_rank[3]:
+        return True
+    start_loops(model, work, False)
+    return False
 
 
 @late.predict_loops.defined(otherwise=False)

@@ -71,9 +71,11 @@ def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     bodies down, as an impact does, has given nothing.
     """
     h = options.h
+    gain = 0.5 * _loop_work(model, work) / h
+    if not gain > 0.0:
+        return False
     before = momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
     after = momentum_velocity(model, work, h, work.move, work.turn, work.nu)
-    gain = 0.5 * _loop_work(model, work) / h
     most = _SHARE * 0.5 * (before + after)
     if not (gain > most and after > before):
         return False

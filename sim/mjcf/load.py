@@ -47,24 +47,14 @@ def load_mjcf(
         rim_points  points per rim of a cylinder
         gravity     [m/s^2]; None: that of the file
 
-    The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
-    slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
-    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move; actuators on hinges and
-    slides as inputs in N and N m, u = report.gear * ctrl; connect and weld as joints that close loops, and linear
-    couplings of two joints as gears, all of them rigid (sim/mjcf/equalities.py). Not represented, and listed in
-    `mechanism.report.notes`: other equality constraints, tendons, collisions between bodies, dry friction of joints,
-    servos, fluids, meshes, height fields, explicit pairs. What changes the motion in a way that a user would not expect
-    is also an MjcfWarning.
+    What of the file is represented, and what not: MjcfMechanism. What changes the motion in a way that a user would not
+    expect is also an MjcfWarning.
 
     ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
     whose inertia no rigid body has; OSError for a file that is not there.
     """
     model, file = _compile(source)
-    touching = (
-        None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
-        checks.one_of("load_mjcf(law=...)", law, LAWS),
-        whole("load_mjcf(rim_points=...)", rim_points, 3),
-    )
+    touching = _touching(friction, law, rim_points)
     notes = Notes()
     groups, where = find_groups(model)
     bodies, joints, homes = _tree(model, groups, merge, notes)
@@ -83,14 +73,27 @@ def load_mjcf(
         gears=find_gears(model, homes, notes),
     )
     mech = _without_constant_gaps(mech, notes)
-    if keyframe is None:
-        mech = _clear(mech)
+    mech = _clear(mech) if keyframe is None else mech
     known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
     report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
+    _warn(report)
+    return replace(mech, report=report)
+
+
+def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float | None, str, int]:
+    """The choices that all contacts share, checked."""
+    return (
+        None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
+        checks.one_of("load_mjcf(law=...)", law, LAWS),
+        whole("load_mjcf(rim_points=...)", rim_points, 3),
+    )
+
+
+def _warn(report: MjcfReport) -> None:
+    """Warnings, at the line that called load_mjcf, of what changes the motion."""
     for note in report.notes:
         if note.warn:
-            warnings.warn(f"load_mjcf: {file}: {note}", MjcfWarning, stacklevel=2)
-    return replace(mech, report=report)
+            warnings.warn(f"load_mjcf: {report.file}: {note}", MjcfWarning, stacklevel=3)
 
 
 def _tree(

@@ -60,13 +60,8 @@ def load_urdf(
         actuated      joints with an input, in the order of u; None: all that move, but for floating ones
         rim_points    points per rim of a cylinder
 
-    Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
-    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in
-    Dojo), and <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (sim/urdf/loops.py). A body's
-    frame has the axes of its first link and its origin at the centre of mass; `mechanism.report.links` has the pose of
-    every link in its body, `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not
-    represented (dry friction, meshes, mimics). What changes the motion in a way that a user would not expect is also a
-    UrdfWarning.
+    What is read, and what `mechanism.report` says of the rest: UrdfMechanism. What changes the motion in a way that a
+    user would not expect is also a UrdfWarning.
 
     Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
     names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.

@@ -1,7 +1,4 @@
-"""Plant and perturbation: pushes, payload, slope, friction, delay, noise, limits; closed loops and Monte Carlo."""
-
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
+"""Plant and perturbation: pushes, payload, slope, friction, delay, noise, limits; closed loops."""
 
 import numpy as np
 import pytest
@@ -11,7 +8,6 @@ from dojo_opt.mpc.ground import Ground
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.plant.perturbation import Perturbation, Push
 from dojo_opt.plant.plant import Plant
-from dojo_opt.plant.study import wilson_interval
 from solvers.status import Status
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)
@@ -178,86 +174,3 @@ def test_ground_is_learnt_from_a_foot_that_stands():
     assert r.contacts.normal_force[0] > 10.0 and Ground(HOPPER).height[0] == 0.0
     ground.forget()
     np.testing.assert_array_equal(ground.height, 0.0)
-
-
-def test_wilson_interval_is_the_one_of_the_score_test():
-    """Its ends are the p at which the observed share is 1.96 standard deviations away."""
-    for k, n in ((0, 10), (3, 10), (95, 100), (100, 100)):
-        lo, hi = wilson_interval(k, n)
-        for p in (lo, hi):
-            if 1e-12 < p < 1.0 - 1e-12:
-                assert abs(k / n - p) == pytest.approx(1.959964 * np.sqrt(p * (1 - p) / n), rel=1e-6)
-        assert lo <= k / n <= hi
-    with pytest.raises(ValueError, match="11 of 10"):
-        wilson_interval(11, 10)
-
-
-def test_disturbances_are_in_their_ranges_and_paired():
-    wide = dojo.Disturbances(
-        7, velocity=0.2, push=(2.0, 4.0), payload=(1.0, 2.0), friction=(0.2, 0.4), slope=(0.0, 0.1)
-    )
-    other = dojo.Disturbances(7, velocity=0.2, push=(4.0, 8.0))
-    for i in range(50):
-        a, b = (d(np.random.default_rng(i)) for d in (wide, other))
-        assert 1.0 <= a.payload <= 2.0 and 0.2 <= a.friction <= 0.4 and 0.0 <= a.slope <= 0.1
-        assert 2.0 <= np.linalg.norm(a.pushes[0].impulse) <= 4.0 and a.pushes[0].impulse[2] == 0.0
-        assert np.abs(a.offset).max() <= 0.2 and np.count_nonzero(a.offset) <= 2
-        np.testing.assert_array_equal(a.offset, b.offset)
-        assert b.payload == 0.0 and b.friction is None and not b.slope
-
-
-def _hold(time, x):
-    """Keeps the hopper up and lets it tip over."""
-    return np.array([-3.0 * x[4] - 0.4 * x[11], -3.0 * x[5] - 0.4 * x[12], 45.0])
-
-
-def _study(executor=None, runs=6):
-    sampler = dojo.Disturbances(7, velocity=0.4, push=(0.0, 8.0), push_time=(0.1, 0.2))
-    return dojo.monte_carlo(_hold, Plant(HOPPER), sampler, 0.6, runs=runs, seed=11, executor=executor)
-
-
-def _same(a, b):
-    assert [o.survived for o in a.outcomes] == [o.survived for o in b.outcomes]
-    for one, two in zip(a.outcomes, b.outcomes, strict=True):
-        np.testing.assert_array_equal(one.x, two.x)
-
-
-def test_monte_carlo_is_the_same_with_threads_and_again():
-    study = _study()
-    assert 0 < study.survived < 6, "the runs should not all end alike"
-    assert f"{study.survived} of 6 survive" in study.summary()
-    _same(study, _study())
-    with ThreadPoolExecutor(2) as pool:
-        _same(study, _study(pool))
-    for one, two in zip(_study(runs=3).outcomes, study.outcomes, strict=False):
-        np.testing.assert_array_equal(one.x, two.x)
-
-
-@pytest.mark.slow
-def test_monte_carlo_of_mpc_is_the_same_in_processes():
-    mpc = dojo.tasks.hopper_mpc(substeps=2)
-    plant = dojo.tasks.plant(mpc, 5e-3)
-    sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
-    here = mpc.monte_carlo(plant, sampler, 0.4, runs=3, seed=1)
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        there = mpc.monte_carlo(plant, sampler, 0.4, runs=3, seed=1, executor=pool)
-    _same(here, there)
-    assert here.milliseconds.size == 3 * 7
-    assert np.isfinite(here.rms).all()
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning", "ignore::UserWarning")
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_monte_carlo_is_the_same_on_a_dask_cluster():
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        mpc = dojo.tasks.hopper_mpc(substeps=2)
-        plant = dojo.tasks.plant(mpc, 5e-3)
-        sampler = dojo.Disturbances(7, velocity=0.15, push=(2.0, 4.0), push_time=(0.1, 0.2))
-        here = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2)
-        there = mpc.monte_carlo(plant, sampler, 0.3, runs=2, seed=2, executor=client.get_executor())
-    _same(here, there)

@@ -83,6 +83,15 @@ def test_a_grashof_linkage_keeps_its_energy(tolerance: float) -> None:
     assert errors[0] < 0.04 and errors[1] < 0.4 * errors[0]
 
 
+def test_the_short_way_of_a_rollout_is_the_long_way_of_single_steps() -> None:
+    """The first step of a motion looks for branches wherever it is, those after it only where one may be near."""
+    sim = dojo.Simulator(linkage(GRASHOF, (0.0, 0.0, -9.81)), time_step=0.01, tolerance=1e-11)
+    t = sim.rollout(whirling(sim), np.zeros((150, 3)), throw=True)
+    assert passages(t.x, GRASHOF) >= 1
+    for k in range(150):
+        np.testing.assert_allclose(sim.step(t.x[k], np.zeros(3), throw=True).x, t.x[k + 1], atol=1e-8)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("lengths", [PARALLELOGRAM, GRASHOF], ids=["parallelogram", "grashof"])
 def test_energy_is_bounded_over_1e5_steps(lengths: tuple[float, float, float, float]) -> None:
