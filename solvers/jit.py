@@ -1,5 +1,5 @@
-"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is
-imported here, in code.py, late.py and record.py only.)
+"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is imported here, in code.py, late.py and
+record.py only.)
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the cache folder is named by a digest of every source file that can reach a kernel, so any edit
@@ -47,7 +47,8 @@ __all__ = [
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+# "contract": products and sums may be fused, rounded once; nothing is assumed of infinities and NaN
+_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
 _REGISTRY: list[Any] = []
@@ -142,9 +143,7 @@ class Kernel:
         """By its name; a kernel made inside a function by its code, as Numba sends its dispatchers."""
         return self.py_func.__qualname__ if self.keep else custom_reduce(Kernel, {"func": self.py_func})
 
-    @classmethod
-    def _rebuild(cls, func: Callable[..., Any]) -> Any:
-        return local_kernel(func)
+    _rebuild = classmethod(lambda cls, func: local_kernel(func))
 
     @cached_property
     def entry(self) -> _Form:
