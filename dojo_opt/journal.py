@@ -36,9 +36,10 @@ class Journal:
         record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
         self._tick = tock
         self.records.append(record)
-        if len(self.records) == 1:
-            self._options.say(table_header())
-        self._options.say(table_line(record))
+        if self._options.verbose:
+            if len(self.records) == 1:
+                self._options.say(table_header())
+            self._options.say(table_line(record))
         if self._options.callback is not None:
             try:
                 self._options.callback(record)

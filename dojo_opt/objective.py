@@ -35,11 +35,13 @@ class Objective:
     def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
         """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem.
 
-        Constraints that have been added since, after the others, start anew.
+        Constraints that this problem has more than that one, after the others, start anew; those it has less are left
+        out: a refined problem has more of them than the one that it comes from.
         """
         shapes = [term.slope.shape for term in self.constraints]
         for given in (multipliers, penalties):
-            if [a.shape for a in given] != shapes[: len(given)]:
+            common = min(len(given), len(shapes))
+            if [a.shape for a in given[:common]] != shapes[:common]:
                 raise ValueError(
                     f"ilqr(warm_start=...): expected multipliers of shapes {shapes}, got {[a.shape for a in given]}"
                 )

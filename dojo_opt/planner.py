@@ -58,14 +58,15 @@ def ilqr(
     if warm_start is not None and not isinstance(warm_start, Plan):
         raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
     options = Options(**settings) if options is None else replace(options, **settings)
+    finer = None if problem.refinement == 1 else problem.refined(problem.refinement)  # refused before any work
     plan = Solver(problem, options).solve(controls, states, warm_start)
-    if problem.refinement == 1 or not plan.success:
+    if finer is None or not plan.success:
         return plan
     options.say(f"Once more, every time step cut into {problem.refinement}:")
-    finer = Solver(problem.refined(problem.refinement), options).solve(warm_start=plan)
-    history, seconds = plan.history + finer.history, plan.seconds + finer.seconds
-    both = replace(finer, nit=plan.nit + finer.nit, history=history, seconds=seconds)
-    options.say(f"{plan.nit} + {finer.nit} iterations, {1e3 * seconds:.1f} ms in all")
+    last = Solver(finer, options).solve(warm_start=plan)
+    history, seconds = plan.history + last.history, plan.seconds + last.seconds
+    both = replace(last, nit=plan.nit + last.nit, history=history, seconds=seconds)
+    options.say(f"{plan.nit} + {last.nit} iterations, {1e3 * seconds:.1f} ms in all")
     return both
 
 

@@ -20,7 +20,7 @@ from sim.pairs.touch import Touch, touches
 from sim.parts import WORLD, Body, Contact, Input, Joint
 from sim.shapes import Solid
 from sim.terrain.terrain import Terrain
-from sim.tree import check_loops, check_masses, sort_tree
+from sim.tree import check_axes, check_loops, check_masses, sort_tree
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,6 +63,7 @@ class Mechanism:
         object.__setattr__(self, "bodies", bodies)
         object.__setattr__(self, "joints", joints)
         check_masses(f"{call})", bodies, joints)
+        check_axes(f"{call})", bodies, joints)
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")

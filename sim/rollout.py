@@ -41,7 +41,15 @@ class Linearized(NamedTuple):
 def begin(work: Work, settings: Vector) -> Options:
     """Settings of a motion that begins here."""
     work.counts[3] = 0
-    work.far_law[0] = 0.0  # what is known of far contacts (contacts/far.py) belongs to another motion
+    # what is known of far contacts (contacts/far.py), forces of loops and last directions belong to another motion
+    work.far_law[0] = 0.0
+    for row in range(work.couple_force.shape[0]):
+        work.couple_force[row] = 0.0
+    for c in range(work.cone_step.shape[0]):
+        for k in range(work.cone_step.shape[1]):
+            work.cone_step[c, k] = 0.0
+    for k in range(work.bound_step.shape[0]):
+        work.bound_step[k, 0] = work.bound_step[k, 1] = 0.0
     return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 

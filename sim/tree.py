@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from sim import checks
 from sim.parts import WORLD, Body, Joint
+from sim.shapes import rotation_matrix
+
+_ALONG = 1e-9  # sine of the angle, and distance [m], below which two axes are one
 
 
 def check_loops(
@@ -68,3 +73,27 @@ def check_masses(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> 
             carries[joint.parent] |= carries[body.name]
         if not carries[body.name]:
             raise ValueError(f"{call}: body {body.name!r} has no mass, nor has anything that hangs on it")
+
+
+def check_axes(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
+    """Refuse two hinges about one axis, or two slides along one direction, with nothing but a massless body between
+    them: only the sum of their coordinates moves anything. Springs, dampers and armature tell them apart.
+    """
+    above = {j.child: j for j in joints}
+    below = [j.parent for j in joints]
+    massless = {b.name for b in bodies if not b.mass > 0.0}
+    for joint in joints:
+        before = above[joint.parent] if joint.parent in massless and below.count(joint.parent) == 1 else joint
+        kinds = {before.kind, joint.kind}
+        if before is joint or kinds not in ({"revolute"}, {"prismatic"}):
+            continue
+        if any(np.any(getattr(j, held)) for j in (before, joint) for held in ("spring", "damper", "armature")):
+            continue
+        axis = rotation_matrix(joint.orientation) @ np.asarray(joint.axis, float)
+        apart = np.asarray(joint.parent_point, float) - np.asarray(before.child_point, float)
+        along = (axis, apart) if joint.kind == "revolute" else (axis,)
+        if max(np.linalg.norm(np.cross(np.asarray(before.axis, float), d)) for d in along) < _ALONG:
+            raise ValueError(
+                f"{call}: joints {before.name!r} and {joint.name!r} move along one axis, and body {joint.parent!r} "
+                "between them has no mass: only the sum of their coordinates would be known"
+            )

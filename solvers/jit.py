@@ -47,7 +47,7 @@ __all__ = [
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# "contract": products and sums may be fused, rounded once; nothing is assumed of infinities and NaN
+# "contract": products and sums are fused where the processor can; nothing is assumed of infinities and NaN
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
@@ -140,7 +140,7 @@ class Kernel:
         return self.entry(*args)
 
     def __reduce__(self) -> Any:
-        """By its name; a kernel made inside a function by its code, as Numba sends its dispatchers."""
+        """By its name; a kernel made inside a function by its code, compiled anew where it is loaded."""
         return self.py_func.__qualname__ if self.keep else custom_reduce(Kernel, {"func": self.py_func})
 
     _rebuild = classmethod(lambda cls, func: local_kernel(func))

@@ -44,7 +44,7 @@ class MPC:
     iterations  of the planner per tick. One is enough for costs, control limits and equalities; an inequality among the
                 constraints is not seen by an iteration that starts on its good side, and takes about three
     reference   what to track over time, see `mpc.moving.References`; without it, the problem's own at every tick
-    plan        the first plan, at the time of the first call; without it, `ilqr` is called with its defaults
+    plan        the first plan, at the time of the first call; without it, that of `ilqr` without refinement
     settings    fields of `dojo_opt.mpc.tick.Settings` by name
 
     A tick shifts the plan by the time that has passed and keeps its states as the guess, the measured one in front: the

@@ -22,7 +22,7 @@ from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
 
-_CREEPING = 3.0  # times the slip of the path at the present friction: in less, a contact sticks
+_CREEPING = 3.0  # times the largest slip of the path at the present b^2 - |beta|^2: in less, a contact sticks
 _INSIDE = 0.3  # least share of b^2 that b^2 - |beta|^2 has there
 
 

@@ -35,8 +35,6 @@ _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were n
 def loops_regular(model: Model, work: Work) -> bool:
     """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
     work.loop_led[0] = 0
-    if model.loop_ntrans.shape[0] == 0:
-        return True
     if work.counts[3] == 0:
         work.couple_rank[3] = 1e300
         return False
@@ -49,7 +47,7 @@ def loops_regular(model: Model, work: Work) -> bool:
 
 @late.stay_regular.defined(otherwise=True)
 def stay_regular(model: Model, work: Work, status: int) -> bool:
-    """Whether this step is as far, too; if not, the forces of loops are those that a step begins with."""
+    """Whether this step is as far, too; if not, the forces of loops are zero again."""
     deficiency = work.couple_rank[1] - work.couple_rank[0]
     if status == _SOLVED and work.couple_rank[2] > _REGULAR and deficiency <= work.couple_rank[3]:
         return True

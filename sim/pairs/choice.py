@@ -10,9 +10,9 @@ Where a solution with some elements overlaps in others, and one with these in th
 Only elements that did not overlap when the step began are chosen: a contact pushes along the normal that it has at the
 end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
 energy. That is so where they overlapped along the normal that they had then, and along the one that they have in the
-end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds
-energy.) Where all elements of cylinders that overlap in the end did so in the beginning, those of the beginning stand
-for them.
+end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds energy.) Where a point
+of a collision with a cylinder is lost so, and has nothing instead, all elements of the collision are those of the
+beginning.
 
 Shapes may slide from one element to another within a step. The one that they came to was below the other then, is left
 out, and overlaps in the end. Where several attempts end so (pair_free[1] is 1), normals may have turned on the way

@@ -60,7 +60,7 @@ def collide_cylinders(model: Model, work: Work, first: int) -> None:
 @late.choose_cylinders.defined()
 def choose_cylinders(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
-    the step began.
+    the step began; where that leaves a point without, those of the beginning.
     """
     kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
     before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]

@@ -1,5 +1,6 @@
-"""Elements that pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those
-of the other in the first. Collisions of polytopes and of cylinders have room for them (sim/collision/kept.py).
+"""What collisions remember of the beginning of a step, and by how much elements may overlap there; and elements that
+pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those of the other in
+the first. Collisions of polytopes and of cylinders have room for them (sim/collision/kept.py).
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from sim.work import Work
 from solvers.jit import kernel
 
 _SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
-_LEFT = 2e-4  # part of the smallest size: more than the overlap that the end of a step may have (choice.py)
+_LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (choice.py)
 _THROWN = 2e-2  # the same of shapes that are thrown out, not pushed: they overlapped more where the step began
 
 

@@ -149,6 +149,7 @@ def interior_point(
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    work.pair_free[1] = 0  # `find_impacts` chooses elements, too
     begin_pairs(model, work, options)
     choose_far(model, work, options)
     find_impacts(model, work, options.h)

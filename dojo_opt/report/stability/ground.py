@@ -51,7 +51,10 @@ def on_a_foot(ratio: float, time_step: float) -> Trial:
 
 
 def impact(what: str, time_step: float) -> Trial:
-    """A ball, a box on a corner, or a quadruped at 100 m/s."""
+    """A ball, a box on a corner, or a quadruped at 100 m/s.
+
+    Its shanks leave the ground with 300 rad/s and more: in 10 ms that is half a turn, which no step represents.
+    """
     velocity = np.r_[0.0, 0.0, -100.0, np.zeros(3)]
     if what == "ball":
         mechanism, q = sphere(radius=0.1, friction=0.5), np.array([0.0, 0.0, 0.1, *REST])
@@ -194,7 +197,7 @@ def trials() -> list[Trial]:
         *(on_a_foot(ratio, h) for ratio in (1e2, 1e4, 1e6) for h in (1e-3, 1e-2)),
         *(impact(what, h) for what in ("ball", "box") for h in (1e-3, 1e-2, 1e-1)),
         impact("quadruped", 1e-3),
-        impact("quadruped", 1e-2),
+        impact("quadruped", 5e-3),
         drop(1e-5, 0.2),
         drop(1e-3, 2.0),
         drop(1e-1, 10.0),
