@@ -58,8 +58,9 @@ def ilqr(
     if warm_start is not None and not isinstance(warm_start, Plan):
         raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
     options = Options(**settings) if options is None else replace(options, **settings)
+    solver = Solver(problem, options)
     finer = None if problem.refinement == 1 else problem.refined(problem.refinement)  # refused before any work
-    plan = Solver(problem, options).solve(controls, states, warm_start)
+    plan = solver.solve(controls, states, warm_start)
     if finer is None or not plan.success:
         return plan
     options.say(f"Once more, every time step cut into {problem.refinement}:")
