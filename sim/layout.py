@@ -17,6 +17,8 @@ __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "S
 
 Shape = tuple[int | str, ...]
 
+_REACH = 48  # rows of contacts and limits that a prediction takes
+
 
 def _shapes(text: str) -> dict[str, Shape]:
     """{name: shape} of fields written as "name rows columns"; columns left out for a vector."""
@@ -52,7 +54,7 @@ MODEL_FLOATS = _shapes(
 WORK_INTS = _shapes(
     """
     counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 2,
-    loop_led 2, loop_used nrow, coupling_live ncoupling, couple_live nrow 2
+    loop_led 2, loop_used nrow, reach_of nreach, coupling_live ncoupling, couple_live nrow 2
     """
 )
 
@@ -80,7 +82,8 @@ WORK_FLOATS = _shapes(
     loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
     panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
-    far nground 37, far_law 2
+    far nground 37, far_law 2,
+    reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """
 )
 
@@ -121,6 +124,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
         "nlate": late.COUNT,
+        "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
     return rows, cols

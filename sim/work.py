@@ -133,6 +133,13 @@ class Work(NamedTuple):
     bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)
     bound_w: Vector  # (nlimit,)
+    # prediction
+    reach_of: Integers  # (nreach,) contacts and limits that may touch; of a contact's three rows, the first
+    reach: Matrix  # (nv, nreach) rates of their gaps and slips, eliminated on the way down the tree
+    delassus: Matrix  # (nreach, nreach) transposed: rates by unit impulses
+    reach_rate: Vector  # (nreach,) gaps and slips
+    reach_impulse: Vector  # (nreach,)
+    reach_friction: Vector  # (nreach,) coefficients, in the first row of a contact
     # derivatives
     A1: Matrix  # (nbody, 36) d(balance)/d(pose 1), about O
     A2: Matrix  # (nbody, 36)

@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 
 @kernel
 def lu_factor(A: Vector, n: int) -> int:
-    """A := its LU factors; A holds n x n numbers row-major, n <= 15.
+    """A := its LU factors, U with the reciprocals of its diagonal; A holds n x n numbers row-major, n <= 15.
 
     Returns the row exchanges, the pivot row of column k in bits 4k .. 4k+3, or -1 if a pivot vanishes or is not finite.
     """
@@ -35,8 +35,9 @@ def lu_factor(A: Vector, n: int) -> int:
         if row != k:
             for c in range(n):
                 A[k * n + c], A[row * n + c] = A[row * n + c], A[k * n + c]
+        A[k * n + k] = 1.0 / A[k * n + k]
         for r in range(k + 1, n):
-            f = A[r * n + k] / A[k * n + k]
+            f = A[r * n + k] * A[k * n + k]
             A[r * n + k] = f
             for c in range(k + 1, n):
                 A[r * n + c] -= f * A[k * n + c]
@@ -63,12 +64,14 @@ def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
         if row != k:
             b[first + k], b[first + row] = b[first + row], b[first + k]
     for k in range(n):
+        x = b[first + k]
         for r in range(k + 1, n):
-            b[first + r] -= A[r * n + k] * b[first + k]
+            b[first + r] -= A[r * n + k] * x
     for k in range(n - 1, -1, -1):
-        for c in range(k + 1, n):
-            b[first + k] -= A[k * n + c] * b[first + c]
-        b[first + k] /= A[k * n + k]
+        x = b[first + k] * A[k * n + k]
+        b[first + k] = x
+        for r in range(k):
+            b[first + r] -= A[r * n + k] * x
 
 
 @kernel
@@ -94,6 +97,6 @@ def lu_solve_rows(A: Vector, n: int, swaps: int, B: Matrix, first: int) -> None:
             b = B[first + r]
             for c in range(m):
                 x[c] -= f * b[c]
-        f = 1.0 / A[k * n + k]
+        f = A[k * n + k]
         for c in range(m):
             x[c] *= f

@@ -10,8 +10,8 @@ With b = mu gamma the same path is also
 
     (b^2 - |beta|^2) v_t + kappa beta = 0
 
-which is linear in v_t: of a contact that sticks, whose slip is not far from the path, Newton's method finds the slip by
-this form in one step, by the other in several.
+which is linear in v_t: of a contact that sticks Newton's method finds the slip by this form in one step, by the other
+in several.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
 
-_CREEPING = 3.0  # times the largest slip of the path at the present b^2 - |beta|^2: in less, a contact sticks
-_INSIDE = 0.3  # least share of b^2 that b^2 - |beta|^2 has there
+_INSIDE = 0.1  # least share of b^2 that b^2 - |beta|^2 has of a contact that sticks
 
 
 @kernel
@@ -79,8 +78,7 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, 
     b0 = mu * z[1]
     room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
     against = z[2] * k[1] + z[3] * k[2]
-    creeping = room * sqrt(k[1] * k[1] + k[2] * k[2]) < _CREEPING * kappa * b0
-    if near and creeping and room > _INSIDE * b0 * b0 and against <= 0.0:
+    if near and room > _INSIDE * b0 * b0 and against <= 0.0:
         condense_sticking(z, k, b0, kappa, share, W, q)
     else:
         condense_sliding(z, k, b0, kappa, share, W, q)

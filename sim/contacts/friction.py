@@ -56,6 +56,18 @@ def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> 
 
 
 @kernel
+def touch_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
+    """Slack of contact c for its impulse, on the central path of kappa; where that hardly presses, both by its gap."""
+    z = work.cone[c]
+    weight = h * _response(model, c)
+    if weight * z[1] * z[1] > kappa:
+        z[0] = kappa / z[1]
+    else:
+        z[0], z[1] = onto_path(work.contact_kin[c, 0], z[1], weight, kappa)
+        _start_friction(model, work, c, kappa)
+
+
+@kernel
 def _start_friction(model: Model, work: Work, c: int, kappa: float) -> None:
     """Friction of contact c on the central path of kappa at its slip."""
     law = law_of(model, c)

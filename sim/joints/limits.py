@@ -87,6 +87,17 @@ def resume_limits(model: Model, work: Work, weight: float, kappa: float) -> None
 
 
 @kernel
+def touch_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+    """Slacks for the impulses, on the central path of kappa; where those hardly press, both by the gap."""
+    for k in range(model.limit_dof.shape[0]):
+        b = work.bound[k]
+        if weight * b[1] * b[1] > kappa:
+            b[0] = kappa / b[1]
+        else:
+            b[0], b[1] = onto_path(work.bound_gap[k], b[1], weight, kappa)
+
+
+@kernel
 def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
     """The pairs that left their cones put back onto the central path of kappa."""
     for k in range(model.limit_dof.shape[0]):

@@ -18,12 +18,14 @@ from sim.solve.inequalities import (
 )
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
+from sim.solve.prediction import predict, predictable, release, touch_inequalities
 from sim.work import Work
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
 _BALANCED = 0.3  # the residual at kappa, over that of such a start, of a motion that may start at kappa
+_GOES_ON = 0.01  # the residual with the impulses of the step before, over that without any, where they are kept
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949
@@ -71,6 +73,8 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
         return Beginning(1, kappa, (1e300, 1e300))
     keep_inequalities(model, work)
     if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
+        if predictable(model, work):
+            return go_on(model, work, options, inputs, guess.velocity)
         return resume(model, work, options, inputs, guess.velocity)
     if not place(model, work, h, q, v, 1.0):
         return Beginning(1, kappa, (1e300, 1e300))
@@ -84,6 +88,28 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
     start_inequalities(model, work, h, kappa, 0.0)
     hard = residuals(model, work, h, q, v, u)
     return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard)
+
+
+@inlined
+def go_on(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+) -> Beginning:
+    """Attempt 0 at kappa: with the impulses of the step before where they all but balance, as predicted elsewhere."""
+    q, v, u = inputs
+    h = options.h
+    if not place(model, work, h, q, velocity, 1.0):
+        return Beginning(1, options.kappa, (1e300, 1e300))
+    move_inequalities(model, work, 0.0)
+    last = residuals(model, work, h, q, v, u)
+    release(model, work)
+    free, _ = residuals(model, work, h, q, v, u)
+    if last[0] < _GOES_ON * free:
+        move_inequalities(model, work, 0.0)
+        return Beginning(0, options.kappa, residuals(model, work, h, q, v, u))
+    if not predict(model, work, options, inputs) or not place(model, work, h, q, work.dnu, 1.0):
+        return Beginning(1, options.kappa, (1e300, 1e300))
+    touch_inequalities(model, work, options)
+    return Beginning(0, options.kappa, residuals(model, work, h, q, v, u))
 
 
 @inlined

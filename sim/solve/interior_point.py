@@ -6,8 +6,8 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
   beta by Newton, at a `smoothing` that follows down to kappa (contacts/friction.py); only gaps and normal impulses have
   to stay positive. Conic scalings jam on thin cones.
 * The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
-  the impulses of kappa itself, a robot at rest or a good guess, starts there; one that goes on first tries the
-  impulses of the step before, at a smaller kappa0 (central_path.py).
+  the impulses of kappa itself, a robot at rest or a good guess, starts there; and one that goes on, at what the step
+  linearised there predicts (prediction.py).
 * The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
 * No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
@@ -90,7 +90,7 @@ def try_from(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
+    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), min(0.01 * kappa, 0.1 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     worse = _WORSE if attempt < _LED else _WORSE_LED
     smoothing = beginning.kappa

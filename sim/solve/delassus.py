@@ -1,0 +1,141 @@
+"""What impulses of contacts and joint limits do to each other: G = J H^-1 B^T, after Delassus.
+
+The elimination of H (sim/elimination.py) goes from a body to the root and back. On the way up the answer to an impulse
+has entries of the joints on that way alone, and so have, on the way down, the rates of a body:
+
+    G_ab = sum over the joints that are ancestors of both of  rate_a(d) z_b(d)
+
+    z = -D^-1 S2^T p,   p_parent = p + U z        from p = -B^T e at the body of b
+    rate = r.S3nu,      r_parent = r - rate L     from r = J at the body of a
+"""
+
+from __future__ import annotations
+
+from sim.contacts.contact import add_contact_wrench
+from sim.elimination import dot_six
+from sim.model import Model
+from sim.work import Work
+from solvers.jit import kernel
+from solvers.lu import lu_solve
+
+
+@kernel
+def _rates_above(model: Model, work: Work, i: int, a: int) -> None:
+    """Rates of row a by the joints from body i to the root; work.twist[i] holds r."""
+    while i >= 0:
+        q = model.body_parent[i]
+        r = work.twist[i]
+        d0, end = model.body_vadr[i], model.body_vadr[i + 1]
+        for d in range(d0, end):
+            work.reach[d, a] = dot_six(r, work.S3nu[d])
+        if q >= 0:
+            s = work.twist[q]
+            for k in range(6):
+                s[k] = r[k]
+            for d in range(d0, end):
+                for k in range(6):
+                    s[k] -= work.reach[d, a] * work.L[d, k]
+        i = q
+
+
+@kernel
+def contact_rates(model: Model, work: Work, c: int, a: int) -> None:
+    """Rows a, a + 1, a + 2: gap and slip of contact c."""
+    i = model.contact_body[c]
+    J = work.contact_kin[c]
+    for e in range(3):
+        r = work.twist[i]
+        for k in range(3):
+            r[k], r[3 + k] = J[18 + 3 * e + k], J[9 + 3 * e + k]
+        _rates_above(model, work, i, a + e)
+
+
+@kernel
+def limit_rates(model: Model, work: Work, k: int, h: float, a: int) -> None:
+    """Row a: the gap of limit k of one coordinate."""
+    d = model.limit_dof[k]
+    q = model.body_parent[model.dof_body[d]]
+    rate = h * model.limit_sign[k]
+    work.reach[d, a] = rate
+    if q >= 0:
+        for e in range(6):
+            work.twist[q, e] = -rate * work.L[d, e]
+        _rates_above(model, work, q, a)
+
+
+@kernel
+def _answer(model: Model, work: Work, i: int, b: int, size: int) -> None:
+    """Column b from the load p in work.subtree[i], and z of the joint of i before its block is solved."""
+    g = work.delassus[b]
+    for k in range(size):
+        g[k] = 0.0
+    while i >= 0:
+        p = work.subtree[i]
+        d0 = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d0
+        for d in range(d0, d0 + n):
+            work.z[d] -= dot_six(work.S2[d], p)
+        if n == 1:
+            work.z[d0] *= work.D[i, 0]
+        elif n > 1:
+            lu_solve(work.D[i], n, int(work.D[i, 36]), work.z, d0)
+        for d in range(d0, d0 + n):
+            z, rates = work.z[d], work.reach[d]
+            for k in range(size):
+                g[k] += z * rates[k]
+        q = model.body_parent[i]
+        if q >= 0:
+            s = work.subtree[q]
+            for k in range(6):
+                s[k] = p[k]
+            for d in range(d0, d0 + n):
+                for k in range(6):
+                    s[k] += work.U[d, k] * work.z[d]
+        for d in range(d0, d0 + n):
+            work.z[d] = 0.0
+        i = q
+
+
+@kernel
+def contact_answers(model: Model, work: Work, c: int, b: int, size: int) -> None:
+    """Columns b, b + 1, b + 2: unit impulses of contact c, normal and tangents."""
+    i = model.contact_body[c]
+    for e in range(3):
+        for k in range(6):
+            work.subtree[i, k] = 0.0
+        add_contact_wrench(
+            model, work, c, 1.0 if e == 0 else 0.0, 1.0 if e == 1 else 0.0, 1.0 if e == 2 else 0.0, work.subtree
+        )
+        _answer(model, work, i, b + e, size)
+
+
+@kernel
+def limit_answers(model: Model, work: Work, k: int, b: int, size: int) -> None:
+    """Column b: a unit impulse of limit k of one coordinate."""
+    d = model.limit_dof[k]
+    i = model.dof_body[d]
+    for e in range(6):
+        work.subtree[i, e] = 0.0
+    work.z[d] = model.limit_sign[k]
+    _answer(model, work, i, b, size)
+
+
+@kernel
+def delassus(model: Model, work: Work, h: float, points: int, size: int) -> None:
+    """Columns of G, as rows of work.delassus, of the contacts and limits in work.reach_of.
+
+    points: contacts, of three rows each;  size: rows.   Destroys work.twist, work.subtree, work.z.
+    """
+    for d in range(work.z.shape[0]):
+        work.z[d] = 0.0
+        row = work.reach[d]
+        for a in range(size):
+            row[a] = 0.0
+    for a in range(points):
+        contact_rates(model, work, work.reach_of[3 * a], 3 * a)
+    for a in range(3 * points, size):
+        limit_rates(model, work, work.reach_of[a], h, a)
+    for b in range(points):
+        contact_answers(model, work, work.reach_of[3 * b], 3 * b, size)
+    for b in range(3 * points, size):
+        limit_answers(model, work, work.reach_of[b], b, size)

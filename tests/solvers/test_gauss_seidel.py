@@ -1,0 +1,75 @@
+"""Block Gauss-Seidel for contacts: what it ends at satisfies the laws."""
+
+import numpy as np
+import pytest
+
+from solvers.gauss_seidel import gauss_seidel
+
+H = 0.01
+POINTS, STOPS = 3, 2
+SIZE = 3 * POINTS + STOPS
+ROOM = SIZE + 4  # the matrices of a step have room for more
+
+
+def problem(seed):
+    """G of bodies whose gaps change by h times their speeds, and w of a motion that closes some of them."""
+    rng = np.random.default_rng(seed)
+    J = rng.normal(size=(SIZE, 14))
+    scale = np.ones(SIZE)
+    scale[0 : 3 * POINTS : 3] = scale[3 * POINTS :] = H
+    G = scale[:, None] * (J @ J.T)  # impulses act along J, and normal rows are lengths
+    w = scale * rng.normal(size=SIZE)
+    return G, w
+
+
+def solution(seed, kappa, repeat=60):
+    G, w0 = problem(seed)
+    columns, friction = np.zeros((ROOM, ROOM)), np.zeros(ROOM)
+    columns[:SIZE, :SIZE] = G.T
+    friction[0 : 3 * POINTS : 3] = (0.0, 0.4, 2.0)
+    w, l = np.zeros(ROOM), np.zeros(ROOM)
+    w[:SIZE] = w0
+    for _ in range(repeat):  # a call ends early
+        gauss_seidel(columns, friction, H, kappa, POINTS, SIZE, w, l)
+    np.testing.assert_allclose(w[:SIZE], w0 + G @ l[:SIZE], atol=1e-12)
+    return w, l, friction
+
+
+@pytest.mark.parametrize("kappa", [1e-12, 1e-3])
+@pytest.mark.parametrize("seed", range(6))
+def test_gaps_times_impulses_are_kappa(seed, kappa):
+    w, l, _ = solution(seed, kappa)
+    normals = [*range(0, 3 * POINTS, 3), *range(3 * POINTS, SIZE)]
+    assert (w[normals] > 0.0).all()
+    assert (l[normals] > 0.0).all()
+    np.testing.assert_allclose(w[normals] * l[normals], kappa, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_friction_sticks_or_acts_against_the_slip_at_its_bound(seed):
+    w, l, friction = solution(seed, 1e-12)
+    for j in range(0, 3 * POINTS, 3):
+        slip, force, bound = w[j + 1 : j + 3], l[j + 1 : j + 3], friction[j] * l[j]
+        assert np.hypot(*force) <= bound * (1.0 + 1e-9) + 1e-15
+        if np.hypot(*slip) > 1e-6:
+            np.testing.assert_allclose(force, -bound * slip / np.hypot(*slip), atol=1e-6)
+
+
+def test_some_stick_some_slide_and_some_are_apart():
+    seen = set()
+    for seed in range(6):
+        w, l, friction = solution(seed, 1e-12)
+        for j in range(3, 3 * POINTS, 3):
+            stuck = np.hypot(*w[j + 1 : j + 3]) < 1e-6
+            seen.add("apart" if l[j] < 1e-6 else "sticks" if stuck else "slides")
+    assert seen == {"apart", "sticks", "slides"}
+
+
+def test_a_good_guess_is_kept():
+    w, l, friction = solution(0, 1e-12)
+    G, _ = problem(0)
+    columns = np.zeros((ROOM, ROOM))
+    columns[:SIZE, :SIZE] = G.T
+    before = l.copy()
+    gauss_seidel(columns, friction, H, 1e-12, POINTS, SIZE, w, l)
+    np.testing.assert_allclose(l, before, atol=1e-9)
