@@ -12,7 +12,7 @@ Derivatives: jacobian.py.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin
 
 from sim import late
 from sim.collision.collide import collide_chosen
@@ -26,17 +26,25 @@ from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
 
+POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
+_TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole
+_FIRST = (1.0 - _TO_POLE * POLE[0] * POLE[0], -_TO_POLE * POLE[0] * POLE[1], -POLE[0])
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
 
 
 @kernel
-def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3, Vec3]:
-    """t1, t2 and the axis e that t1 is nearest to: t1 = (e - n (n.e)) / |...|, t2 = n x t1."""
-    e = (1.0, 0.0, 0.0) if abs(nx) < 0.9 else (0.0, 1.0, 0.0)
-    d = nx * e[0] + ny * e[1]
-    i = 1.0 / sqrt(1.0 - d * d)
-    t = (i * (e[0] - nx * d), i * (e[1] - ny * d), -i * nz * d)
-    return t, cross(nx, ny, nz, t[0], t[1], t[2]), e
+def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3]:
+    """t1, t2: the frame of the pole a, turned the shortest way to n: t1 = b - (b.n)/(1 + a.n) (a + n), t2 = n x t1.
+
+    Continuous but at n = -a, so that a pyramid of friction does not jump from one iterate to the next. At n = z it is
+    x and y, as of contacts with the ground. A pole that nobody would build along keeps -a out of the way.
+    """
+    a, b = POLE, _FIRST
+    p = (b[0] * nx + b[1] * ny + b[2] * nz) / max(1.0 + a[0] * nx + a[1] * ny + a[2] * nz, 1e-12)
+    x, y, z = b[0] - p * (a[0] + nx), b[1] - p * (a[1] + ny), b[2] - p * (a[2] + nz)
+    s = x * nx + y * ny + z * nz  # rounding: on a floor the frame lies in it exactly
+    t1 = (x - s * nx, y - s * ny, z - s * nz)
+    return t1, cross(nx, ny, nz, t1[0], t1[1], t1[2])
 
 
 @kernel
@@ -97,7 +105,7 @@ def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
     g = work.pair_out[j]
     F = work.pair_frame[j]
     s = shape_b(model, j)
-    t1, t2, _ = tangents(g[1], g[2], g[3])
+    t1, t2 = tangents(g[1], g[2], g[3])
     F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
     F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
     F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
