@@ -2,10 +2,11 @@
 
     gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/collision
     slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
-    force  f = n gamma + T^T beta on a, -f on b, both at P = p - mean of (x_a3 - x_a2, x_b3 - x_b2)
+    force  f = n gamma + T^T beta on a, -f on b, both at P = p - w_a (x_a3 - x_a2) - w_b (x_b3 - x_b2)
 
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
-to configuration 2, where the balance of momenta is taken; of a fixed obstacle, a alone carries it.
+to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
+alone carries it.
 
 Derivatives: jacobian.py.
 """
@@ -131,9 +132,18 @@ def shape_b(model: Model, j: int) -> int:
 
 
 @kernel
-def shares(b: int) -> tuple[float, float]:
-    """Parts of a and b in carrying the contact point back to configuration 2."""
-    return (1.0, 0.0) if b < 0 else (0.5, 0.5)
+def shares(model: Model, j: int) -> tuple[float, float]:
+    """Parts of a and b in carrying the contact point of pair j back to configuration 2: m_b/(m_a + m_b) and the rest.
+
+    The point of a ball that rolls moves with the ball; carried by half, it presses ahead of the centre and brakes.
+    """
+    k = model.pair_coupling[j]
+    b = model.coupling_body[k, 1]
+    if b < 0:
+        return 1.0, 0.0
+    m = model.body_mass[model.coupling_body[k, 0]]
+    both = m + model.body_mass[b]
+    return (1.0 - m / both, m / both) if both > 0.0 else (0.5, 0.5)
 
 
 @kernel
@@ -141,7 +151,7 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    wa, wb = shares(b)
+    wa, wb = shares(model, j)
     F = work.pair_frame[j]
     x = F[9] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
     y = F[10] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])

@@ -30,7 +30,7 @@ GROUND, GRIP = 0.4, 0.8  # friction of the box on the ground, of the balls on th
 SIZE, HEIGHT = 20.0, 0.1  # of the box [m]
 DIRECTIONS = {"y": (0.0, 1.0), "askew": (0.5, 0.75**0.5)}
 KAPPA = 1e-10
-_FIRST_ORDER = "of first order: between bodies the force acts half a step ahead of the ball, as a drag"
+_FIRST_ORDER = "of first order in the time step"
 
 
 def accelerations() -> tuple[float, float]:
