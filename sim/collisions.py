@@ -25,7 +25,8 @@ class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
     shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Polytope, HalfSpace; left out, that of the body. With String on
-                       both sides the bodies are tied together instead: their points keep within its length.
+                       both sides the bodies are tied together instead: their points keep within its length, and
+                       there is no friction. A HalfSpace on a body moves with it.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law, restitution     as in Contact
 

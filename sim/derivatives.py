@@ -44,7 +44,7 @@ class Derivatives(States):
         x: ArrayLike,
         u: ArrayLike | None = None,
         kappa: float | None = None,
-        wrenches: None = None,
+        wrenches: Wrenches | None = None,
         *,
         wrt: Sequence[str],
     ) -> Blocks: ...
@@ -61,12 +61,11 @@ class Derivatives(States):
 
         wrt: "state", "input" and parameters, as in `parameters`; then a table by these names, of blocks (ndx, n). x and
         u are held fixed, so the poses and momenta that belong to x move with a parameter.
-        wrenches: (nbody, 6) as in `rollout`, constants; not together with `wrt`. An unsolved step raises
-        SimulationError.
+        wrenches: (nbody, 6) as in `rollout`, constants. An unsolved step raises SimulationError.
         """
         if wrenches is not None:
             if wrt is not None:
-                raise ValueError("Simulator.linearize(wrt=..., wrenches=...): give either, or the wrenches as inputs")
+                return pushed.linearize_by(cast(Any, self), x, u, wrenches, kappa, wrt)
             return pushed.linearize(cast(Any, self), x, u, wrenches, kappa)
         state = self._border.state("linearize", x)
         us = self._border.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
@@ -82,13 +81,21 @@ class Derivatives(States):
         return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
 
     def linearize_rollout(
-        self, x: ArrayLike, us: ArrayLike, kappa: float | None = None, wrt: Sequence[str] = ()
+        self,
+        x: ArrayLike,
+        us: ArrayLike,
+        kappa: float | None = None,
+        wrt: Sequence[str] = (),
+        wrenches: Wrenches | None = None,
     ) -> tuple[Floats, Linearization]:
         """States (T + 1, nx) of a rollout from x under us (T, nu), and its derivatives, in one pass.
 
         As `rollout` and `linearize_trajectory`, but every step is solved once. wrt: parameters, whose derivatives
-        (T, ndx, n) are then in `Linearization.parameters`, by name. An unsolved step raises SimulationError.
+        (T, ndx, n) are then in `Linearization.parameters`, by name; wrenches: (T, nbody, 6) as in `rollout`. An
+        unsolved step raises SimulationError.
         """
+        if wrenches is not None:
+            return pushed.linearize_rollout(cast(Any, self), x, us, wrenches, kappa, wrt)
         call = "linearize_rollout"
         state, inputs = self._border.state(call, x), self._border.inputs(call, "us", us, ("T", self.nu))
         level = self._border.kappa(call, kappa)
@@ -153,16 +160,22 @@ class Derivatives(States):
         dL_dx: ArrayLike,
         wrt: Sequence[str] = ("state", "input"),
         kappa: float | None = None,
+        wrenches: Wrenches | None = None,
     ) -> Blocks:
         """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
 
         trajectory: of `rollout`, or (states (T + 1, nx), inputs (T, nu)); dL_dx: (T + 1, ndx) in tangent coordinates.
         Returns a table by the names of `wrt`: "state" (ndx,), of the first state; "input" (T, nu); parameters (n,),
         as in `parameters`. The steps are solved anew at `kappa`; nothing but one step is kept, so the memory is that of
-        the trajectory. An unsolved step raises SimulationError.
+        the trajectory. wrenches: (T, nbody, 6) as in `rollout`, left out those of the trajectory. An unsolved step
+        raises SimulationError.
         """
         call = "Simulator.vjp"
         xs, us = path_of(f"{call}(trajectory)", trajectory)
+        if wrenches is None and isinstance(trajectory, Trajectory):
+            wrenches = trajectory.wrenches
+        if wrenches is not None:
+            return pushed.vjp(cast(Any, self), (xs, us), dL_dx, wrenches, kappa, wrt)
         inputs = self._border.inputs("vjp", "trajectory", us, ("T", self.nu))
         rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
         loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))

@@ -80,6 +80,14 @@ class Joint:
     limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite. cone: largest angle of
     the child's axis from the parent's, for kinds with three rotations [rad]. armature [kg, kg m^2]: inertia that moves
     with a coordinate and with nothing else, as a geared rotor's; none on the rotations of a quaternion.
+
+    close: the child hangs on another joint already, and this one closes a loop. With a spring, a damper, limits,
+    armature, an input or two rotations it has coordinates of its own, and the child is cut there: a second part of it,
+    the body "child.name", hangs on this joint and is welded to the first (sim/coupling/closing.py).
+
+    kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
+    prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating. The plane of
+    the planar kinds is across the axis; orbital kinds turn about all but the axis, the other three about all.
     """
 
     kind: str
@@ -96,7 +104,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
-    close: bool = False  # closes a loop: child hangs on another joint already; see sim/coupling/closing.py
+    close: bool = False
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)

@@ -98,6 +98,7 @@ class Trajectory:
     iterations: Integers  # (T,)
     contacts: Contacts
     message: str
+    wrenches: Floats | None = None  # (T, nbody, 6) external ones, if there were any [N, N m]
 
     def __repr__(self) -> str:
         sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"

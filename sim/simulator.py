@@ -18,7 +18,7 @@ from sim.describe import describe
 from sim.horizon import Horizon
 from sim.mechanism import Mechanism
 from sim.policies import Feedback, roll
-from sim.reactions import Reactions, reactions
+from sim.reactions import Reactions
 from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of, fastest
 from sim.settings import Settings, default_kappa
 from sim.wrenches import Wrenches
@@ -118,9 +118,8 @@ class Simulator(Derivatives):
         status, iterations, residual, violation = reports[0, :4]
         if knot == 0 and throw:
             raise self._error("Simulator.step", reports[0], state)
-        out = xs[knot] if knot else state
         return StepResult(
-            out,
+            xs[knot] if knot else state,
             Status(int(status)),
             int(iterations),
             float(residual),
@@ -228,14 +227,16 @@ class Simulator(Derivatives):
         )
         return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
-    def reactions(self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world") -> Reactions:
+    def reactions(
+        self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world", wrenches: Wrenches | None = None
+    ) -> Reactions:
         """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
 
         x (..., nx) and u (..., nu), zero when left out, with the same leading axes: `sim.reactions(t.x[:-1], t.u)` has
         those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
-        ("body"). See `Reactions` for points and parts. An unsolved step raises SimulationError.
+        ("body"); wrenches as in `rollout`. See `Reactions` for points. An unsolved step raises SimulationError.
         """
-        return reactions(self, x, u, frame)
+        return pushed.reactions(self, x, u, wrenches, frame)
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
         """Rollouts and derivatives of trajectories of so many knots, for a planner: see `sim.horizon`."""

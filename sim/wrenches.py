@@ -6,7 +6,7 @@ are exact in a step and in its derivatives, and cost nothing where there are non
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,8 @@ from sim import checks
 from sim.border import whole
 from sim.parts import Input
 from sim.policies import Feedback
+from sim.reactions import Reactions
+from sim.reactions import reactions as transmitted
 from sim.results import Linearization, Shot, StepResult, Trajectory
 
 if TYPE_CHECKING:
@@ -25,7 +27,12 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
-__all__ = ["Wrenches", "closed_loop", "linearize", "linearize_trajectory", "rollout", "step"]
+Blocks = dict[str, Floats]
+
+__all__ = [
+    "Wrenches", "closed_loop", "linearize", "linearize_by", "linearize_rollout", "linearize_trajectory", "reactions",
+    "rollout", "step", "vjp",
+]  # fmt: skip
 
 
 def _table(sim: Simulator, call: str, wrenches: Any, steps: int) -> dict[str, Floats]:
@@ -93,9 +100,12 @@ def rollout(
 
         found = other.rollout(x, policy, steps=count, throw=throw)
     else:
-        other, inputs = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
-        found = other.rollout(x, inputs, steps=steps, throw=throw)
-    return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]))
+        other, rows = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
+        found = other.rollout(x, rows, steps=steps, throw=throw)
+    given = np.zeros((found.knot, sim.nbody, 6))
+    for name, wrench in _table(sim, "Simulator.rollout(wrenches=...)", wrenches, len(rows)).items():
+        given[:, sim.mechanism.body_names.index(name)] = wrench[: found.knot]
+    return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]), wrenches=given)
 
 
 def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches, **options: Any) -> Shot:
@@ -133,3 +143,69 @@ def linearize_trajectory(
     other, inputs = _pushed(sim, method, wrenches, _inputs(sim, method, "us", us))
     found = other.linearize_trajectory(xs, inputs, substeps, kappa)
     return replace(found, B=np.ascontiguousarray(found.B[..., : sim.nu]))
+
+
+def linearize_by(
+    sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches, kappa: float | None, wrt: Sequence[str]
+) -> Blocks:
+    """`Simulator.linearize` by names, of the step under wrenches (nbody, 6)."""
+    us = _inputs(sim, "linearize", "u", np.zeros((1, sim.nu)) if u is None else np.asarray(u)[None])
+    other, inputs = _pushed(sim, "linearize", wrenches, us)
+    return _own(sim, other.linearize(x, inputs[0], kappa, wrt=_known(sim, "linearize", wrt)))
+
+
+def linearize_rollout(
+    sim: Simulator, x: ArrayLike, us: ArrayLike, wrenches: Wrenches, kappa: float | None, wrt: Sequence[str]
+) -> tuple[Floats, Linearization]:
+    """`Simulator.linearize_rollout` under wrenches (T, nbody, 6)."""
+    method = "linearize_rollout"
+    other, inputs = _pushed(sim, method, wrenches, _inputs(sim, method, "us", us))
+    xs, found = other.linearize_rollout(x, inputs, kappa, _known(sim, method, wrt) if wrt else ())
+    B = np.ascontiguousarray(found.B[..., : sim.nu])
+    return xs, replace(found, B=B, parameters=_own(sim, found.parameters))
+
+
+def vjp(
+    sim: Simulator,
+    path: tuple[ArrayLike, ArrayLike],
+    dL_dx: ArrayLike,
+    wrenches: Wrenches,
+    kappa: float | None,
+    wrt: Sequence[str],
+) -> Blocks:
+    """`Simulator.vjp` of a rollout under wrenches (T, nbody, 6); path: its states and inputs."""
+    other, inputs = _pushed(sim, "vjp", wrenches, _inputs(sim, "vjp", "trajectory", path[1]))
+    return _own(sim, other.vjp((path[0], inputs), dL_dx, _known(sim, "vjp", wrt), kappa))
+
+
+def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenches | None, frame: str) -> Reactions:
+    """`Simulator.reactions` under wrenches, if any: (nbody, 6) or, of a trajectory, (T, nbody, 6)."""
+    if wrenches is None:
+        return transmitted(sim, x, u, frame)
+    states = np.asarray(x, dtype=np.float64)
+    if states.ndim > 2:
+        raise ValueError(f"Simulator.reactions(wrenches=...): expected x of shape (nx,) or (T, nx), got {states.shape}")
+    rows = np.atleast_2d(states)
+    us = np.zeros((len(rows), sim.nu)) if u is None else np.asarray(u, dtype=np.float64).reshape(-1, sim.nu)
+    other, inputs = _pushed(sim, "reactions", wrenches, checks.array("Simulator.reactions(u)", us, (len(rows), sim.nu)))
+    return transmitted(other, states, inputs if states.ndim == 2 else inputs[0], frame)
+
+
+def _known(sim: Simulator, method: str, wrt: Sequence[str]) -> Sequence[str]:
+    """The names, when they mean the same with six inputs more."""
+    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+    sim.parameters([name for name in names if name not in ("state", "input")])
+    for name in names:
+        if isinstance(name, str) and name.startswith(("input_force:*", "input_torque:*")):
+            raise ValueError(f"Simulator.{method}(wrt=...): no {name!r} under wrenches, which are inputs as well")
+    return names
+
+
+def _own(sim: Simulator, blocks: Mapping[str, Floats]) -> Blocks:
+    """The blocks without the columns of the six inputs more."""
+    counts = {name: len(sim.parameters((name,)).names) for name in blocks if name not in ("state", "input")}
+    out = {}
+    for name, block in blocks.items():
+        count = counts.get(name, sim.nu if name == "input" else block.shape[-1])
+        out[name] = np.ascontiguousarray(block[..., :count])
+    return out

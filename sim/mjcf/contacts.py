@@ -17,29 +17,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, Group, name_of, pose_of
+from sim.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, Group, Where, name_of, pose_of
 from sim.parts import Contact
 from sim.urdf.pose import Pose
 from sim.urdf.report import Notes
 
 Floats = NDArray[np.float64]
-Where = dict[int, tuple[Group | None, Pose]]
-
 PLANE = 0  # mjtGeom
+_UNLESS = "are no obstacles (collisions=True makes them)"
 KINDS = {1: "height field", 4: "ellipsoid", 7: "mesh", 8: "signed distance field"}
 
 
-def find_contacts(model: Any, where: Where, settings: tuple[float | None, str, int], notes: Notes) -> list[Contact]:
-    """The contacts of all geoms with all planes; settings: friction, law, points per rim of a cylinder."""
+def find_contacts(
+    model: Any, where: Where, settings: tuple[float | None, str, int], collisions: bool, notes: Notes
+) -> list[Contact]:
+    """The contacts of all geoms with all planes; settings: friction, law, points per rim of a cylinder.
+
+    collisions: whether the other fixed geoms are obstacles, by sim/mjcf/collisions.py.
+    """
     planes = [g for g in range(model.ngeom) if _owner(model, where, g) is None and model.geom_type[g] == PLANE]
     out: list[Contact] = []
     for g in range(model.ngeom):
         group, frame = where[int(model.geom_bodyid[g])]
         if group is None:
-            if model.geom_type[g] != PLANE and model.geom_contype[g] | model.geom_conaffinity[g]:
-                notes.add("geoms fixed to the world other than planes are no obstacles", [name_of(model, "geom", g)])
+            solid = model.geom_type[g] != PLANE and model.geom_contype[g] | model.geom_conaffinity[g]
+            if solid and not collisions:
+                notes.add(f"geoms fixed to the world other than planes {_UNLESS}", [name_of(model, "geom", g)])
             continue
-        touched = [p for p in planes if _meet(model, g, p)]
+        touched = [p for p in planes if meet(model, g, p)]
         if not touched:
             continue
         kind = int(model.geom_type[g])
@@ -61,10 +66,17 @@ def _owner(model: Any, where: Where, g: int) -> Group | None:
     return where[int(model.geom_bodyid[g])][0]
 
 
-def _meet(model: Any, a: int, b: int) -> bool:
+def meet(model: Any, a: int, b: int) -> bool:
     """Whether MuJoCo lets two geoms collide."""
     ab = model.geom_contype[a] & model.geom_conaffinity[b]
     return bool(ab | (model.geom_contype[b] & model.geom_conaffinity[a]))
+
+
+def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
+    """(friction, whether there is none) of two geoms: the larger ones, or those of the geom with priority."""
+    own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
+    first = [x for x, wins in ((a, own >= other), (b, other >= own)) if wins]
+    return max(float(model.geom_friction[x, 0]) for x in first), max(int(model.geom_condim[x]) for x in first) == 1
 
 
 def _contact(
@@ -80,10 +92,7 @@ def _contact(
             plane = pose_of(model.body_pos[body], model.body_quat[body]).then(plane)
             body = int(model.body_parentid[body])
     normal = plane.rotation[:, 2]
-    own, other = int(model.geom_priority[g]), int(model.geom_priority[p])
-    first = [x for x, wins in ((g, own >= other), (p, other >= own)) if wins]
-    friction = max(float(model.geom_friction[x, 0]) for x in first)
-    slippery = max(int(model.geom_condim[x]) for x in first) == 1
+    friction, slippery = mixed(model, g, p)
     return Contact(
         group.name,
         ball[0] - group.com,

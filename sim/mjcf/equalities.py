@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.gear import Gear
-from sim.mjcf.groups import Group, name_of, pose_of
+from sim.mjcf.groups import Group, Where, name_of, pose_of
 from sim.parts import WORLD, Joint
 from sim.urdf.pose import HERE, Pose
 from sim.urdf.report import Notes
 
 Floats = NDArray[np.float64]
-Where = dict[int, tuple[Group | None, Pose]]
 
 CONNECT, WELD, JOINT = 0, 1, 2  # mjtEq
 _SITE = 6  # mjtObj

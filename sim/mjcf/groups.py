@@ -34,6 +34,9 @@ class Group:
         return self.inertia.com
 
 
+Where = dict[int, tuple[Group | None, Pose]]  # of every body of the file, its group (None: the world) and pose in it
+
+
 def name_of(model: Any, kind: str, index: int) -> str:
     """Name of a body, joint, geom or actuator; made from its number where the file gives none."""
     given = getattr(model, kind)(index).name
@@ -46,13 +49,13 @@ def pose_of(position: Floats, quaternion: Floats) -> Pose:
     return Pose(rotation_matrix(unit / np.linalg.norm(unit)), np.array(position, dtype=np.float64))
 
 
-def find_groups(model: Any) -> tuple[list[Group], dict[int, tuple[Group | None, Pose]]]:
+def find_groups(model: Any) -> tuple[list[Group], Where]:
     """Groups with parents before children; and of every body of the file its group (None: the world) and its pose.
 
     model: a mujoco.MjModel.
     """
     groups: list[Group] = []
-    where: dict[int, tuple[Group | None, Pose]] = {0: (None, HERE)}
+    where: Where = {0: (None, HERE)}
     parts: dict[int, list[RigidInertia]] = {}
     for b in range(1, model.nbody):
         carrier, at = where[int(model.body_parentid[b])]
@@ -81,15 +84,15 @@ def drawn(model: Any, group: Group) -> Shape | None:
     for b, frame in group.members.items():
         start = int(model.body_geomadr[b])
         for g in range(start, start + int(model.body_geomnum[b])):
-            solid = _solid(model, g, frame, group.com)
+            solid = solid_of(model, g, frame, group.com)
             size = float(np.prod(np.maximum(model.geom_size[g], 1e-3)))
             if solid is not None and size > volume:
                 best, volume = solid, size
     return best
 
 
-def _solid(model: Any, g: int, frame: Pose, com: Floats) -> Shape | None:
-    """A geom as a shape in the body, from its centre of mass; None for a mesh, a plane or an ellipsoid."""
+def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | None:
+    """A geom as a shape in its body, from the centre of mass com; None for a mesh, a plane or an ellipsoid."""
     at = frame.then(pose_of(model.geom_pos[g], model.geom_quat[g]))
     r, s, t = (float(x) for x in model.geom_size[g])
     center, turn = at.point - com, at.quaternion

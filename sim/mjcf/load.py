@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from sim import checks
 from sim.border import whole
+from sim.mjcf.collisions import find_collisions
 from sim.mjcf.contacts import find_contacts
 from sim.mjcf.drives import find_inputs, left_out
 from sim.mjcf.equalities import find_gears, find_loops
@@ -33,6 +34,7 @@ def load_mjcf(
     merge: bool = True,
     keyframe: int | None = None,
     rim_points: int = 4,
+    collisions: bool = False,
     gravity: ArrayLike | None = None,
 ) -> MjcfMechanism:
     """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
@@ -45,6 +47,8 @@ def load_mjcf(
         keyframe    number of the keyframe whose qpos is the neutral state; None: the default one, joints that it has
                     outside their range in its middle, and a floating base so high that nothing is in the ground
         rim_points  points per rim of a cylinder
+        collisions  whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
+                    them: its spheres, capsules, boxes and cylinders (sim/mjcf/collisions.py)
         gravity     [m/s^2]; None: that of the file
 
     What of the file is represented, and what not: MjcfMechanism. What changes the motion in a way that a user would not
@@ -60,16 +64,17 @@ def load_mjcf(
     bodies, joints, homes = _tree(model, groups, merge, notes)
     if not joints:
         raise ValueError(f"load_mjcf: {file}: no joint is free to move")
-    inputs, gear, low, high = find_inputs(model, homes, notes)
-    left_out(model, notes)
+    inputs, gear, low, high = find_inputs(model, homes, where, notes)
+    left_out(model, collisions, notes)
     mech = MjcfMechanism(
         bodies,
         [*joints, *find_loops(model, where, notes)],
-        find_contacts(model, where, touching, notes) if ground else [],
+        find_contacts(model, where, touching, collisions, notes) if ground else [],
         inputs,
         gravity=model.opt.gravity if gravity is None else gravity,
         name=Path(file).stem,
         neutral=_neutral(model, keyframe, notes),
+        collisions=find_collisions(model, where, touching, notes) if collisions else (),
         gears=find_gears(model, homes, notes),
     )
     mech = _without_constant_gaps(mech, notes)

@@ -46,11 +46,12 @@ class MjcfMechanism(Mechanism):
 
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
-    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move; actuators on hinges and
-    slides as inputs in N and N m, u = report.gear * ctrl; connect and weld as joints that close loops, and linear
-    couplings of two joints as gears, all of them rigid (sim/mjcf/equalities.py). Not represented, and listed in
-    `report.notes`: other equality constraints, tendons, collisions between bodies, dry friction of joints, servos,
-    fluids, meshes, height fields, explicit pairs.
+    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move, and with
+    `collisions=True` against one another and what is fixed; actuators on hinges and slides as inputs in N and N m, u =
+    report.gear * ctrl, and on sites as wrenches that move with the body; connect and weld as joints that close loops,
+    and linear couplings of two joints as gears, all of them rigid (sim/mjcf/equalities.py). Not represented, and listed
+    in `report.notes`: other equality constraints, tendons, dry friction of joints, servos, fluids, meshes, height
+    fields.
     """
 
     report: MjcfReport | None = field(default=None, compare=False, repr=False)

@@ -2,17 +2,18 @@
 
     gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/collision
     slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
-    force  f = n gamma + T^T beta on a, -f on b, both at P = p - mean of (x_a3 - x_a2, x_b3 - x_b2)
+    force  f = n gamma + T^T beta on a, -f on b, both at P = p - w_a (x_a3 - x_a2) - w_b (x_b3 - x_b2)
 
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
-to configuration 2, where the balance of momenta is taken; of a fixed obstacle, a alone carries it.
+to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
+alone carries it.
 
 Derivatives: jacobian.py.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin
 
 from sim import late
 from sim.collision.collide import collide_chosen
@@ -26,17 +27,25 @@ from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
 
+POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
+_TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole
+_FIRST = (1.0 - _TO_POLE * POLE[0] * POLE[0], -_TO_POLE * POLE[0] * POLE[1], -POLE[0])
 _NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
 
 
 @kernel
-def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3, Vec3]:
-    """t1, t2 and the axis e that t1 is nearest to: t1 = (e - n (n.e)) / |...|, t2 = n x t1."""
-    e = (1.0, 0.0, 0.0) if abs(nx) < 0.9 else (0.0, 1.0, 0.0)
-    d = nx * e[0] + ny * e[1]
-    i = 1.0 / sqrt(1.0 - d * d)
-    t = (i * (e[0] - nx * d), i * (e[1] - ny * d), -i * nz * d)
-    return t, cross(nx, ny, nz, t[0], t[1], t[2]), e
+def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3]:
+    """t1, t2: the frame of the pole a, turned the shortest way to n: t1 = b - (b.n)/(1 + a.n) (a + n), t2 = n x t1.
+
+    Continuous but at n = -a, so that a pyramid of friction does not jump from one iterate to the next. At n = z it is
+    x and y, as of contacts with the ground. A pole that nobody would build along keeps -a out of the way.
+    """
+    a, b = POLE, _FIRST
+    p = (b[0] * nx + b[1] * ny + b[2] * nz) / max(1.0 + a[0] * nx + a[1] * ny + a[2] * nz, 1e-12)
+    x, y, z = b[0] - p * (a[0] + nx), b[1] - p * (a[1] + ny), b[2] - p * (a[2] + nz)
+    s = x * nx + y * ny + z * nz  # rounding: on a floor the frame lies in it exactly
+    t1 = (x - s * nx, y - s * ny, z - s * nz)
+    return t1, cross(nx, ny, nz, t1[0], t1[1], t1[2])
 
 
 @kernel
@@ -97,7 +106,7 @@ def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
     g = work.pair_out[j]
     F = work.pair_frame[j]
     s = shape_b(model, j)
-    t1, t2, _ = tangents(g[1], g[2], g[3])
+    t1, t2 = tangents(g[1], g[2], g[3])
     F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
     F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
     F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
@@ -123,9 +132,18 @@ def shape_b(model: Model, j: int) -> int:
 
 
 @kernel
-def shares(b: int) -> tuple[float, float]:
-    """Parts of a and b in carrying the contact point back to configuration 2."""
-    return (1.0, 0.0) if b < 0 else (0.5, 0.5)
+def shares(model: Model, j: int) -> tuple[float, float]:
+    """Parts of a and b in carrying the contact point of pair j back to configuration 2: m_b/(m_a + m_b) and the rest.
+
+    The point of a ball that rolls moves with the ball; carried by half, it presses ahead of the centre and brakes.
+    """
+    k = model.pair_coupling[j]
+    b = model.coupling_body[k, 1]
+    if b < 0:
+        return 1.0, 0.0
+    m = model.body_mass[model.coupling_body[k, 0]]
+    both = m + model.body_mass[b]
+    return (1.0 - m / both, m / both) if both > 0.0 else (0.5, 0.5)
 
 
 @kernel
@@ -133,7 +151,7 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    wa, wb = shares(b)
+    wa, wb = shares(model, j)
     F = work.pair_frame[j]
     x = F[9] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
     y = F[10] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])

@@ -7,11 +7,9 @@ Everything moves with b, plus what the motion of a relative to b does:
 
 from __future__ import annotations
 
-from math import sqrt
-
 from sim import late
 from sim.model import Model, Vector
-from sim.pairs.contact import point_velocity, shape_b, tangents
+from sim.pairs.contact import POLE, point_velocity, shape_b
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
@@ -40,16 +38,15 @@ def shape_to_world(X: Vector, first: int, work: Work, s: int, x: float, y: float
 def frame_turn(g: Vector, out: Vector) -> None:
     """out (3 x 6): rotation of the contact frame, n x dn + n (spin of t1), both in the frame of shape b.
 
-    t2.dt1 = -(n.e)/|e - n (n.e)| t2.dn
+    t2.dt1 = (n x a).dn / (1 + a.n), a the pole of `tangents`
     """
     nx, ny, nz = g[1], g[2], g[3]
-    _, t, e = tangents(nx, ny, nz)
-    d = nx * e[0] + ny * e[1]
-    spin = -d / sqrt(1.0 - d * d)
+    spin = 1.0 / max(1.0 + POLE[0] * nx + POLE[1] * ny + POLE[2] * nz, 1e-12)
+    sx, sy, sz = cross(nx, ny, nz, POLE[0], POLE[1], POLE[2])
     for k in range(6):
         x, y, z = g[7 + k], g[13 + k], g[19 + k]
         a, b, c = cross(nx, ny, nz, x, y, z)
-        s = spin * (t[0] * x + t[1] * y + t[2] * z)
+        s = spin * (sx * x + sy * y + sz * z)
         out[k] = a + nx * s
         out[6 + k] = b + ny * s
         out[12 + k] = c + nz * s

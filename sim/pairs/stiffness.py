@@ -69,7 +69,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
-    wa, wb = shares(b)
+    wa, wb = shares(model, j)
     n, t1, t2 = contact_impulse(model, work, c)
     f = pair_force(work, j, share * n, share * t1, share * t2)
     P = pair_arm(model, work, j)
@@ -153,8 +153,7 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
     slip    -t/h on dx2,  (-c y + s x y)/h on dphi2,  y = r x t        P follows the centres of mass at 2
     """
     c = model.contact_height.shape[0] + j
-    b = model.coupling_body[model.pair_coupling[j], 1]
-    weight = shares(b)
+    weight = shares(model, j)
     n, t1, t2 = contact_impulse(model, work, c)
     f = pair_force(work, j, n, t1, t2)
     P = pair_arm(model, work, j)

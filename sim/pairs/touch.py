@@ -60,6 +60,8 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
             raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
         solids.append((index, shape))
     (a, first), (b, second) = solids
+    if isinstance(first, String) and isinstance(second, String) and first.length != second.length:
+        raise ValueError(f"{call}: both ends of a string have its length, got {first.length:g} and {second.length:g}")
     if isinstance(first, Polytope) and isinstance(second, HalfSpace):
         return _corners(collision, (a, first), (b, second))
     if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
@@ -81,6 +83,7 @@ def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
 def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[Touch]:
     """The contact points of two shapes in the order of their pair."""
     code, number = int(kind), kinds.count(kind)
+    rope = isinstance(ends[0][1], String)  # which pulls along itself, and does not rub
     sizes = np.zeros(8)
     around = []
     for k, (_, shape) in enumerate(ends):
@@ -100,8 +103,8 @@ def _features(collision: Collision, kind: kinds.Pair, ends: list[End]) -> list[T
             (),
             (around[0], around[1]),
             places,
-            collision.friction,
-            collision.law,
+            0.0 if rope else collision.friction,
+            "impact" if rope else collision.law,
             collision.restitution,
             collision.name,
         )

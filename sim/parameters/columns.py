@@ -31,7 +31,7 @@ from sim.parameters.contacts import (
 from sim.parameters.effects import At, Effect
 from sim.parameters.geometry import add_geometry
 from sim.parameters.loops import add_gear_offset, add_gear_ratio, add_loop_geometry, add_loop_turn
-from sim.parameters.pairs import add_shapes_shift
+from sim.parameters.pairs import add_pairs_mass, add_shapes_shift
 from sim.parameters.sizes import add_shapes_size
 from sim.work import Work
 from solvers.jit import kernel
@@ -55,6 +55,7 @@ def add_term(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: f
         add_geometry(model, work, at, effect, i, k, w, col)
     elif effect == _MASS:
         add_mass(model, work, at.h, i, w, col)
+        add_pairs_mass(model, work, i, w, col)
     elif effect == _INERTIA:
         add_inertia(model, work, at.h, i, k, w, col)
     elif effect == _SPRING:

@@ -14,6 +14,7 @@ from sim.mechanism import Mechanism
 from sim.parameters.heights import terrains
 from sim.parameters.of_touch import shape_of
 from sim.polytope import Polytope
+from sim.shapes import String
 
 Floats = NDArray[np.float64]
 Entries = Mapping[str, float]  # by component, "" of a single number
@@ -114,7 +115,10 @@ class Draft:
             changed = replace(shape, vertices=entries["scale"] * np.asarray(shape.vertices))
         else:
             changed = replace(shape, **entries)
-        self.collisions[name] = replace(self.collisions[name], **{f"shape_{letter}": changed})
+        fields = {f"shape_{letter}": changed}
+        if what == "size" and isinstance(shape, String):  # one length, written on both ends
+            fields = {f: replace(getattr(self.collisions[name], f), **entries) for f in ("shape_a", "shape_b")}
+        self.collisions[name] = replace(self.collisions[name], **fields)
 
     def _raise_terrain(self, name: str, entries: Entries) -> None:
         """The ground has other heights, for all contacts that stand on it."""

@@ -66,7 +66,8 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
             ("friction", Effect.FRICTION, collision.friction),
             ("restitution", Effect.RESTITUTION, collision.restitution),
         ):
-            yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
+            if kind == "restitution" or not isinstance(collision.shape_a, String):  # a string does not rub
+                yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
         firsts = [j for j in mine if mech.touches[j].feature == 0]  # the corners of a polytope are one by one
         swapped = mech.touches[mine[0]].bodies[0] != index.get(collision.a, -1)
         for side, letter in enumerate("ba" if swapped else "ab"):

@@ -83,6 +83,24 @@ def is_felt(model: Model, work: Work, j: int) -> bool:
 
 
 @kernel
+def add_pairs_mass(model: Model, work: Work, i: int, w: float, col: int) -> None:
+    """Where the forces of collisions act follows the mass of body i: dP = m_b/m^2 (dx_a - dx_b) for a, m = m_a + m_b.
+
+    dx = x3 - x2; for b, -m_a/m^2 instead.
+    """
+    for j in range(model.pair_kind.shape[0]):
+        a = model.coupling_body[model.pair_coupling[j], 0]
+        b = model.coupling_body[model.pair_coupling[j], 1]
+        if b < 0 or (i != a and i != b) or not is_felt(model, work, j):
+            continue
+        m = model.body_mass[a] + model.body_mass[b]
+        r = (model.body_mass[b] if i == a else -model.body_mass[a]) / (m * m)
+        x3, x2, y3, y2 = work.pos3[a], work.pos2[a], work.pos3[b], work.pos2[b]
+        x, y, z = x3[0] - x2[0] - y3[0] + y2[0], x3[1] - x2[1] - y3[1] + y2[1], x3[2] - x2[2] - y3[2] + y2[2]
+        add_pair(model, work, j, (0.0, 0.0, 0.0), (r * x, r * y, r * z), w, col)
+
+
+@kernel
 def add_shapes_shift(model: Model, work: Work, h: float, first: int, k: int, w: float, col: int) -> None:
     """The shape of a (k < 3) or b of the collision whose first pair this is moves along axis k % 3 of its body."""
     side, e = k // 3, unit_vector(k % 3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dojo_opt.report import Progress
-from dojo_opt.report.contact import Contact, measure, scenes, study
+from dojo_opt.report.contact import Contact, measure, scenes, simbenchmark, study
 from dojo_opt.report.engines import Ours
 
 HARD = Ours(kappa=1e-10, rounds=1)
@@ -50,4 +50,22 @@ def test_bars_of_the_quick_study_are_met(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(study, "installed", list)
     report = Contact(quick=True).run(Progress())
     assert report.met(), [row for row in report.rows if row.met is False]
-    assert report.figure is not None and len(report.tables) == 5
+    assert report.figure is not None and len(report.tables) == 6
+
+
+def test_balls_that_give_everything_back_keep_their_energy() -> None:
+    assert simbenchmark.bouncing(1e-2, 2, 3.0) < 1e-8
+
+
+def test_a_ball_that_hits_a_robot_hands_its_momentum_over() -> None:
+    assert simbenchmark.momentum(1e-2, 0.5) < 1e-11
+
+
+@pytest.mark.slow
+def test_balls_roll_on_a_pulled_box() -> None:
+    """The error is of first order in the time step, the same in all directions."""
+    pulled, balls = simbenchmark.accelerations()
+    assert 10.0 * pulled + 25.0 * balls == pytest.approx(150.0 - 0.4 * 35.0 * 9.81)
+    found = [simbenchmark.rolling(h, simbenchmark.DIRECTIONS["askew"], 1.0) for h in (1e-2, 5e-3)]
+    assert found[1]["box"] < 0.6 * found[0]["box"] and found[1]["balls"] < 0.6 * found[0]["balls"]
+    assert found[1]["askew"] < 1e-6 < found[1]["box"]

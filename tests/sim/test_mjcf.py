@@ -156,13 +156,13 @@ CHAIN = """
 def test_joints_in_a_row_with_references_springs_and_a_ball() -> None:
     with pytest.warns(MjcfWarning) as told:
         mech = load_mjcf(CHAIN)
-    assert {str(w.message).split(": ")[3] for w in told} == {"servo", "thrust"}
+    assert {str(w.message).split(": ")[3] for w in told} == {"servo"}
     assert [j.kind for j in mech.joints] == ["prismatic", "revolute", "revolute", "spherical"]
     assert [b.mass > 0.0 for b in mech.bodies] == [False, False, True, True]
     assert [c.law for c in mech.contacts].count("impact") == 2
     assert {c.friction for c in mech.contacts} == {0.9, 1.0}
     assert mech.report is not None
-    np.testing.assert_allclose(mech.report.gear, [3.0, 1.0])
+    np.testing.assert_allclose(mech.report.gear, [3.0, 1.0, 1.0])
     np.testing.assert_allclose((mech.report.low[0], mech.report.high[0]), (-6.0, 3.0))
     assert mech.report.joints["h2"] == ("h2", 0)
 
@@ -172,7 +172,7 @@ def test_joints_in_a_row_with_references_springs_and_a_ball() -> None:
     q, v, _ = start(flying, 4)
     model.actuator_gainprm[:] = model.actuator_biasprm[:] = 0.0
     expected = reference(model, q, v, np.zeros(3), 0.1)
-    error = [difference(flying, flown(flying, q, v, np.zeros(2), h, 0.1), expected) for h in (2e-3, 1e-3, 1e-4)]
+    error = [difference(flying, flown(flying, q, v, np.zeros(3), h, 0.1), expected) for h in (2e-3, 1e-3, 1e-4)]
     assert error[2] < 1e-6 and error[1] < 0.3 * error[0], error
 
 

@@ -209,18 +209,6 @@ def test_a_polytope_falls_as_the_box_that_it_is() -> None:
     np.testing.assert_allclose(runs[0], runs[1], atol=1e-5)
 
 
-def test_a_string_holds_and_does_not_push() -> None:
-    bodies = [Body(n, 1.0, (0.1, 0.1, 0.1)) for n in "ab"]
-    joints = [Joint("floating", None, n) for n in "ab"]
-    rope = Collision("a", "b", String(1.0), String(1.0), friction=0.0)
-    sim = dojo.Simulator(Mechanism(bodies, joints, collisions=[rope], gravity=(0, 0, 0)), time_step=0.01)
-    x = np.concatenate([[0, 0, 0, 1, 0, 0, 0, 0.5, 0, 0, 1, 0, 0, 0], [-1, 0.2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0]])
-    t = sim.rollout(x, np.zeros((200, sim.nu)))
-    assert t.success, t.message
-    apart = np.linalg.norm(t.x[:, :3] - t.x[:, 7:10], axis=1)
-    assert 0.9 < apart.max() <= 1.0
-
-
 def test_collisions_are_checked() -> None:
     bodies = [Body("a", 1.0, (1, 1, 1)), Body("b", 1.0, shape=Cylinder(0.1, 0.2)), Body("c", 1.0, shape=Box(1, 1, 1))]
     joints = [Joint("floating", None, b.name) for b in bodies]

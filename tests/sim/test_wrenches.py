@@ -86,3 +86,50 @@ def test_bad_wrenches_are_refused(wrenches, message):
     sim = dojo.Simulator(ball(), time_step=0.01)
     with pytest.raises(ValueError, match=message):
         sim.rollout(sim.neutral(), np.zeros((3, sim.nu)), wrenches=wrenches)
+
+
+def test_gradients_of_a_pushed_rollout(rng):
+    """By state, input and parameters: forward at every knot, backward along the whole, against differences."""
+    sim = dojo.Simulator(ball(), time_step=0.01, kappa=1e-4, tolerance=1e-13)
+    x, T = sim.neutral(), 15
+    x[2] = 0.12
+    push = {"ball": np.r_[0.5, 0.2, -3.0, 0.1, 0.0, 0.3] * np.ones((T, 1))}
+    us = 0.1 * rng.normal(size=(T, sim.nu))
+    t = sim.rollout(x, us, wrenches=push, throw=True)
+    assert t.wrenches is not None and t.wrenches.shape == (T, 1, 6) and sim.rollout(x, us).wrenches is None
+    wrt = ("state", "input", "mass", "friction", "gravity", "time_step")
+    loss = rng.normal(size=(T + 1, sim.ndx))
+    g = sim.vjp(t, loss, wrt)
+    assert g["input"].shape == (T, sim.nu)
+    xs, lines = sim.linearize_rollout(x, us, wrt=("mass", "friction"), wrenches=push)
+    np.testing.assert_allclose(xs, t.x, atol=1e-9)
+    one = sim.linearize(xs[4], us[4], wrenches={"ball": push["ball"][4]}, wrt=wrt)
+    np.testing.assert_allclose(lines.parameters["mass"][4], one["mass"], atol=1e-8)
+    np.testing.assert_allclose(lines.B[4], one["input"], atol=1e-8)
+
+    def value(other, start, inputs):
+        return np.sum(loss * sim.difference(other.rollout(start, inputs, wrenches=push, throw=True).x, t.x))
+
+    e = 1e-6
+    for name in ("mass:ball", "friction:*", "gravity[2]", "time_step"):
+        p = float(sim.parameters((name,)).values[0])
+        ends = [value(sim.with_parameters({name: p + s * e}), x, us) for s in (1.0, -1.0)]
+        got = g["gravity"][2] if name == "gravity[2]" else g[name.split(":")[0]].sum()
+        np.testing.assert_allclose(got, (ends[0] - ends[1]) / (2 * e), rtol=1e-5)
+    dx, du = rng.normal(size=sim.ndx), rng.normal(size=us.shape)
+    ends = [value(sim, sim.integrate(x, s * e * dx), us + s * e * du) for s in (1.0, -1.0)]
+    np.testing.assert_allclose(g["state"] @ dx + np.sum(g["input"] * du), (ends[0] - ends[1]) / (2 * e), rtol=1e-5)
+
+
+def test_reactions_of_a_pushed_pendulum():
+    """The joint carries weight and push of a body that hangs at rest."""
+    body = dojo.Body("bob", 2.0, shape=dojo.Sphere(0.1))
+    joint = dojo.Joint("fixed", None, "bob", child_point=(0, 0, 1))
+    hinge = dojo.Joint("revolute", "bob", "tail", axis=(0, 1, 0), parent_point=(0, 0, -1), child_point=(0, 0, 1))
+    tail = dojo.Body("tail", 1.0, shape=dojo.Sphere(0.1))
+    sim = dojo.Simulator(dojo.Mechanism([body, tail], [joint, hinge]), time_step=0.01)
+    r = sim.reactions(sim.neutral(), wrenches={"bob": (3.0, 0, 0, 0, 0, 0)})
+    np.testing.assert_allclose(r["bob"].force, [-3.0, 0, 3 * 9.81], atol=1e-8)
+    np.testing.assert_allclose(r["bob"].torque, [0, 3.0, 0], atol=1e-8)
+    many = sim.reactions(np.tile(sim.neutral(), (2, 1)), wrenches={"bob": (3.0, 0, 0, 0, 0, 0)})
+    np.testing.assert_allclose(many.force[1], r.force)

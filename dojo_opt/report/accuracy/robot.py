@@ -73,6 +73,8 @@ def recommend(mechanism: Mechanism, quick: bool, progress: Progress) -> Report:
     parts: list[tuple[str, Any]] = []
     if hard or unknown:
         parts.append(("time steps, kappas", lambda: _hard(report, mechanism, q, v, quick)))
+    if hard and not (mechanism.contacts or mechanism.collisions):
+        report.notes.append("nothing of it makes contact: the kappa found is that of its limits, not of the ground")
     if unknown:
         report.notes.append(f"not compared with an independent ODE: that has no {unknown}")
     else:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.report.contact import measure, scenes
+from dojo_opt.report.contact import measure, scenes, simbenchmark
 from dojo_opt.report.contact.picture import picture
 from dojo_opt.report.engines import Engine, Ours, installed
 from dojo_opt.report.result import Cell, Report, Row, Table
@@ -68,6 +68,10 @@ class Contact:
         report.tables += _tables(results, [f"{h:g}" for h in steps])
         report.rows += _rows(results, [f"{h:g}" for h in steps], curve)
         report.details |= {"engines": results, "curve": curve}
+        rows, table, numbers = simbenchmark.measured(self.quick)
+        report.rows += rows
+        report.tables.append(table)
+        report.details["simbenchmark"] = numbers
         report.figure = picture(results, curve, f"{steps[-1]:g}")
         return report
 

@@ -32,7 +32,7 @@ def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) 
     edges = [k for k in range(1, rows) if trials[k].group != trials[k - 1].group]
     ax.hlines(np.array(edges) - 0.5, -0.5, columns - 0.5, color="white", lw=2.0)
     ax.vlines(np.arange(1, columns) - 0.5, -0.5, rows - 0.5, color="white", lw=1.0)
-    ax.set_xlabel(_LEGEND, fontsize=8)
+    figure.supxlabel(_LEGEND, fontsize=8)
     ax.tick_params(length=0)
     for side in ax.spines.values():
         side.set_visible(False)

@@ -1,0 +1,93 @@
+"""load_mjcf: actuators on sites, and collisions of bodies with one another and with what is fixed to the world."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
+from sim.simulator import Simulator
+
+mujoco = pytest.importorskip("mujoco")
+
+DRONE = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body pos="0 0 1" quat="0.9 0.1 0.2 0.3"><freejoint/>
+  <geom type="box" size=".2 .1 .05" mass="1"/><geom type="sphere" size=".05" pos=".1 .1 .1" mass=".3"/>
+  <body pos=".1 0 0" euler="20 0 0"><geom type="box" size=".01 .02 .03" mass=".1"/>
+    <site name="rotor" pos=".2 -.1 .05" euler="0 30 10"/></body></body></worldbody>
+<actuator><motor name="thrust" site="rotor" gear="0 0 2 0 .1 .02" ctrllimited="true" ctrlrange="-1 3"/>
+  <general name="twist" site="rotor" gear="0 0 0 0 0 .5" gainprm="4"/></actuator></mujoco>"""
+
+TABLE = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+  <geom name="table" type="box" size=".5 .5 .2" pos="0 0 .2" friction=".4"/>
+  <body name="box" pos="0 0 .6"><freejoint/><geom name="cube" type="box" size=".1 .1 .1" friction=".7"/></body>
+  <body name="ball" pos="0 0 .9"><freejoint/><geom name="ball" size=".1" condim="1"/></body>
+  <body name="arm" pos="3 0 1"><joint axis="0 1 0"/><geom name="upper" type="capsule" fromto="0 0 0 .3 0 0" size=".05"/>
+    <body name="hand" pos=".3 0 0"><joint axis="0 1 0"/><geom name="lower" type="capsule" fromto=".15 0 0 .3 0 0" size=".05"/>
+      <body name="finger" pos=".3 0 0"><joint axis="0 0 1"/><geom name="tip" size=".05" pos=".1 0 0"/></body></body></body>
+</worldbody>
+<contact><exclude body1="arm" body2="box"/><pair geom1="upper" geom2="lower" friction=".3 .3 .005 .001 .001"/></contact>
+</mujoco>"""
+
+
+def quietly(text: str, **choices: bool) -> MjcfMechanism:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MjcfWarning)
+        return load_mjcf(text, **choices)  # type: ignore[arg-type]
+
+
+def test_an_actuator_on_a_site_moves_with_its_body() -> None:
+    mech = load_mjcf(DRONE)
+    assert mech.report is not None
+    np.testing.assert_allclose(mech.report.gear, [1.0, 4.0])
+    np.testing.assert_allclose([mech.report.low, mech.report.high], [[-1.0, -np.inf], [3.0, np.inf]])
+    model = mujoco.MjModel.from_xml_string(DRONE)
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-3
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 2.0, -0.3
+    mujoco.mj_step(model, data, 200)
+    assert abs(data.qvel[3:]).max() > 10.0
+    ends = []
+    for h in (1e-3, 5e-4):  # inputs act at the beginning of a step: an error of first order, extrapolated
+        steps = round(0.2 / h)
+        sim = Simulator(mech, time_step=h)
+        x = sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv))
+        ends.append(sim.rollout(x, np.tile(mech.report.gear * data.ctrl, (steps, 1)), throw=True).x[-1, : sim.nq])
+    np.testing.assert_allclose(2.0 * ends[1] - ends[0], data.qpos, atol=3e-5)
+
+
+def test_geoms_meet_where_mujoco_lets_them() -> None:
+    mech = quietly(TABLE, collisions=True)
+    pairs = {c.name: c for c in mech.collisions}
+    bodies = {"arm": "upper", "hand": "lower", "finger": "tip", "box": "cube", "ball": "ball"}
+    expected = {f"table-{geom}" for geom in bodies.values()} | {"cube-ball"}
+    expected |= {f"{a}-{b}" for a in ("cube", "ball") for b in ("upper", "lower", "tip")} - {"cube-upper"}
+    expected |= {"upper-tip", "upper-lower"}  # neighbours do not meet, but where the file pairs them
+    assert set(pairs) == expected
+    assert (pairs["table-cube"].friction, pairs["upper-lower"].friction) == (0.7, 0.3)
+    assert (pairs["table-ball"].law, pairs["cube-ball"].law) == ("nonlinear", "nonlinear")  # condim: the larger
+    assert not quietly(TABLE).collisions
+    notes = "\n".join(str(note) for note in (quietly(TABLE).report or mech.report).notes)  # type: ignore[union-attr]
+    for words in ("explicit contact pairs are left out: pair_0", "no obstacles (collisions=True makes them): table"):
+        assert words in notes
+    assert not any(words in str(mech.report) for words in ("pairs are left out", "no obstacles", "do not collide"))
+
+
+def test_a_box_lies_on_a_table_and_carries_a_ball() -> None:
+    sim = Simulator(quietly(TABLE, collisions=True), time_step=0.01)
+    t = sim.rollout(sim.neutral(), np.zeros((100, sim.nu)), throw=True)
+    q = sim.mechanism.q_slice
+    names = [joint.name for joint in sim.mechanism.joints if joint.kind == "floating"]
+    heights = [t.x[-1, q(name)][2] for name in names]
+    np.testing.assert_allclose(heights, [0.5, 0.7], atol=1e-6)
+
+
+def test_tendons_that_pull_are_warned_of() -> None:
+    text = """<mujoco><worldbody><site name="a" pos="0 0 1"/><body><freejoint/><geom size=".1"/><site name="b"/></body>
+    </worldbody><tendon><spatial name="rope" {}><site site="a"/><site site="b"/></spatial></tendon></mujoco>"""
+    with pytest.warns(MjcfWarning, match="tendons are left out: rope"):
+        load_mjcf(text.format('range="0 2" limited="true"'))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MjcfWarning)
+        assert "tendons are left out: rope" in str(load_mjcf(text.format("")).report)
