@@ -61,8 +61,8 @@ class Beginning(NamedTuple):
 def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess) -> Beginning:
     """Attempt 0, whose iterate it leaves, where anything is known of the solution; attempt 1 elsewhere.
 
-    With the impulses of the step before where they are known (`resume`), with those of the gaps, kappa / gap, where the
-    guess all but balances with them.
+    Where the impulses of the step before are known, as predicted from them (`go_on`), or near them (`resume`);
+    otherwise with those of the gaps, kappa / gap, where the guess all but balances with them.
     """
     q, v, u = inputs
     h = options.h
@@ -74,7 +74,9 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
     keep_inequalities(model, work)
     if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
         if predictable(model, work):
-            return go_on(model, work, options, inputs, guess.velocity)
+            beginning = go_on(model, work, options, inputs, guess.velocity)
+            if beginning.attempt == 0:
+                return beginning
         return resume(model, work, options, inputs, guess.velocity)
     if not place(model, work, h, q, v, 1.0):
         return Beginning(1, kappa, (1e300, 1e300))
@@ -94,7 +96,10 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
 def go_on(
     model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> Beginning:
-    """Attempt 0 at kappa: with the impulses of the step before where they all but balance, as predicted elsewhere."""
+    """Attempt 0 at kappa: with the impulses of the step before where they all but balance, otherwise as predicted.
+
+    Attempt 1 where that fails.
+    """
     q, v, u = inputs
     h = options.h
     if not place(model, work, h, q, velocity, 1.0):
