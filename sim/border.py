@@ -106,7 +106,7 @@ class Border:
         turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
         for bad, what in (
             (np.abs(length - 1.0) > _UNIT, "expected a unit quaternion"),
-            (turn >= np.pi, MESSAGES[Status(5)]),
+            (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
         ):
             if bad.any():
                 raise ValueError(
