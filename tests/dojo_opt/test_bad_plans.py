@@ -60,6 +60,18 @@ CALLS = {
     "unknown keyword": (lambda: dojo.problems.trot(sped=0.1), "gaits.trot(...)", "'sped'", "'speed'"),
     "half a cycle": (lambda: dojo.problems.walk(cycles=0.5), "gaits.walk(cycles=...)", "0.5"),
     "distance as a word": (lambda: dojo.problems.jump(distance="far"), "gaits.jump(distance=...)", "far"),
+    "refinement of a jump": (lambda: dojo.problems.jump(refinement=0), "problems.jump(refinement=...)", ">= 1", "0"),
+    "no substeps of a gait": (lambda: dojo.problems.trot(substeps=0), "problems.follow(substeps=...)", ">= 1", "0"),
+    **{f"leap with {name}": (lambda name=name, bad=bad: dojo.problems.leap(**{name: bad}),
+                             f"problems.leap({name}=...)", *words)
+       for name, bad, *words in [
+           ("distance", "far", "far"),
+           ("height", np.nan, "nan"),
+           ("duration", 0.0, "> 0", "0"),
+           ("crouch", -0.1, ">= 0", "-0.1"),
+           ("time_step", 0.0, "> 0", "0"),
+           ("refinement", 2.5, "whole number", "2.5"),
+       ]},
     "rest of a mechanism": (lambda: dojo.equilibrium(SIM.mechanism), "equilibrium(sim)", "Simulator"),
     "negative noise": (lambda: dojo.Plant(SIM, noise=-1.0), "Perturbation(noise=...)", "-1.0"),
     "noise nan": (lambda: dojo.Plant(SIM, noise=np.nan), "Perturbation(noise=...)", "nan"),
