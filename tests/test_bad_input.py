@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from refusals import check_refused
 from scenes import ball, block, chain, free_body, pendulum, run
 
 import dojo_opt as dojo
@@ -87,11 +88,7 @@ PARTS = {
 
 @pytest.mark.parametrize("case", PARTS)
 def test_mechanism(case):
-    build, *words = PARTS[case]
-    with pytest.raises(ValueError) as error:
-        build()
-    for word in words:
-        assert word in str(error.value), str(error.value)
+    check_refused(*PARTS[case])
 
 
 def hopper():
@@ -136,11 +133,7 @@ CALLS = {
 
 @pytest.mark.parametrize("case", CALLS)
 def test_simulator(case):
-    call, *words = CALLS[case]
-    with pytest.raises((ValueError, TypeError)) as error:
-        call()
-    for word in words:
-        assert word in str(error.value), str(error.value)
+    check_refused(*CALLS[case])
 
 
 @pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])

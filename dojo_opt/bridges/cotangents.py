@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.cross import cross
 from dojo_opt.manifold import tangent_layout
 from sim.simulator import Simulator
 
@@ -37,7 +38,7 @@ class Cotangents:
         for r, a in zip(self._rotations, self._quaternions, strict=True):
             q, g = xs[:, a : a + 4], by_x[:, a : a + 4]
             w, v, g_w, g_v = q[:, :1], q[:, 1:], g[:, :1], g[:, 1:]
-            out[:, r : r + 3] = 0.5 * (w * g_v - g_w * v - _cross(v, g_v))
+            out[:, r : r + 3] = 0.5 * (w * g_v - g_w * v - cross(v, g_v))
         return out
 
     def ambient(self, xs: Floats, by_dx: Floats) -> Floats:
@@ -48,14 +49,5 @@ class Cotangents:
             q, g_r = xs[:, a : a + 4], by_dx[:, r : r + 3]
             w, v = q[:, :1], q[:, 1:]
             out[:, a] = -2.0 * np.einsum("ni,ni->n", v, g_r)
-            out[:, a + 1 : a + 4] = 2.0 * (w * g_r + _cross(v, g_r))
+            out[:, a + 1 : a + 4] = 2.0 * (w * g_r + cross(v, g_r))
         return out
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    """a x b of rows (n, 3); a fifth of the time of np.cross."""
-    out = np.empty_like(a)
-    out[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    out[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    out[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return out

@@ -45,25 +45,7 @@ def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpac
     """
     jax = _jax()
     core = Rollouts(_CALL, sim, kappa, parameters)
-
-    def array(*shape: int) -> Any:
-        return jax.ShapeDtypeStruct(shape, "float64")
-
-    @jax.custom_vjp
-    def states(x0: Any, us: Any, theta: Any) -> Any:
-        xs = array(us.shape[0] + 1, sim.nx)
-        return jax.pure_callback(core.states, xs, x0, us, theta, vmap_method="broadcast_all")
-
-    def forward(x0: Any, us: Any, theta: Any) -> Any:
-        xs = states(x0, us, theta)
-        return xs, (xs, us, theta)
-
-    def backward(kept: Any, by_xs: Any) -> Any:
-        xs, us, theta = kept
-        gradients = (array(sim.nx), array(*us.shape), array(*theta.shape))
-        return jax.pure_callback(core.pullback, gradients, xs, us, theta, by_xs, vmap_method="broadcast_all")
-
-    states.defvjp(forward, backward)
+    states = _states(jax, core)
 
     def rollout(x0: Any, us: Any, theta: Any = None) -> Any:
         """States (T + 1, nx) from x0 (nx,) under us (T, nu); see `to_jax`."""
@@ -81,3 +63,28 @@ def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpac
         return rollout(x, u[None], theta)[1]
 
     return Functions(step, rollout)
+
+
+def _states(jax: Any, core: Rollouts) -> Any:
+    """`core.states` of arrays of JAX, with its pullback."""
+    nx = core.sim.nx
+
+    def array(*shape: int) -> Any:
+        return jax.ShapeDtypeStruct(shape, "float64")
+
+    @jax.custom_vjp
+    def states(x0: Any, us: Any, theta: Any) -> Any:
+        xs = array(us.shape[0] + 1, nx)
+        return jax.pure_callback(core.states, xs, x0, us, theta, vmap_method="broadcast_all")
+
+    def forward(x0: Any, us: Any, theta: Any) -> Any:
+        xs = states(x0, us, theta)
+        return xs, (xs, us, theta)
+
+    def backward(kept: Any, by_xs: Any) -> Any:
+        xs, us, theta = kept
+        gradients = (array(nx), array(*us.shape), array(*theta.shape))
+        return jax.pure_callback(core.pullback, gradients, xs, us, theta, by_xs, vmap_method="broadcast_all")
+
+    states.defvjp(forward, backward)
+    return states

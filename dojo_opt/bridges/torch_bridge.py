@@ -35,13 +35,42 @@ def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSp
     except ImportError:
         raise ImportError(f'{_CALL} needs PyTorch: pip install "dojo-opt[torch]"') from None
     core = Rollouts(_CALL, sim, kappa, parameters)
+    states = _states(torch, core)
+
+    def rollout(x0: Any, us: Any, theta: Any = None) -> Any:
+        """States (..., T + 1, nx) from x0 (..., nx) under us (..., T, nu); see `to_torch`."""
+        n = core.sizes(theta)
+        x0, us = _doubles(torch, "x0", x0), _doubles(torch, "us", us)
+        theta = us.new_zeros(0) if theta is None else _doubles(torch, "theta", theta)
+        ends = {"x0": (x0, (sim.nx,)), "us": (us, ("T", sim.nu)), "theta": (theta, (n,))}
+        core.check(**{name: (tuple(t.shape[-len(wanted) :]), wanted) for name, (t, wanted) in ends.items()})
+        lead = torch.broadcast_shapes(x0.shape[:-1], us.shape[:-2], theta.shape[:-1])
+        return states(x0.expand(*lead, -1), us.expand(*lead, -1, -1), theta.expand(*lead, -1))
+
+    def step(x: Any, u: Any, theta: Any = None) -> Any:
+        """The states (..., nx) after x (..., nx) under u (..., nu); see `to_torch`."""
+        u = _doubles(torch, "u", u)
+        core.check(u=(tuple(u.shape[-1:]), (sim.nu,)))
+        return rollout(x, u[..., None, :], theta)[..., 1, :]
+
+    return Functions(step, rollout)
+
+
+def _doubles(torch: Any, name: str, value: Any) -> Any:
+    """The argument as a tensor; one of other numbers than doubles is refused."""
+    tensor = torch.as_tensor(value)
+    if tensor.dtype != torch.float64:
+        raise TypeError(f"{_CALL}: argument {name}: expected a tensor of doubles, got {tensor.dtype}")
+    return tensor
+
+
+def _states(torch: Any, core: Rollouts) -> Any:
+    """`core.states` of tensors, with its pullback."""
 
     def array(tensor: Any) -> Any:
         return tensor.detach().cpu().numpy()
 
     class States(torch.autograd.Function):
-        """core.states with its pullback."""
-
         @staticmethod
         def forward(ctx: Any, x0: Any, us: Any, theta: Any) -> Any:
             xs = torch.from_numpy(core.states(*map(array, (x0, us, theta)))).to(us.device)
@@ -54,32 +83,4 @@ def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSp
             gradients = core.pullback(*map(array, (*ctx.saved_tensors, by_xs)))
             return tuple(torch.from_numpy(g).to(by_xs.device) for g in gradients)
 
-    def tensor(name: str, value: Any) -> Any:
-        value = torch.as_tensor(value)
-        if value.dtype != torch.float64:
-            raise TypeError(f"{_CALL}: argument {name}: expected a tensor of doubles, got {value.dtype}")
-        return value
-
-    def rollout(x0: Any, us: Any, theta: Any = None) -> Any:
-        """States (..., T + 1, nx) from x0 (..., nx) under us (..., T, nu); see `to_torch`."""
-        n = core.sizes(theta)
-        x0, us = tensor("x0", x0), tensor("us", us)
-        theta = us.new_zeros(0) if theta is None else tensor("theta", theta)
-        tails = {
-            "x0": (x0.shape[-1:], (sim.nx,)),
-            "us": (us.shape[-2:], ("T", sim.nu)),
-            "theta": (theta.shape[-1:], (n,)),
-        }
-        core.check(**{name: (tuple(got), wanted) for name, (got, wanted) in tails.items()})
-        lead = torch.broadcast_shapes(x0.shape[:-1], us.shape[:-2], theta.shape[:-1])
-        return States.apply(
-            x0.expand(*lead, sim.nx), us.expand(*lead, *us.shape[-2:]), theta.expand(*lead, theta.shape[-1])
-        )
-
-    def step(x: Any, u: Any, theta: Any = None) -> Any:
-        """The states (..., nx) after x (..., nx) under u (..., nu); see `to_torch`."""
-        u = tensor("u", u)
-        core.check(u=(tuple(u.shape[-1:]), (sim.nu,)))
-        return rollout(x, u[..., None, :], theta)[..., 1, :]
-
-    return Functions(step, rollout)
+    return States.apply
