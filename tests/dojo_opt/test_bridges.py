@@ -14,6 +14,7 @@ from dojo_opt.bridges.rollouts import Rollouts
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=0.02, kappa=1e-3, tolerance=1e-11)
 PENDULUM = dojo.Simulator(dojo.models.pendulum(), time_step=0.05, tolerance=1e-12)
+LOOP = dojo.Simulator(dojo.models.fourbar(), time_step=0.01, tolerance=1e-12)
 SPACE = dojo.ParameterSpace(HOPPER, ("friction:*",), bodies=("foot",))
 
 
@@ -110,14 +111,18 @@ def test_jax_has_gradients_through_jit_and_vmap(jax: Any) -> None:
         np.testing.assert_allclose(ours, theirs, atol=1e-8 * np.abs(theirs).max())
 
 
-def test_jax_step_has_the_jacobians_of_the_simulator(jax: Any) -> None:
-    step, rollout = dojo.bridges.to_jax(PENDULUM)
-    x, u = np.array([0.4, -1.0]), np.array([0.3])
+@pytest.mark.parametrize("sim", [PENDULUM, PENDULUM.replace(order=4), LOOP], ids=["tree", "order 4", "loop"])
+def test_jax_step_has_the_jacobians_of_the_simulator(jax: Any, sim: dojo.Simulator) -> None:
+    step, rollout = dojo.bridges.to_jax(sim)
+    x, u = sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv)), np.full(sim.nu, 0.3)
     A, B = jax.jacrev(step, argnums=(0, 1))(x, u)
-    for ours, theirs in zip((A, B), PENDULUM.linearize(x, u), strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=1e-12)
-    np.testing.assert_array_equal(step(x, u), PENDULUM.step(x, u).x)
-    np.testing.assert_array_equal(rollout(x, np.zeros((3, 1))), PENDULUM.rollout(x, np.zeros((3, 1))).x)
+    for ours, theirs in zip((A, B), sim.linearize(x, u), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())
+    np.testing.assert_array_equal(step(x, u), sim.step(x, u).x)
+    for steps in (0, 3):
+        us = np.zeros((steps, sim.nu))
+        np.testing.assert_array_equal(rollout(x, us), sim.rollout(x, us).x)
+    np.testing.assert_array_equal(jax.grad(lambda x: rollout(x, us[:0])[0, 0])(x), np.eye(sim.nx)[0])
 
 
 def test_jax_large_batches_come_back(jax: Any) -> None:
