@@ -59,6 +59,7 @@ __all__ = [
     "UrdfError",
     "UrdfMechanism",
     "UrdfWarning",
+    "bridges",
     "closed_loop",
     "constraint",
     "cost",
@@ -121,6 +122,7 @@ _HOME: dict[str, str | None] = {
     "UrdfError": "sim.urdf.xml",
     "UrdfMechanism": "sim.urdf.report",
     "UrdfWarning": "sim.urdf.report",
+    "bridges": None,
     "closed_loop": "dojo_opt.plant.loop",
     "constraint": None,
     "cost": None,
@@ -141,7 +143,7 @@ _HOME: dict[str, str | None] = {
 }
 
 if TYPE_CHECKING:
-    from dojo_opt import constraint, cost, gaits, models, plots, problems, report, tasks, viewer
+    from dojo_opt import bridges, constraint, cost, gaits, models, plots, problems, report, tasks, viewer
     from dojo_opt.environment import Environment
     from dojo_opt.mpc.controller import MPC
     from dojo_opt.mpc.moving import Sampled

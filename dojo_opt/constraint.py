@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.names import chosen_components, chosen_inputs, component_name
 from dojo_opt.residual import ResidualKernels, check_residual
-from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table
+from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, numbers, state_table
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
@@ -41,7 +41,12 @@ class Goal:
 def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: Integers) -> tuple[Any, Integers, Vector]:
     """Reference, repeated components and signs of  lower - z <= 0  and  z - upper <= 0, infinite bounds left out."""
     columns = chosen.size
-    with_inf = [np.broadcast_to(np.asarray(b, dtype=float), (rows, columns)) for b in (lower, upper)]
+    with_inf = []
+    for side, bound in (("lower", lower), ("upper", upper)):
+        given = numbers(f"{call}({side}=...)", bound)
+        if given.shape not in ((), (columns,), (rows, columns)):
+            raise ValueError(f"{call}({side}=...): expected shape () or ({columns},), got {given.shape}")
+        with_inf.append(np.broadcast_to(given, (rows, columns)))
     if np.any(np.isnan(with_inf)) or np.any(with_inf[0] > with_inf[1]):
         raise ValueError(f"{call}: expected lower <= upper, got lower {lower!r}, upper {upper!r}")
     keep = [np.any(np.isfinite(b), axis=0) for b in with_inf]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import input_weight, state_weight
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
+from sim import checks
 
 Integers = NDArray[np.int64]
 
@@ -30,10 +31,11 @@ class Spec(Protocol):
 
 
 def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale: float) -> NDArray[np.float64]:
-    weight = table(call, value, rows, columns)
-    if np.any(weight < 0.0) or not scale >= 0.0:
-        raise ValueError(f"{call}: expected no negative weight and scale, got min {weight.min()}, scale {scale}")
-    return scale * weight
+    """scale * value as a table (rows, columns) of numbers >= 0."""
+    weight = table(f"{call}(weight=...)", value, rows, columns)
+    if np.any(weight < 0.0):
+        raise ValueError(f"{call}(weight=...): expected no negative weight, got {weight.min():g}")
+    return checks.number(f"{call}(scale=...)", scale, at_least=0.0) * weight
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Tracking:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
         reference = state_table("Tracking(reference=...)", self.reference, knots.size, sim.nx, layout)
         named = state_weight("Tracking(weight=...)", self.weight, sim)
-        weight = _checked_weight("Tracking(weight=...)", named, knots.size, sim.ndx, self.scale)
+        weight = _checked_weight("Tracking", named, knots.size, sim.ndx, self.scale)
         return StateTerm("Tracking", knots, weight, reference, layout)
 
 
@@ -74,7 +76,7 @@ class Effort:
         knots = np.arange(horizon)
         reference = table("Effort(reference=...)", self.reference, horizon, sim.nu)
         named = input_weight("Effort(weight=...)", self.weight, sim)
-        weight = _checked_weight("Effort(weight=...)", named, horizon, sim.nu, self.scale)
+        weight = _checked_weight("Effort", named, horizon, sim.nu, self.scale)
         pick = Pick(False, np.arange(sim.nu), sim.ndx + np.arange(sim.nu), np.ones(sim.nu))
         return PickTerm("Effort", knots, weight, reference, pick)
 
@@ -100,6 +102,6 @@ class ResidualCost:
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)
         knots = knot_list("ResidualCost(knots=...)", self.knots, horizon, last=True)
-        weight = _checked_weight("ResidualCost(weight=...)", self.weight, knots.size, self.dimension, self.scale)
+        weight = _checked_weight("ResidualCost", self.weight, knots.size, self.dimension, self.scale)
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
         return ResidualTerm("ResidualCost", knots, weight, False, kernels, layout)

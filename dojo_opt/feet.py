@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.cross import cross
 from sim import checks
 from sim.simulator import Simulator
 
@@ -51,8 +52,8 @@ class Feet:
         """Centres (..., k, 3) of the balls at the states x (..., nx), world axes [m]."""
         z = self.sim.maximal(x)[..., self._body, :]
         w, v = z[..., 6:7], z[..., 7:10]
-        side = np.cross(v, self._point)
-        return np.asarray(z[..., :3] + self._point + 2.0 * (w * side + np.cross(v, side)))
+        side = cross(v, self._point)
+        return np.asarray(z[..., :3] + self._point + 2.0 * (w * side + cross(v, side)))
 
     def gaps(self, x: ArrayLike) -> Array:
         """Distances (..., k) of the balls from the ground [m]."""
@@ -77,9 +78,9 @@ class Feet:
         """The same with the points of the balls nearest to the ground at x (nx,), instead of their centres."""
         z = self.sim.maximal(x)[self._body]
         w, v, arm = z[:, 6:7], -z[:, 7:10], -self.radius[:, None] * self.normals(x)
-        side = np.cross(v, arm)
+        side = cross(v, arm)
         other = copy.copy(self)
-        other._point = self._point + arm + 2.0 * (w * side + np.cross(v, side))
+        other._point = self._point + arm + 2.0 * (w * side + cross(v, side))
         return other
 
     def jacobian(self, x: ArrayLike) -> Array:

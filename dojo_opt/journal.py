@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from dojo_opt.options import Options
-from dojo_opt.plan import table_header, table_line
+from dojo_opt.plan import HEADER, table_line
 from solvers.status import Status
 
 
@@ -38,7 +38,7 @@ class Journal:
         self.records.append(record)
         if self._options.verbose:
             if len(self.records) == 1:
-                self._options.say(table_header())
+                self._options.say(HEADER)
             self._options.say(table_line(record))
         if self._options.callback is not None:
             try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dojo_opt import models
 from dojo_opt.constraint import Goal
@@ -14,7 +15,10 @@ from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
 from sim import checks
+from sim.border import whole
 from sim.simulator import Simulator
+
+Array = NDArray[np.float64]
 
 __all__ = ["leap"]
 
@@ -43,34 +47,24 @@ def leap(
     crouch and the landing the base is that much higher than at first, or the plan is no success. With refinement=1, the
     height is asked for and missed by up to some centimetres.
     """
-    sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step, kappa=PLANNED)
-    horizon = max(5, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
+    call = "problems.leap"
+    distance = checks.number(f"{call}(distance=...)", distance)
+    height = checks.number(f"{call}(height=...)", height)
+    duration = checks.number(f"{call}(duration=...)", duration, above=0.0)
+    crouch = checks.number(f"{call}(crouch=...)", crouch, at_least=0.0)
+    step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
+    refinement = whole(f"{call}(refinement=...)", refinement)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
     start, torques = equilibrium(sim)
-    goal, low = start.copy(), start.copy()
-    goal[0] += distance
-    low[2] -= checks.number("problems.leap(crouch=...)", crouch, at_least=0.0)
-    apex = start.copy()
-    apex[[0, 2]] += 0.5 * distance, height
+    low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
+    horizon = max(5, round(duration / step))
     down, up = round(0.2 * horizon), round(0.4 * horizon)
-    legs = sim.nv - 6
-    parts = [
-        np.array([1.0, 1.0, 20.0]),
-        np.full(3, 2.0),
-        np.full(legs, 0.05),
-        np.full(6, VELOCITY),
-        np.full(legs, RATE),
-    ]
+    poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
     problem = Problem(
         sim,
         start,
         horizon,
-        cost=[
-            Tracking(
-                np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up)),
-                time_step * np.concatenate(parts),
-            ),
-            Effort(time_step * EFFORT),
-        ],
+        cost=[Tracking(poses, step * _weights(sim.nv - 6)), Effort(step * EFFORT)],
         constraints=[Goal(goal, components=np.arange(6))],
         control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
         controls0=torques,
@@ -78,3 +72,15 @@ def leap(
     problem.refinement = refinement
     problem.refined_constraints = (Goal(apex, components=[2], knots=down + up // 2),)
     return problem
+
+
+def _moved(x: Array, ahead: float, up: float) -> Array:
+    """The state (nx,) with the base so far [m] ahead and up."""
+    out = x.copy()
+    out[[0, 2]] += ahead, up
+    return out
+
+
+def _weights(legs: int) -> Array:
+    """(12 + 2 legs,) weights of place, attitude, angles of the legs, velocities of the base, rates of the legs."""
+    return np.repeat([1.0, 20.0, 2.0, 0.05, VELOCITY, RATE], [2, 1, 3, legs, 6, legs])

@@ -18,6 +18,7 @@ from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
 from sim import checks
+from sim.border import whole
 from sim.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -57,12 +58,12 @@ def follow(
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
+    substeps = whole("problems.follow(substeps=...)", substeps)
     if (len(gait.x) - 1) % substeps:
         raise ValueError(f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are no multiple of {substeps}")
-    horizon = (len(gait.x) - 1) // substeps
     reference = gait.x[::substeps]
-    knot = sim.time_step * substeps
-    legs = sim.nv - 6
+    horizon = len(reference) - 1
+    knot, legs = sim.time_step * substeps, sim.nv - 6
     weight = np.concatenate([np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, ANGLE)])
     weight = np.concatenate([weight, np.full(6, VELOCITY), np.full(legs, RATE)])
     if guess == "reference":
@@ -185,7 +186,7 @@ def jump(
     assert isinstance(tracking, Tracking)
     path = np.asarray(tracking.reference)
     top = int(path[:, 2].argmax())
-    problem.refinement = refinement
+    problem.refinement = whole("problems.jump(refinement=...)", refinement)
     problem.refined_constraints = (Goal(path[top], components=[2], knots=top),)
     return problem
 
@@ -201,6 +202,6 @@ def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, 
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
     if follows.get("periodic") and gait is not gaits.jump:
         rest.setdefault("cycles", 1)
-    h = time_step / follows.get("substeps", 1)
+    h = time_step / whole("problems.follow(substeps=...)", follows.get("substeps", 1))
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
     return follow(gait(sim, **keywords, **rest), **follows)

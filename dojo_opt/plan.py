@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.border import whole
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -18,7 +19,7 @@ Stack = NDArray[np.float64]
 __all__ = ["Plan"]
 
 COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha", "gap", "viol", "ms")
-_HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
+HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
 
 
 def table_line(record: dict[str, Any]) -> str:
@@ -29,11 +30,6 @@ def table_line(record: dict[str, Any]) -> str:
         f"{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
         f"{r['kappa_grad']:7.0e} {r['mu']:7.0e} {alpha} {r['gap']:7.0e} {r['violation']:7.0e} {r['milliseconds']:6.2f}"
     )
-
-
-def table_header() -> str:
-    """Names of the columns of `table_line`."""
-    return _HEADER
 
 
 @dataclass(repr=False)
@@ -81,20 +77,18 @@ class Plan:
         fun is that of all cycles; multipliers, penalties and history stay behind. ValueError for a plan that does not
         repeat itself, or that was loaded from a file and knows no simulator.
         """
-        if isinstance(count, bool) or int(count) != count or count < 1:
-            raise ValueError(f"Plan.repeated(count): expected a positive number of cycles, got {count!r}")
+        n = whole("Plan.repeated(count)", count)
         if self.stride is None or self.problem is None:
             why = "its end is not its start (Periodic)" if self.stride is None else "it has no problem"
             raise ValueError(f"Plan.repeated: this plan cannot be repeated, {why}")
-        n, stride = int(count), self.stride
-        cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * stride) for i in range(n)]
+        cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * self.stride) for i in range(n)]
         u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
         x, fun = np.concatenate(cycles), n * self.fun
-        return replace(self, x=x, u=u, K=K, k=k, stride=n * stride, fun=fun, multipliers=[], penalties=[])
+        return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
 
     def summary(self) -> str:
         """The table of iterations and a closing line."""
-        lines = [_HEADER, *(table_line(r) for r in self.history)]
+        lines = [HEADER, *(table_line(r) for r in self.history)]
         return "\n".join([*lines, self.closing_line()])
 
     def closing_line(self) -> str:

@@ -117,11 +117,10 @@ class Problem:
         A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
         shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
         """
-        if isinstance(count, bool) or int(count) != count or count < 1:
-            raise ValueError(f"Problem.refined(count): expected a positive number of steps per step, got {count!r}")
+        count = whole("Problem.refined(count)", count)
         finer = copy.copy(self)
-        finer.sim = self.sim.replace(time_step=self.sim.time_step / int(count))
-        finer.substeps = self.substeps * int(count)
+        finer.sim = self.sim.replace(time_step=self.sim.time_step / count)
+        finer.substeps = self.substeps * count
         finer.refinement = 1
         finer.specs, finer.refined_constraints = (self.specs[0], (*self.specs[1], *self.refined_constraints)), ()
         finer.bind()

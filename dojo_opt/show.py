@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ def add_show(commands: Any) -> None:
     parser.add_argument("--drop", type=float, default=0.0, metavar="M", help="height that it falls from [m]")
     parser.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the motion")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
+    parser.add_argument("--json", action="store_true", help="print sizes and motion as JSON, and no text")
 
 
 def load(args: argparse.Namespace) -> dojo.Mechanism:
@@ -44,15 +46,35 @@ def load(args: argparse.Namespace) -> dojo.Mechanism:
     return found
 
 
+def _numbers(sim: dojo.Simulator, motion: dojo.Trajectory) -> dict[str, Any]:
+    """Sizes of the robot and its motion, as `dojo-opt run --json` has those of a plan."""
+    mechanism = sim.mechanism
+    report = getattr(mechanism, "report", None)  # of files
+    return {
+        "robot": mechanism.name,
+        **{name: getattr(sim, name) for name in ("nbody", "nq", "nv", "nu", "ncontact")},
+        "bodies": list(mechanism.body_names),
+        "joints": list(mechanism.joint_names),
+        "report": None if report is None else str(report),
+        "success": motion.success,
+        "status": int(motion.status),
+        "message": motion.message,
+        "seconds": float(motion.time[-1]),
+        "time": motion.time.tolist(),
+        "x": motion.x.tolist(),
+    }
+
+
 def show(args: argparse.Namespace) -> int:
     """Print, simulate, draw; returns the exit status."""
     checks.number("--seconds", args.seconds, above=0.0)
     checks.number("--drop", args.drop)
     mechanism = load(args)
     sim = dojo.Simulator(mechanism, time_step=args.time_step)
-    print(sim.describe())
-    if getattr(mechanism, "report", None) is not None:
-        print(mechanism.report)  # type: ignore[attr-defined]
+    if not args.json:
+        print(sim.describe())
+        if getattr(mechanism, "report", None) is not None:
+            print(mechanism.report)  # type: ignore[attr-defined]
     x = sim.neutral()
     if args.drop and mechanism.joints[0].kind != "floating":
         raise ValueError(
@@ -61,11 +83,14 @@ def show(args: argparse.Namespace) -> int:
     if args.drop:
         x[2] += args.drop
     motion = sim.rollout(x, np.zeros((max(1, round(args.seconds / args.time_step)), sim.nu)))
-    print(f"let go for {motion.time[-1]:g} s, inputs zero: {motion.message}")
     if args.out:
         dojo.plots.trajectory(motion).savefig(args.out, dpi=150)
     if args.html:
         dojo.viewer.save_html(motion, args.html)
+    if args.json:
+        print(json.dumps(_numbers(sim, motion)))
+        return 0 if motion.success else 1
+    print(f"let go for {motion.time[-1]:g} s, inputs zero: {motion.message}")
     for path in filter(None, (args.out, args.html)):
         print(f"wrote {path}")
     return 0 if motion.success else 1

@@ -18,6 +18,7 @@ from dojo_opt.options import PLANNED
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim import checks
+from sim.border import whole
 from sim.checks import nearest
 from sim.simulator import Simulator
 from sim.terrain.terrain import Terrain
@@ -80,6 +81,7 @@ def hopper_mpc(
     the velocity keeps the body from leaning further than friction holds on the way back.
     """
     knot, horizon = 0.05, 20
+    substeps = whole("tasks.hopper_mpc(substeps=...)", substeps)
     sim = Simulator(models.raiberthopper(), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     weight = np.array([10.0, 10.0, 10.0, 1.0, 1.0, 0.1, 1.0, 1.0, 1.0] + [0.01] * 5)
@@ -117,6 +119,7 @@ def quadruped_mpc(
     friction of .4 where the robot's feet have .8: what they ask for is there on slippery ground, too.
     """
     knot, horizon, limit = 0.04, 20, 33.5
+    substeps = whole("tasks.quadruped_mpc(substeps=...)", substeps)
     sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps, kappa=PLANNED)
     fine = gaits.trot(level.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
     advance = sim.difference(fine.x[-1], fine.x[0])
@@ -155,7 +158,12 @@ class _OnTerrain:
 
 
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
-    """The plant that belongs to an MPC: that of its problem with a finer step and harder contact, perturbed."""
+    """The plant of an MPC: its problem's simulator with a time step [s] and kappa [N s m] of its own, perturbed.
+
+    perturbation: fields of `dojo.Perturbation` by name.
+    """
+    if not isinstance(mpc, MPC):
+        raise TypeError(f"tasks.plant(mpc): expected an MPC, got {mpc!r}")
     return Plant(mpc.nominal.replace(time_step=time_step, kappa=kappa), mpc.start, **perturbation)
 
 

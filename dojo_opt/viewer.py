@@ -15,6 +15,7 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from sim import shapes
+from sim.build import contact_frame
 from sim.parts import WORLD
 from sim.polytope import Polytope
 from sim.simulator import Simulator
@@ -119,11 +120,9 @@ def _ground(m: Motion) -> list[Any]:
         if (normal, height) == ((0.0, 0.0, 1.0), 0.0):
             commands += _floor()
             continue
-        n = np.asarray(normal)
-        side = np.cross(n, [0.0, 1.0, 0.0] if abs(n[1]) < 0.9 else [1.0, 0.0, 0.0])
-        side /= np.linalg.norm(side)
+        n, *sides = contact_frame(normal)
         place = np.eye(4)
-        place[:3, :3] = np.stack([side, np.cross(n, side), n], axis=1)
+        place[:3, :3] = np.stack([*sides, n], axis=1)
         place[:3, 3] = (height - 0.5 * _THICK) * n
         node = Node(("meshcat", "ground", str(k)))
         commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]

@@ -12,7 +12,6 @@ from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Law, Model
 from solvers.late import LateKernel
 
-_HARD = (late.step, late.interior_point, late.worst_contact, late.report_contacts)
 _LOOPS = (
     late.factor_coupling,
     late.solve_coupling,

@@ -106,7 +106,7 @@ class Border:
         turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
         for bad, what in (
             (np.abs(length - 1.0) > _UNIT, "expected a unit quaternion"),
-            (turn >= np.pi, MESSAGES[Status(5)]),
+            (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
         ):
             if bad.any():
                 raise ValueError(
@@ -145,6 +145,6 @@ def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
 
 def whole(call: str, value: Any, least: int = 1) -> int:
     """`value` as a whole number of at least `least`."""
-    if not isinstance(value, int | np.integer) or value < least:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
     return int(value)

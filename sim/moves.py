@@ -18,7 +18,7 @@ from sim.late import swing_pose, swing_turn
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.jit import inlined, kernel
 
 
 class Increment(NamedTuple):
@@ -73,6 +73,18 @@ def slide(model: Model, work: Work, by: Increment, i: int, E: Mat3, dx: Vec3, S:
         b = by.h * by.v[d]
         x, y, z = x + a * g0 + b * s[0], y + a * g1 + b * s[1], z + a * g2 + b * s[2]
     return x, y, z
+
+
+@inlined
+def turned_columns(model: Model, work: Work, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of the rotations of joint i: their axes at 2 turned with the parent, through o from O; E: of the parent.
+
+    Not those of a joint with two rotations.
+    """
+    for d in range(model.body_vadr[i + 1] - model.joint_nrot[i], model.body_vadr[i + 1]):
+        s = work.S2[d]
+        x, y, z = times(E, s[3], s[4], s[5])
+        axis_column(S, d, s[3] + x, s[4] + y, s[5] + z, o[0], o[1], o[2])
 
 
 @kernel
@@ -132,10 +144,7 @@ def tree_moves(model: Model, work: Work, by: Increment, third: bool) -> None:
             if t[0] < 0.0:
                 t = (-t[0], -t[1], -t[2], -t[3])
             if n != 2:
-                for d in range(model.body_vadr[i + 1] - n, model.body_vadr[i + 1]):
-                    s = work.S2[d]
-                    x, y, z = times(E, s[3], s[4], s[5])
-                    axis_column(S, d, s[3] + x, s[4] + y, s[5] + z, o[0], o[1], o[2])
+                turned_columns(model, work, i, E, o, S)
             E = turn_matrix(t)
             if n == 2:
                 swing_columns(model, work, theta, i, E, o, S)

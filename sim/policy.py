@@ -15,7 +15,7 @@ from sim.model import Matrix, Vector
 from sim.options import Guess
 from sim.rollout import Cube, begin
 from sim.state import integrate_state, state_difference
-from solvers.dense import copy, dot
+from solvers.dense import copy, copy_vector, dot
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -88,8 +88,7 @@ def closed_loop(
     dx = work.chain[0][:ndx]
     velocity = work.step_x[1, nq:]
     total = 0.0
-    for k in range(x.shape[0]):
-        path.xs[0, k] = x[k]
+    copy_vector(x, path.xs[0])
     for t in range(path.us.shape[0]):
         u = path.us[t]
         state_difference(model, policy.xs[t], path.xs[t], dx)
@@ -103,11 +102,9 @@ def closed_loop(
             copy(policy.bounds[t], work.bound)
         known = t > 0 or policy.cones.shape[0] > 0
         b = path.xs[t + 1]
-        for k in range(x.shape[0]):
-            b[k] = path.xs[t, k]
+        copy_vector(path.xs[t], b)
         for s in range(substeps):
-            for k in range(x.shape[0]):
-                work.step_x[0, k] = b[k]
+            copy_vector(b, work.step_x[0])
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
             if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t
@@ -118,8 +115,7 @@ def closed_loop(
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
-            for k in range(x.shape[0]):
-                work.step_x[0, k] = b[k]
+            copy_vector(b, work.step_x[0])
             integrate_state(model, work.step_x[0], dx, b)
     path.report[1] = total
     return path.us.shape[0]

@@ -68,7 +68,7 @@ class StepResult:
 
     x: Floats  # (nx,)
     status: Status
-    iterations: int
+    iterations: int  # of Newton's method; where loops have the step solved again, of all its solves
     residual: float  # largest error of a balance or gap equation [N s, m]
     violation: float  # largest |product - kappa| of the complementary pairs
     contacts: Contacts

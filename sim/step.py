@@ -30,6 +30,12 @@ _LEADS = 2  # times that directions of loops are found anew
 
 
 @inlined
+def _after(r: Outcome, last: Outcome) -> Outcome:
+    """The last of several solves, with the iterations of all."""
+    return Outcome(last.status, r.iterations + last.iterations, last.residual, last.violation)
+
+
+@inlined
 def _checked(model: Model, work: Work, options: Options, v: Vector, r: Outcome) -> Outcome:
     """The outcome of a step, refused where the forces of loops gave energy (coupling/loop_work.py)."""
     if r.status == _SOLVED and loops_gained(model, work, options, v):
@@ -43,22 +49,23 @@ def solve_branch(
 ) -> Outcome:
     """`solve` on the branch of the loops' motion (coupling/loop_motion.py and loop_lead.py).   inputs: (q, v, u)."""
     q, v, u = inputs
+    r = Outcome(_SOLVED, 0, 0.0, 0.0)
     if loops_regular(model, work):
-        r = solve(model, work, options, q, v, u, guess)
+        r = _after(r, solve(model, work, options, q, v, u, guess))
         if stay_regular(model, work, r.status):
             return _checked(model, work, options, v, r)
         guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)
-    r = solve(model, work, options, q, v, u, guess)
+    r = _after(r, solve(model, work, options, q, v, u, guess))
     if r.status == _SOLVED and meet_ahead(model, work):
-        r = solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses))
+        r = _after(r, solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
         if is_farther(model, work, r.status):
-            r = solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses))
+            r = _after(r, solve(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
     for _ in range(_LEADS):
         if r.status != _SOLVED or not lead_again(model, work, options.h, q):
             break
-        r = solve(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses))
+        r = _after(r, solve(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses)))
     return _checked(model, work, options, v, r)
 
 

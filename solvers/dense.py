@@ -26,6 +26,13 @@ def copy(A: Matrix, out: Matrix) -> None:
 
 
 @kernel
+def copy_vector(a: Vector, out: Vector) -> None:
+    """out = a"""
+    for i in range(a.shape[0]):
+        out[i] = a[i]
+
+
+@kernel
 def dot(a: Vector, b: Vector) -> float:
     """a . b, as four sums, which vectorise."""
     n = a.shape[0]

@@ -143,7 +143,10 @@ class Kernel:
         """By its name; a kernel made inside a function by its code, compiled anew where it is loaded."""
         return self.py_func.__qualname__ if self.keep else custom_reduce(Kernel, {"func": self.py_func})
 
-    _rebuild = classmethod(lambda cls, func: local_kernel(func))
+    @classmethod
+    def _rebuild(cls, func: Callable[..., Any]) -> Any:
+        """What Numba's unpickling calls with what `__reduce__` kept."""
+        return local_kernel(func)
 
     @cached_property
     def entry(self) -> _Form:
@@ -209,9 +212,7 @@ def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
 
 
 def local_kernel(func: F) -> F:
-    """A kernel made inside a function, around another kernel: Numba never finds such a closure in its cache again, so
-    it is compiled once per process and leaves no file behind.
-    """
+    """A kernel made inside a function: Numba never finds such a closure in its cache, so it leaves no file there."""
     return cast(F, _registered(Kernel(func, keep=False)))
 
 

@@ -25,6 +25,10 @@ class Status(IntEnum):
     INFEASIBLE = 14
     STOPPED = 15
 
+    def __str__(self) -> str:
+        """The name, where an IntEnum prints its number."""
+        return self.name
+
 
 MESSAGES: dict[Status, str] = {
     Status.SOLVED: "Solved to the requested tolerance.",

@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 from sim.mechanism import Mechanism
 from sim.parts import KINDS, Body, Contact, Joint
+from sim.shapes import Sphere
 
 Floats = NDArray[np.float64]
+BALL = Sphere(0.1)
+INF = float("inf")
 
 
 def unit_quaternion(rng: np.random.Generator) -> Floats:
@@ -66,3 +69,17 @@ def random_state(rng: np.random.Generator, mech: Mechanism, speed: float = 1.0) 
             stop = mech.q_slice(joint.name).stop
             q[stop - 4 : stop] = unit_quaternion(rng)
     return q, speed * rng.normal(size=mech.nv)
+
+
+def two(**changes: object) -> Mechanism:
+    """A floating body with a hinged one, and what the test wants to be wrong with it."""
+    parts: dict[str, object] = {
+        "bodies": [Body("torso", shape=BALL), Body("leg", shape=BALL)],
+        "joints": [Joint("floating", None, "torso"), Joint("revolute", "torso", "leg", name="hip")],
+        "name": "robot",
+    }
+    return Mechanism(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+def hip(**changes: object) -> Joint:
+    return Joint("revolute", "torso", "leg", name="hip", **changes)  # type: ignore[arg-type]

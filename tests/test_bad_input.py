@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from refusals import check_refused
 from scenes import ball, block, chain, free_body, pendulum, run
 
 import dojo_opt as dojo
@@ -87,11 +88,7 @@ PARTS = {
 
 @pytest.mark.parametrize("case", PARTS)
 def test_mechanism(case):
-    build, *words = PARTS[case]
-    with pytest.raises(ValueError) as error:
-        build()
-    for word in words:
-        assert word in str(error.value), str(error.value)
+    check_refused(*PARTS[case])
 
 
 def hopper():
@@ -136,11 +133,7 @@ CALLS = {
 
 @pytest.mark.parametrize("case", CALLS)
 def test_simulator(case):
-    call, *words = CALLS[case]
-    with pytest.raises((ValueError, TypeError)) as error:
-        call()
-    for word in words:
-        assert word in str(error.value), str(error.value)
+    check_refused(*CALLS[case])
 
 
 @pytest.mark.parametrize("mech", [free_body(), block(), chain("spherical", 1)])
@@ -192,63 +185,7 @@ def test_a_step_that_failed_is_not_used():
     assert np.isfinite(trajectory.x[: trajectory.knot + 1]).all()
 
 
-def test_deep_overlap_at_the_start_is_solved():
-    """A state below the ground is not an error: the step pushes it out."""
-    sim = dojo.Simulator(block(), time_step=0.01)
-    xs = run(sim, state(_2=-0.5), 3)
-    assert xs[1][2] > 0.25
-
-
 def test_pendulum_may_turn_by_any_angle():
     """Angles of hinges are not wrapped."""
     sim = dojo.Simulator(pendulum(1), time_step=0.01)
     assert run(sim, np.array([50.0 * np.pi, 1.0]), 5)[-1][0] > 50.0 * np.pi
-
-
-def pair_of_boxes(distance, **settings):
-    box = dojo.Box(0.4, 0.4, 0.4)
-    bodies = [dojo.Body(n, 1.0, shape=box) for n in "ab"]
-    joints = [dojo.Joint("floating", None, n) for n in "ab"]
-    mech = dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b")], gravity=(0, 0, 0))
-    sim = dojo.Simulator(mech, time_step=0.01, **settings)
-    x = sim.neutral()
-    x[0] = distance
-    return sim, x
-
-
-@pytest.mark.parametrize("depth", [1e-3, 0.05, 0.2])
-def test_a_start_in_overlap_is_moved_apart_in_the_first_step(depth):
-    """As documented by Collision: at the speed of the overlap over the time step; momentum is kept."""
-    sim, x = pair_of_boxes(0.4 - depth, kappa=1e-9)
-    t = sim.rollout(x, np.zeros((3, 0)))
-    assert t.success, t.message
-    assert t.contacts.gap.min() > 0.0
-    speeds = t.x[1, [sim.nq, sim.nq + 6]]
-    np.testing.assert_allclose(speeds, np.array([0.5, -0.5]) * depth / 0.01, rtol=1e-2)
-    np.testing.assert_allclose(sim.momentum(t.x)[0], 0.0, atol=1e-6)
-
-
-def test_a_second_hinge_on_the_same_axis_changes_nothing():
-    """Two joints on one pair of bodies: the second one closes a loop, and all that it says is known already."""
-    door = dojo.Body("door", 1.0, (0.1, 0.1, 0.1))
-    hinge = {"axis": (0, 1, 0), "child_point": (0, 0, 0.5)}
-    first = dojo.Joint("revolute", None, "door", name="upper", **hinge)
-    second = dojo.Joint("revolute", None, "door", name="lower", close=True, axis=(0, 1, 0), parent_point=(0, 0.3, 0),
-                        child_point=(0, 0.3, 0.5))  # fmt: skip
-    runs = []
-    for joints in ([first], [first, second]):
-        sim = dojo.Simulator(dojo.Mechanism([door], joints), time_step=0.01)
-        runs.append(sim.rollout(np.array([1.0, 0.0]), np.zeros((50, sim.nu)), throw=True).x)
-    np.testing.assert_allclose(runs[0], runs[1], atol=1e-7)
-
-
-def test_hinges_across_one_another_hold_the_body_still():
-    """An over-constrained loop that fits together: nothing can move, and nothing does."""
-    door = dojo.Body("door", 1.0, (0.1, 0.1, 0.1))
-    joints = [
-        dojo.Joint("revolute", None, "door", name="hinge", axis=(0, 1, 0), child_point=(0, 0, 0.5)),
-        dojo.Joint("revolute", None, "door", name="cross", axis=(1, 0, 0), child_point=(0, 0, 0.5), close=True),
-    ]
-    sim = dojo.Simulator(dojo.Mechanism([door], joints), time_step=0.01)
-    t = sim.rollout(sim.neutral(), np.zeros((20, sim.nu)), throw=True)
-    np.testing.assert_allclose(t.x, 0.0, atol=1e-8)

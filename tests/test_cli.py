@@ -132,6 +132,15 @@ def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, caps
     assert "shoulder" in text and "robot.urdf: 7 links" in text
 
 
+def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = branched(tmp_path)
+    assert cli.main(["show", str(path), "--seconds", "0.05", "--json"]) == 0
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers["success"] is True and numbers["status"] == 0
+    assert len(numbers["bodies"]) == numbers["nbody"] and "robot.urdf: 7 links" in numbers["report"]
+    assert np.shape(numbers["x"]) == (11, numbers["nq"] + numbers["nv"]) and len(numbers["time"]) == 11
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

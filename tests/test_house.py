@@ -111,6 +111,13 @@ def test_the_python_of_the_pages_runs(page: str, tmp_path: Path) -> None:
     python("\n".join(blocks), cwd=tmp_path)
 
 
+def test_the_python_for_jax_runs(tmp_path: Path) -> None:
+    pytest.importorskip("jax")
+    blocks = re.findall(r"```py\n(.*?)```", (ROOT / "docs/guide.md").read_text(), flags=re.DOTALL)
+    assert len(blocks) == 1
+    python("import numpy as np, dojo_opt as dojo\n" + blocks[0], cwd=tmp_path)
+
+
 def test_files_stay_readable() -> None:
     long = {}
     for package in PACKAGES:

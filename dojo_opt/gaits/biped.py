@@ -39,6 +39,8 @@ def step(
     Feet are the bodies at the ends of the tree that have contacts: two, with three contacts or more each, or the
     ankles would be free. ValueError: they are not two, or a foot cannot reach its place.
     """
+    for name, value in (("length", length), ("step_height", step_height), ("lower", lower)):
+        checks.number(f"gaits.step({name}=...)", value)
     feet = Feet(sim)
     owner = np.array([contact.body for contact in feet.contacts])
     names = list(dict.fromkeys(owner.tolist()))

@@ -84,7 +84,8 @@ def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
     feet, ground = Feet(sim), _ground(sim)
     base = np.tile(sim.neutral()[:7], (steps + 2, 1))
-    base[:, 2] = base[0, 2] if height is None else height
+    if height is not None:
+        base[:, 2] = checks.number("gaits.stand(height=...)", height)
     places = np.tile(ground, (steps + 2, 1, 1))
     return assemble(sim, "stand", base, places, np.ones(places.shape[:2], dtype=bool), names=feet.names)
 
@@ -196,10 +197,13 @@ def _periodic(
     _check_legs(call, sim)
     for what, value in (("speed", speed), ("lateral", lateral), ("heading_rate", heading_rate)):
         checks.number(f"{call}({what}=...)", value)
-    if not 0.0 < duty < 1.0:
+    if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
     whole(f"{call}(cycles=...)", cycles)
-    checks.number(f"{call}(step_height=...)", step_height, at_least=0.0)
+    for what, value in (("step_height", step_height), ("tilt", tilt)):
+        checks.number(f"{call}({what}=...)", value, at_least=0.0)
+    if height is not None:
+        checks.number(f"{call}(height=...)", height)
     steps = _whole(f"{call}(period=...)", period, sim.time_step) * cycles
     feet, ground, neutral = Feet(sim), _ground(sim), sim.neutral()
     places = ground[:, :2] - neutral[:2]

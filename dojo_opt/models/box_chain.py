@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sim.border import whole
 from sim.parts import Body, Joint
 from sim.shapes import Box
 
@@ -16,8 +17,7 @@ def box_chain(
     joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
     each joint. ValueError: n is no whole number of boxes; the message names `call`.
     """
-    if not isinstance(n, int) or n < 1:
-        raise ValueError(f"{call}(n): expected a whole number >= 1, got {n!r}")
+    n = whole(f"{call}(n)", n)
     links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]
     front, rear = (size[0] / 2, 0.0, 0.0), (-size[0] / 2, 0.0, 0.0)
     joints = [Joint("floating", None, "link_0", name="base")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.border import whole
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
 from sim.shapes import Box
@@ -30,8 +31,7 @@ def npendulum(
     mass [kg] and length [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. `joint` may be any kind
     without translation, e.g. "spherical"; its coordinates are then quaternions, and u three torques per joint.
     """
-    if not isinstance(n, int) or n < 1:
-        raise ValueError(f"npendulum(n): expected a whole number >= 1, got {n!r}")
+    n = whole("npendulum(n)", n)
     half = (0.0, 0.0, length / 2)
     below = (0.0, 0.0, -length / 2)
     pivot = (0.0, 0.0, 1.1 * n * length)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.border import whole
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
 from sim.shapes import Cylinder
@@ -27,8 +28,7 @@ def nslider(
 
     mass [kg], length and radius [m] of one rod; spring [N/m] and damper [N s/m] of each rail.
     """
-    if not isinstance(n, int) or n < 1:
-        raise ValueError(f"nslider(n): expected a whole number >= 1, got {n!r}")
+    n = whole("nslider(n)", n)
     rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]
     top = (0.0, 0.0, length / 2)
     rails = [

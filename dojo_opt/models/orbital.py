@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.border import whole
 from sim.mechanism import Mechanism
 from sim.parts import Body, Joint
 from sim.shapes import Box
@@ -28,8 +29,7 @@ def orbital(
     mass [kg], length and width [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. All coordinates
     zero is hanging straight down.
     """
-    if not isinstance(n, int) or n < 2:
-        raise ValueError(f"orbital(n): expected a whole number >= 2, got {n!r}")
+    n = whole("orbital(n)", n, 2)
     upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
     links = [Body(f"link_{i}", mass, shape=Box(width, width, length)) for i in range(n)]
     joints = [Joint("fixed", None, "link_0", name="joint_0", child_point=upper)]

@@ -24,6 +24,7 @@ from dojo_opt.plant.study import Sampler, Study, monte_carlo
 from dojo_opt.problem import Problem
 from dojo_opt.term import StateTerm
 from sim import checks
+from sim.border import whole
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -56,20 +57,19 @@ class MPC:
     def __init__(
         self, problem: Problem, iterations: int = 1, *, reference: Any = None, plan: Plan | None = None, **settings: Any
     ) -> None:
-        if int(iterations) != iterations or iterations < 1:
-            raise ValueError(f"MPC(iterations=...): expected a whole number >= 1, got {iterations!r}")
+        iterations = whole("MPC(iterations=...)", iterations)
         if not isinstance(problem, Problem):
             raise TypeError(f"MPC(problem): expected a Problem, got {problem!r}")
         checks.keywords("MPC(...)", settings, Settings.__dataclass_fields__)
         self.settings = Settings(**settings)
-        self._again = partial(MPC, problem, int(iterations), reference=reference, plan=plan, **settings)
+        self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
         friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
         self.nominal = problem.sim  # what a plant is made from
         self.problem = with_own_terms(problem, **friction)
         self.sim = self.problem.sim  # what plans are made with
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
-        self._solver = Solver(self.problem, self.settings.planner(int(iterations)))
+        self._solver = Solver(self.problem, self.settings.planner(iterations))
         self.references = References(self.problem, reference)
         self._delay = Delay(self.sim, self.settings.delay)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)

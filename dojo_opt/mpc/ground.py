@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.cross import cross
 from dojo_opt.mpc.policy import Policy
 from sim.simulator import Simulator
 
@@ -15,7 +16,6 @@ Stack = NDArray[np.float64]
 _TOUCHING = 5e-3  # gap of a contact that counts as touching [m]
 _PLANNED = 1e-2  # planned gap of a contact that is meant to stand [m]
 _STILL = 0.2  # speed of a contact point that stands [m/s]
-_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])  # cyclic, for cross products
 
 __all__ = ["Ground"]
 
@@ -53,8 +53,8 @@ class Ground:
         """Lowest points of the contacts at the states xs (..., nx), (..., ncontact, 3) [m]."""
         z = self._sim.maximal(xs)[..., self._body, :]
         w, r = z[..., 6:7], z[..., 7:10]
-        twice = 2.0 * _cross(r, self._point)
-        return np.asarray(z[..., :3] + self._point + w * twice + _cross(r, twice) - self._lowest)
+        twice = 2.0 * cross(r, self._point)
+        return np.asarray(z[..., :3] + self._point + w * twice + cross(r, twice) - self._lowest)
 
     def gaps(self, points: Stack) -> Matrix:
         """Distances of the points (..., ncontact, 3) of the contacts from their ground, (..., ncontact) [m]."""
@@ -78,8 +78,3 @@ class Ground:
         still = ((now - earlier) ** 2).sum(axis=1) < (_STILL * (time - then)) ** 2
         stands = still & (self.gaps(planned) < _PLANNED)
         self.height[stands] += self.gaps(now)[stands]
-
-
-def _cross(a: Stack, b: Stack) -> Stack:
-    """Cross products along the last axis: for a few vectors, a tenth of the time of NumPy's."""
-    return a[..., _NEXT] * b[..., _AFTER] - a[..., _AFTER] * b[..., _NEXT]

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.plant.perturbation import Perturbation, Push
+from sim import checks
+from sim.border import whole
 
 __all__ = ["Disturbances"]
 
@@ -29,6 +31,16 @@ class Disturbances:
     slope: tuple[float, float] = (0.0, 0.0)  # [rad], towards any heading
     delay: float = 0.0  # [s]
     noise: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        call = "Disturbances"
+        whole(f"{call}(nv)", self.nv)
+        checks.number(f"{call}(velocity=...)", self.velocity, at_least=0.0)
+        for name in ("push", "push_time", "payload", "friction", "slope"):
+            if (given := getattr(self, name)) is not None:
+                low, high = checks.vector(f"{call}({name}=...)", given, 2)
+                if not low <= high:
+                    raise ValueError(f"{call}({name}=...): expected (low, high) with low <= high, got {given!r}")
 
     def __call__(self, rng: np.random.Generator) -> Perturbation:
         """One draw; the same numbers are drawn whatever the ranges, so that studies with the same seed are paired."""

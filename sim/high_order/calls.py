@@ -8,7 +8,7 @@ import numpy as np
 
 from sim import bodies, coordinates
 from sim.bind import bind_smooth
-from sim.calls import REPORT, Calls, Floats
+from sim.calls import CONTACT, REPORT, Calls, Floats
 from sim.high_order import runge_kutta
 from sim.high_order.hamilton_gradient import Slopes
 from sim.high_order.tableau import stable, tableau
@@ -48,7 +48,7 @@ class HighOrder(Calls):
         knot = runge_kutta.roll(
             self._table(bind_smooth), self._scratch.table(), self.settings.time_step, self._scheme(), us, xs, reports
         )
-        return int(knot), xs, reports, np.zeros((steps, 0, 8))
+        return int(knot), xs, reports, np.zeros((steps, 0, CONTACT))
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
         """As Calls.roll_batch, on one core."""

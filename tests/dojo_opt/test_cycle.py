@@ -90,5 +90,5 @@ def test_other_plans_do_not_repeat():
     part = ilqr(oscillator([Periodic(components=[1])], free_start=True), stages=ONE_STAGE)
     assert part.stride is None
     periodic = ilqr(oscillator([Periodic([0.6 * np.pi, 0.0])], free_start=True), stages=ONE_STAGE)
-    with pytest.raises(ValueError, match="positive number of cycles, got 0"):
+    with pytest.raises(ValueError, match="whole number >= 1, got 0"):
         periodic.repeated(0)

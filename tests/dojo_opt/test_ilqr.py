@@ -218,5 +218,5 @@ def test_refined_keeps_knots_and_terms_and_cuts_the_steps():
     assert finer.costs[0] is not problem.costs[0]
     np.testing.assert_array_equal(finer.costs[0].weight, problem.costs[0].weight)
     for count in (0, 1.5, True):
-        with pytest.raises(ValueError, match="expected a positive number of steps per step"):
+        with pytest.raises(ValueError, match="expected a whole number >= 1"):
             problem.refined(count)

@@ -2,54 +2,13 @@
 
 import numpy as np
 import pytest
+from planned_legs import check, lands, lowest_foot, upright
 
 from dojo_opt import gaits, models, plots, problems
 from dojo_opt.feet import Feet
 from dojo_opt.motion import motion
 from dojo_opt.planner import ilqr
 from sim.simulator import Simulator
-
-
-def upright(x):
-    """Cosine of the angle between the z axis of the base and the vertical."""
-    return 1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)
-
-
-def replayed(problem, plan):
-    """The plan under its own gains, at a fifth of its time step."""
-    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
-    shot = fine.closed_loop(
-        problem.start, plan.u, xs=plan.x, Ks=plan.K, substeps=5 * problem.substeps, limits=problem.control_limits
-    )
-    assert shot.status == 0
-    return fine, shot
-
-
-def check(problem, plan, iterations, tilt=0.99, off=0.02):
-    """Converged, upright, within the torque limits, and not only at this time step."""
-    assert plan.success, plan.summary()
-    assert plan.nit <= iterations
-    assert plan.violation <= 1e-3
-    assert upright(plan.x).min() > tilt
-    _, shot = replayed(problem, plan)
-    assert np.abs(shot.u).max() <= 33.5
-    assert upright(shot.x).min() > tilt - 0.01
-    assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < off
-
-
-def lands(problem, plan, off=5e-3):
-    """On its feet and where the plan says, at 1 ms and with hard contacts."""
-    hard = problem.sim.replace(time_step=1e-3, kappa=1e-8)
-    shot = hard.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=20, limits=problem.control_limits)
-    assert shot.status == 0 and upright(shot.x).min() > 0.98
-    assert np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < off
-
-
-def lowest_foot(problem, plan):
-    """(N,) distance of the lowest foot from the ground at a fifth of the time step."""
-    fine, shot = replayed(problem, plan)
-    steps = [fine.rollout(x, np.tile(u, (5, 1))).contacts for x, u in zip(shot.x[:-1], shot.u, strict=True)]
-    return np.concatenate([contacts.gap.min(axis=1) for contacts in steps])
 
 
 @pytest.mark.parametrize("damping, iterations", [(5.0, 8), (0.5, 30)])
@@ -152,46 +111,6 @@ def test_jumps_up_and_back_land_in_short_steps(distance, height):
     lands(problem, plan)
     assert ilqr(problem, warm_start=plan).success  # which has a constraint less than its refined form
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    "distance, height",
-    [(0.3, 0.2), (0.2, 0.2)]
-    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
-)
-def test_leap_is_found_from_standing_and_a_goal(distance, height):
-    """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms."""
-    problem = problems.leap(distance=distance, height=height)
-    assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
-    plan = ilqr(problem)
-    assert plan.success and plan.nit <= 140, plan.summary()
-    assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
-    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
-    assert lowest_foot(problem, plan).max() > 0.1
-    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(distance, abs=2e-3)
-    lands(problem, plan)
-
-
-@pytest.mark.slow
-def test_a_leap_leads_to_a_longer_one():
-    """A plan of a shorter one, without its refinement, is a guess for it."""
-    shorter, longer = (problems.leap(distance=distance, height=0.25) for distance in (0.4, 0.5))
-    shorter.refinement = 1
-    plan = ilqr(longer, warm_start=ilqr(shorter))
-    assert plan.success and plan.nit <= 90, plan.summary()
-    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.5, abs=2e-3)
-    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(0.25, abs=0.01)
-    lands(longer, plan)
-
-
-@pytest.mark.slow
-def test_a_leap_that_is_too_high_is_no_success():
-    """With motors of a third of the torque the robot cannot rise by .3 m, and the plan says that it misses something."""
-    problem = problems.leap(height=0.3)
-    problem.control_limits = (np.full(12, -12.0), np.full(12, 12.0))
-    plan = ilqr(problem)
-    assert not plan.success
-    assert "Violated most: Goal of trunk" in plan.message
 
 
 @pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])

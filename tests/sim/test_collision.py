@@ -9,6 +9,7 @@ import pytest
 from jacobians import differences
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
+from shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
 from sim.collision.axes import OPEN
 from sim.collision.broad import bounding_radius
@@ -16,51 +17,7 @@ from sim.collision.collide import arrange, choose, collide, collide_chosen, open
 from sim.collision.kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
 
 Array = np.ndarray
-NO_HULL = np.zeros((1, 4))
-SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE]  # test_collision_table.py has the others
 ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are a radius around the core
-CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING"} & set(p.name.split("_"))]
-NAMES = {p: p.name.lower() for p in Pair}
-
-
-def touch(kind: Pair, feature: int, sizes: Array, R: Array, r: Array) -> Array:
-    out = np.empty(OUT)
-    collide(int(kind), feature, sizes, NO_HULL, np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r), out)
-    return out
-
-
-def features(kind: Pair, sizes: Array, R: Array, r: Array) -> list[Array]:
-    """What `collide` returns for the contact points that exist."""
-    outs = [touch(kind, f, sizes, R, r) for f in range(count(kind))]
-    return [out for out in outs if out[0] < 1e8]
-
-
-def deepest(kind: Pair, sizes: Array, R: Array, r: Array) -> Array:
-    return min(features(kind, sizes, R, r), key=lambda out: out[0])
-
-
-def shapes(kind: Pair) -> tuple[Shape, Shape]:
-    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
-
-
-def random_pose(
-    rng: np.random.Generator, kind: Pair, sizes: Array, depth: float, aligned: bool = False
-) -> tuple[Array, Array]:
-    """A random orientation (small if aligned), and a centre along a random direction where the distance is -depth."""
-    R = Rotation.from_rotvec(0.2 * rng.normal(size=3)) if aligned else Rotation.random(random_state=rng)
-    R = R.as_matrix()
-    direction = rng.normal(size=3)
-    direction /= np.linalg.norm(direction)
-    if kind.name.endswith("HALFSPACE"):
-        direction[2] = 0.0
-        return R, direction + (-depth - deepest(kind, sizes, R, direction)[0]) * np.array([0.0, 0.0, 1.0])
-    if kind == Pair.STRING:
-        return R, direction * (sizes[0] + depth)
-    low, high = 0.0, 3.0
-    while high - low > 1e-13:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if deepest(kind, sizes, R, middle * direction)[0] > -depth else (middle, high)
-    return R, high * direction
 
 
 # -- derivatives -------------------------------------------------------------------------------------------------------

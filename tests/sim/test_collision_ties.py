@@ -6,34 +6,20 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
+from shape_pairs import features
 
-from sim.collision.collide import collide
-from sim.collision.kinds import OUT, Pair, count
+from sim.collision.kinds import SIZES, Pair
 
 Array = np.ndarray
 EYE = np.eye(3)
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def touch(kind: Pair, feature: int, a: list[float], b: list[float], R: Array, r: Array) -> Array:
-    sizes, out = np.zeros(8), np.empty(OUT)
-    sizes[: len(a)], sizes[4 : 4 + len(b)] = a, b
-    collide(
-        int(kind),
-        feature,
-        sizes,
-        np.zeros((1, 4)),
-        np.ascontiguousarray(R).ravel(),
-        np.asarray(r, dtype=np.float64),
-        out,
-    )
-    return out
-
-
 def contacts(kind: Pair, a: list[float], b: list[float], R: Array, r: Array) -> Array:
     """(n, 43): the contact points that exist."""
-    outs = np.array([touch(kind, f, a, b, R, r) for f in range(count(kind))])
-    return outs[outs[:, 0] < 1e8]
+    sizes = np.zeros(2 * SIZES)
+    sizes[: len(a)], sizes[SIZES : SIZES + len(b)] = a, b
+    return np.array(features(kind, sizes, R, np.asarray(r, dtype=np.float64)))
 
 
 def about(axis: str, degrees: float) -> Array:

@@ -113,6 +113,12 @@ def test_batches_steps_and_copies_agree_with_rollouts() -> None:
     assert "order 4" in sim.describe()
 
 
+def test_a_scene_without_contacts_has_no_forces_of_them() -> None:
+    sim = dojo.Simulator(dojo.models.npendulum(2), time_step=0.01, order=4)
+    contacts = sim.rollout(sim.neutral(), np.zeros((3, sim.nu))).contacts
+    assert contacts.normal_force.shape == contacts.gap.shape == (3, 0) and contacts.friction_force.shape == (3, 0)
+
+
 def test_a_body_that_turns_too_far_is_reported() -> None:
     sim = dojo.Simulator(dojo.models.npendulum(1), time_step=0.1, order=4)
     result = sim.step(sim.start([0.0], [300.0]))

@@ -59,6 +59,13 @@ def test_a_parallelogram_stays_one() -> None:
     np.testing.assert_allclose(x[:, 0], x[:, 2], atol=1e-6)
 
 
+def test_a_step_that_is_solved_again_counts_the_iterations_of_all_its_solves() -> None:
+    sim = dojo.Simulator(linkage(PARALLELOGRAM, SIDEWAYS), time_step=0.01, tolerance=1e-11)
+    t = sim.rollout(sim.start([-1.2, 1.2, -1.2], [1.0, -1.0, 1.0]), np.zeros((60, sim.nu)), throw=True)
+    assert np.median(t.iterations) == 2  # where links come into one line, a step is solved from its guess, and again
+    assert t.iterations[np.argmin([strength(x, PARALLELOGRAM) for x in t.x[1:]])] >= 4
+
+
 def test_both_branches_leave_the_pose_where_they_meet() -> None:
     """Configuration 2 is that pose itself, to the last digit; the velocity says where the motion goes."""
     sim = dojo.Simulator(linkage(PARALLELOGRAM, (0.0, 0.0, 0.0)), time_step=0.01)

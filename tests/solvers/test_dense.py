@@ -38,6 +38,8 @@ def test_copy_and_axpy():
     dense.copy(A, out)
     dense.axpy(2.0, A[0], out[1])
     np.testing.assert_array_equal(out, [[0.0, 1.0, 2.0], [3.0, 6.0, 9.0]])
+    dense.copy_vector(A[1], out[0])
+    np.testing.assert_array_equal(out[0], A[1])
 
 
 @pytest.mark.parametrize("n", [1, 2, 5, 12])

@@ -1,0 +1,90 @@
+"""Steps and rollouts as functions of JAX: it calls the simulator back; derivatives are those of `Simulator.vjp`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dojo_opt.bridges.rollouts import Functions, Rollouts
+from dojo_opt.parameter_space import ParameterSpace
+from sim.simulator import Simulator
+
+_CALL = "bridges.to_jax"
+
+
+def _jax() -> Any:
+    """JAX with numbers of 64 bits."""
+    try:
+        import jax
+    except ImportError:
+        raise ImportError(f'{_CALL} needs JAX: pip install "dojo-opt[jax]"') from None
+    if not jax.config.jax_enable_x64:
+        raise ValueError(
+            f"{_CALL}: steps are solved to more than the seven digits of JAX's floats; call "
+            'jax.config.update("jax_enable_x64", True) before arrays are made'
+        )
+    return jax
+
+
+def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpace | None = None) -> Functions:
+    """step(x, u, theta=None) and rollout(x0, us, theta=None) of a simulator, for `jax.grad`, `jax.jit` and `jax.vmap`.
+
+    x, x0     (nx,) states, their quaternions of length one
+    u, us     (nu,), (T, nu) inputs [N, N m]
+    theta     (n,) the values of `parameters`; None: those of `sim`
+    returns   the next state (nx,); all states (T + 1, nx), x0 among them
+
+    kappa     of the derivatives [N s m], those of smoother contact than the simulator's own; that by default
+
+    Gradients by a state have its shape: of a rotation they are tangent to the quaternion, the gradient of the function
+    that makes its length one first. Under vmap, rollouts are spread over the cores. A gradient solves the steps once
+    more, and keeps no more than the states. There is no forward mode (`jax.jvp`, `jax.jacfwd`): `Simulator.linearize`
+    has Jacobians. Callbacks run on the processor, whatever the device.
+
+    Errors of the simulator (SimulationError: an unsolved step; ValueError: numbers that are not finite, quaternions of
+    another length) end the computation, with their text in JAX's own error. ValueError here: JAX computes with 32 bits.
+    """
+    jax = _jax()
+    core = Rollouts(_CALL, sim, kappa, parameters)
+    states = _states(jax, core)
+
+    def rollout(x0: Any, us: Any, theta: Any = None) -> Any:
+        """States (T + 1, nx) from x0 (nx,) under us (T, nu); see `to_jax`."""
+        _jax()  # which may have been told to use 32 bits since
+        n = core.sizes(theta)
+        x0, us = jax.numpy.asarray(x0, "float64"), jax.numpy.asarray(us, "float64")
+        theta = jax.numpy.zeros(0) if theta is None else jax.numpy.asarray(theta, "float64")
+        core.check(x0=(x0.shape, (sim.nx,)), us=(us.shape, ("T", sim.nu)), theta=(theta.shape, (n,)))
+        return states(x0, us, theta)
+
+    def step(x: Any, u: Any, theta: Any = None) -> Any:
+        """The state (nx,) after x (nx,) under u (nu,); see `to_jax`."""
+        u = jax.numpy.asarray(u)
+        core.check(u=(u.shape, (sim.nu,)))
+        return rollout(x, u[None], theta)[1]
+
+    return Functions(step, rollout)
+
+
+def _states(jax: Any, core: Rollouts) -> Any:
+    """`core.states` of arrays of JAX, with its pullback."""
+    nx = core.sim.nx
+
+    def array(*shape: int) -> Any:
+        return jax.ShapeDtypeStruct(shape, "float64")
+
+    @jax.custom_vjp
+    def states(x0: Any, us: Any, theta: Any) -> Any:
+        xs = array(us.shape[0] + 1, nx)
+        return jax.pure_callback(core.states, xs, x0, us, theta, vmap_method="broadcast_all")
+
+    def forward(x0: Any, us: Any, theta: Any) -> Any:
+        xs = states(x0, us, theta)
+        return xs, (xs, us, theta)
+
+    def backward(kept: Any, by_xs: Any) -> Any:
+        xs, us, theta = kept
+        gradients = (array(nx), array(*us.shape), array(*theta.shape))
+        return jax.pure_callback(core.pullback, gradients, xs, us, theta, by_xs, vmap_method="broadcast_all")
+
+    states.defvjp(forward, backward)
+    return states

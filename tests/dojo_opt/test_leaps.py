@@ -1,0 +1,48 @@
+"""Leaps of the quadruped: found from standing and a goal, as high as asked, and they land."""
+
+import numpy as np
+import pytest
+from planned_legs import lands, lowest_foot
+
+from dojo_opt import problems
+from dojo_opt.planner import ilqr
+
+
+@pytest.mark.parametrize(
+    "distance, height",
+    [(0.3, 0.2), (0.2, 0.2)]
+    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
+)
+def test_leap_is_found_from_standing_and_a_goal(distance, height):
+    """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms."""
+    problem = problems.leap(distance=distance, height=height)
+    assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
+    plan = ilqr(problem)
+    assert plan.success and plan.nit <= 140, plan.summary()
+    assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
+    assert lowest_foot(problem, plan).max() > 0.1
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(distance, abs=2e-3)
+    lands(problem, plan)
+
+
+@pytest.mark.slow
+def test_a_leap_leads_to_a_longer_one():
+    """A plan of a shorter one, without its refinement, is a guess for it."""
+    shorter, longer = (problems.leap(distance=distance, height=0.25) for distance in (0.4, 0.5))
+    shorter.refinement = 1
+    plan = ilqr(longer, warm_start=ilqr(shorter))
+    assert plan.success and plan.nit <= 90, plan.summary()
+    assert plan.x[-1, 0] - plan.x[0, 0] == pytest.approx(0.5, abs=2e-3)
+    assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(0.25, abs=0.01)
+    lands(longer, plan)
+
+
+@pytest.mark.slow
+def test_a_leap_that_is_too_high_is_no_success():
+    """With motors of a third of the torque the robot cannot rise by .3 m, and the plan says that it misses something."""
+    problem = problems.leap(height=0.3)
+    problem.control_limits = (np.full(12, -12.0), np.full(12, 12.0))
+    plan = ilqr(problem)
+    assert not plan.success
+    assert "Violated most: Goal of trunk" in plan.message

@@ -1,0 +1,71 @@
+"""load_mjcf: what rows of joints become, what is left out, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.mjcf import MjcfWarning, load_mjcf
+from sim.simulator import Simulator
+
+pytest.importorskip("mujoco")
+
+
+def test_slides_and_a_hinge_become_one_joint() -> None:
+    joints = {
+        "planar_axis": '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 -1 0"/>',
+        "cylindrical": '<joint type="slide" axis="0 1 0"/><joint axis="0 1 0"/>',
+        "fixed_orientation": "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1")),
+        "planar": '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>',
+        "floating": "<freejoint/>",
+    }
+    for kind, text in joints.items():
+        body = f'<body pos="0 0 1">{text}<geom size="0.1"/></body>'
+        mech = load_mjcf(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+        assert [j.kind for j in mech.joints] == [kind]
+    turned = (
+        '<body quat="0.7 0.1 0.1 0.7"><joint type="slide" axis="1 1 0"/><joint axis="0 0 1"/><geom size="0.1"/></body>'
+    )
+    mech = load_mjcf(f"<mujoco><worldbody>{turned}</worldbody></mujoco>")
+    assert [j.kind for j in mech.joints] == ["prismatic", "revolute"]
+
+
+@pytest.mark.parametrize("axis", ["1 0 0", "1 2 3"])
+def test_hinges_about_one_axis_are_refused(axis: str) -> None:
+    text = (
+        '<mujoco><worldbody><body><joint name="a" axis="{0}"/><joint name="b" axis="{0}" {1}/>'
+        '<geom size="0.1" pos="0 0 0.2"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(ValueError, match=r"joints 'a' and 'b' move along one axis"):
+        load_mjcf(text.format(axis, ""))
+    for held in ('pos="0 0 0.1"' if axis == "1 0 0" else 'pos="0.1 0 0"', 'damping="1"'):
+        sim = Simulator(load_mjcf(text.format(axis, held)), time_step=0.01)
+        assert sim.step(sim.neutral() + 0.1, np.zeros(0)).status.name == "SOLVED"
+
+
+def test_what_is_left_out_is_said() -> None:
+    text = """
+    <mujoco><option density="1000"/><worldbody>
+      <body name="a"><freejoint/><geom name="g" size="0.1"/></body>
+      <body name="b" pos="0 0 1"><joint name="j" frictionloss="1"/><geom name="h" size="0.1" pos="1 0 0"/></body>
+      <body name="c" pos="0 0 2"><joint name="k"/><geom size="0.1" pos="1 0 0"/></body>
+    </worldbody><equality><joint name="w" joint1="j" joint2="k" polycoef="0 1 2 0 0"/></equality></mujoco>"""
+    with pytest.warns(MjcfWarning):
+        report = load_mjcf(text).report
+    assert report is not None
+    for words in ("that hold one joint, or are not linear, are left out: w", "dry friction of joints is left out: j", "drag of a fluid",
+                  "bodies do not collide"):  # fmt: skip
+        assert words in str(report), words
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "words"),
+    [
+        ("nowhere.xml", FileNotFoundError, "load_mjcf: no file 'nowhere.xml'"),
+        ("<mujoco><worldbody><body/></worldbody>", ValueError, "load_mjcf: the text: "),
+        ("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>", ValueError, "no joint is free to move"),
+    ],
+)
+def test_errors(source: str, error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        load_mjcf(source)
