@@ -20,7 +20,7 @@ import numpy as np
 
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import milliseconds
-from dojo_opt.report import STUDIES, run_report, write_page
+from dojo_opt.report import STUDIES, run_reports, write_page
 from dojo_opt.show import add_show, show
 from sim.checks import nearest
 
@@ -147,7 +147,7 @@ def _run_loop(args: argparse.Namespace) -> int:
 def _report(args: argparse.Namespace) -> int:
     mechanism = None if args.robot is None else dojo.load_urdf(args.robot, floating=not args.fixed)
     names = list(STUDIES) if args.name == "all" else [args.name]
-    reports = {name: run_report(name, quick=args.quick, mechanism=mechanism, verbose=True) for name in names}
+    reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True)
     if args.json:
         print(json.dumps({name: json.loads(report.as_json()) for name, report in reports.items()}, indent=1))
     else:
@@ -160,7 +160,8 @@ def _report(args: argparse.Namespace) -> int:
             *(["--quick"] if args.quick else []),
         ]
         write_page(reports, args.out, "dojo-opt report " + " ".join(arguments))
-    return 1 if args.strict and not all(report.met() for report in reports.values()) else 0
+    missed = args.strict and not all(report.met() for report in reports.values())
+    return 1 if missed or any("error" in report.details for report in reports.values()) else 0
 
 
 def _models(args: argparse.Namespace) -> int:

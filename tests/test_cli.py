@@ -73,7 +73,7 @@ def test_a_missed_bar_exits_with_1_only_when_strict(
     report = Report(
         "title", "command", [Row("fast", np.float64(1.0), "us", 2.0), Row("slow", np.float64(3.0), "us", 2.0)]
     )
-    monkeypatch.setattr(cli, "run_report", lambda name, **_: report)
+    monkeypatch.setattr("dojo_opt.report.study.run_report", lambda name, **_: report)
     assert cli.main(["report", "timing", "--out", str(tmp_path)]) == 0
     assert "NO" in capsys.readouterr().out
     assert cli.main(["report", "timing", "--strict", "--json"]) == 1
@@ -81,6 +81,24 @@ def test_a_missed_bar_exits_with_1_only_when_strict(
     assert numbers["command"] == "dojo-opt report timing"
     assert numbers["studies"]["timing"]["rows"][1]["met"] is False
     capsys.readouterr()
+
+
+def test_a_study_that_fails_takes_no_other_with_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(name: str, **_: object) -> Report:
+        if name == "contact":
+            raise RuntimeError("MuJoCo has no license")
+        return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
+
+    monkeypatch.setattr("dojo_opt.report.study.run_report", run)
+    assert cli.main(["report", "all", "--out", str(tmp_path)]) == 1
+    studies = json.loads((tmp_path / "report.json").read_text())["studies"]
+    assert [name for name, study in studies.items() if not study["met"]] == ["contact"]
+    assert studies["contact"]["details"] == {"error": "RuntimeError: MuJoCo has no license"}
+    assert "MuJoCo has no license" in capsys.readouterr().out
+    with pytest.raises(RuntimeError, match="no license"):
+        cli.main(["report", "contact"])
 
 
 def test_the_module_runs_as_a_program() -> None:
