@@ -11,10 +11,11 @@ docs/quotes.toml lists sentences as they stand in a page, with holes where measu
     text = "of 243 falls not solved to the end | {d falls > not solved to the end, default kappa} |"
 
 A hole is a format and an address. Address: a study of the report or a benchmark, then the name of a row; or the title
-of a table, the first cell of a row and the head of a column; or `details` and the keys. Format: as Python's (d, .2f,
-.2g and so on; 7e-11 for 7e-11 and not 7e-11 with a zero more), s for a text, with a factor behind it, as `.2f*1e-3`.
-Text between code quotes, and what stands under `given`, is not measured; every other number of a page has to be in a
-sentence of the list, or in a table:
+of a table, the first cell of a row (the first two, with `; ` between) and the head of a column; or `details`, or
+`machine`, and the keys; or `bars`, `bars met`: how many the study has. Format: as Python's (d, .2f, .2g and so on),
+without zeros in exponents; s for a version or a share like 3 of 4; with a factor behind it, as `.2f*1e-3`.
+Code, formulas, links, titles, and what stands under `given` (regular expressions, by page) is not measured; every other
+number of a page has to be in a sentence of the list, or in a table:
 
     [[table]]           between `<!-- NAME -->` and `<!-- end of NAME -->`
     page = "README.md"
@@ -45,7 +46,7 @@ WIDTH = 120  # of a line of JSON
 
 _HOLE = re.compile(r"\{(\S+?)(?:\*(\S+))? ([^{}]+)\}")
 _NUMBER = r"([-+]?\.?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?|inf|nan)"
-_TEXT = r"([^|]*?)"
+_TEXT = r"(\d+(?:\.\d+)*(?: of \d+)?)"  # versions, and shares
 _UNMEASURED = (r"```.*?```", r"\$\$.*?\$\$", r"`[^`]*`", r"\]\([^)]*\)", r"^#.*?$")  # code, formulas, links, titles
 
 
@@ -75,17 +76,25 @@ def value(studies: dict[str, Any], address: str) -> Any:
     """What is there.  KeyError: nothing is."""
     study, *path = (part.strip() for part in address.split(" > "))
     report = studies[study]
+    if path in (["bars"], ["bars met"]):
+        judged = [row["met"] for row in report["rows"] if row["met"] is not None]
+        return len(judged) if path == ["bars"] else sum(judged)
     if len(path) == 1:
         return _only(address, (row["value"] for row in report["rows"] if row["name"] == path[0]))
-    if path[0] == "details":
+    if path[0] in ("details", "machine"):
         found = report
         for key in path:
             found = found[int(key)] if isinstance(found, list) else found[key]
         return found
     title, label, column = path
     table = _only(address, (table for table in report["tables"] if table["title"] == title))
-    row = _only(address, (row for row in table["rows"] if str(row[0]) == label))
+    cells = label.split("; ")
+    row = _only(address, (row for row in table["rows"] if [_label(c) for c in row[: len(cells)]] == cells))
     return row[list(table["header"]).index(column)]
+
+
+def _label(cell: Any) -> str:
+    return f"{cell:g}" if isinstance(cell, float) else str(cell)
 
 
 def _only(address: str, found: Iterator[Any]) -> Any:
@@ -106,7 +115,10 @@ def shown(number: Any, style: str, factor: str | None = None) -> str:
 
 
 def fill(page: str, text: str, listed: Quotes, studies: dict[str, Any]) -> tuple[str, list[tuple[int, int]]]:
-    """The page with its quotes and tables as measured; and the parts of it that are.  ValueError: a quote is not there."""
+    """The page with its quotes and tables as measured; and which parts of it they are.
+
+    ValueError: a quote is not there, or more than once.  KeyError: its number is not in docs/measured.
+    """
     for table in (t for t in listed.table if t["page"] == page):
         start, end = (text.find(f"<!-- {mark}{table['name']} -->") for mark in ("", "end of "))
         if not 0 <= start < end:

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +74,7 @@ def test_a_missed_bar_exits_with_1_only_when_strict(
     report = Report(
         "title", "command", [Row("fast", np.float64(1.0), "us", 2.0), Row("slow", np.float64(3.0), "us", 2.0)]
     )
-    monkeypatch.setattr("dojo_opt.report.study.run_report", lambda name, **_: report)
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", lambda name, **_: report)
     assert cli.main(["report", "timing", "--out", str(tmp_path)]) == 0
     assert "NO" in capsys.readouterr().out
     assert cli.main(["report", "timing", "--strict", "--json"]) == 1
@@ -91,7 +92,7 @@ def test_a_study_that_fails_takes_no_other_with_it(
             raise RuntimeError("MuJoCo has no license")
         return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
 
-    monkeypatch.setattr("dojo_opt.report.study.run_report", run)
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", run)
     assert cli.main(["report", "all", "--out", str(tmp_path)]) == 1
     studies = json.loads((tmp_path / "report.json").read_text())["studies"]
     assert [name for name, study in studies.items() if not study["met"]] == ["contact"]

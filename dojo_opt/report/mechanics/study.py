@@ -88,6 +88,7 @@ class Mechanics:
         kinds = {kind for values in found.values() for kind in values}
         right = [k for k in kinds if all(values.get(k, 0.0) <= parameters.BAR for values in found.values())]
         report.rows += [
+            Row("kinds of parameters", len(kinds), ""),
             Row("situations of parameters", len(found), ""),
             Row("kinds of parameters whose derivatives are right", len(right), "", len(kinds), at_least=True),
         ]
