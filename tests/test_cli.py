@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from programs import HOME
-from urdf_files import branched
+from urdf_files import branched, collision, inertial, joint, link, write
 
 import dojo_opt as dojo
 from dojo_opt import cli
@@ -100,6 +100,27 @@ def test_a_study_that_fails_takes_no_other_with_it(
     assert "MuJoCo has no license" in capsys.readouterr().out
     with pytest.raises(RuntimeError, match="no license"):
         cli.main(["report", "contact"])
+
+
+def test_links_that_touch_the_ground_are_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured = []
+
+    def run(name: str, mechanism: dojo.Mechanism, **_: object) -> Report:
+        measured.append(mechanism)
+        return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
+
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", run)
+    foot = link("foot", inertial(), collision('<box size="0.1 0.1 0.1"/>'))
+    robot = write(tmp_path, link("base", inertial()), foot, joint("hip", "base", "foot"), name="leg")
+    assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot", "base=0.2", "--out", str(tmp_path)]) == 0
+    assert [c.body for c in measured[0].contacts].count("foot") == 8
+    assert [c.radius for c in measured[0].contacts if c.body == "base"] == [0.2]
+    command = json.loads((tmp_path / "report.json").read_text())["command"]
+    assert command.endswith("leg.urdf --contacts foot base=0.2")
+    assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot=wide"]) == 2
+    assert "--contacts foot=wide: expected LINK or LINK=RADIUS in metres" in capsys.readouterr().err
 
 
 def test_the_module_runs_as_a_program() -> None:

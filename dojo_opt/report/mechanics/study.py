@@ -85,12 +85,12 @@ class Mechanics:
                 title = f"Derivatives by parameters{title}"
                 report.tables.append(Table(title, ("", *part), lines, _note(parameters.__doc__)))
         report.details["parameters"] = found
-        kinds = {kind for values in found.values() for kind in values}
-        right = [k for k in kinds if all(values.get(k, 0.0) <= parameters.BAR for values in found.values())]
+        every = {kind for values in found.values() for kind in values}
+        right = [k for k in every if all(values.get(k, 0.0) <= parameters.BAR for values in found.values())]
         report.rows += [
-            Row("kinds of parameters", len(kinds), ""),
+            Row("kinds of parameters", len(every), ""),
             Row("situations of parameters", len(found), ""),
-            Row("kinds of parameters whose derivatives are right", len(right), "", len(kinds), at_least=True),
+            Row("kinds of parameters whose derivatives are right", len(right), "", len(every), at_least=True),
         ]
         for name, values in found.items():
             report.rows.append(_worst(f"parameters: {name}", values, parameters.BAR, ""))
