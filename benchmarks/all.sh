@@ -15,7 +15,6 @@ quick="${2:-}"
 case "$quick" in "" | --quick) ;; *) echo "benchmarks/all.sh: expected --quick, got $quick" >&2; exit 2 ;; esac
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 python="${PYTHON:-python}"
-export PYTHONPATH="$here${PYTHONPATH:+:$PYTHONPATH}"
 cd "$out" || exit 2
 missed=""
 

@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> Report:
     report.rows = [
         number("motions of a pair", motions),
         number("collisions", motions * len(pairs)),
-        number("not solved", sum(unsolved), note=", ".join(str(line[0]) for line in lines if line[1])),
+        number("not solved", sum(unsolved), note="; ".join(str(line[0]) for line in lines if line[1])),
         number("gain energy", sum(gains), 0, note=f"more than {GAIN:g} J in a step"),
         number("drift of momentum", max(drift), unit="N s, N m s"),
     ]

@@ -1,4 +1,4 @@
-"""Put the measured numbers into the pages: README.md, docs/numbers.md and CHANGELOG.md quote docs/measured.
+"""Put the measured numbers into the pages: README.md, CHANGELOG.md and those of docs/ quote docs/measured.
 
     python docs/figures.py               fill in what docs/quotes.toml says
     python docs/figures.py --check       change nothing; exit with 1 if a page is not what was measured
@@ -15,7 +15,7 @@ of a table, the first cell of a row (the first two, with `; ` between) and the h
 `machine`, and the keys; or `bars`, `bars met`: how many the study has. Format: as Python's (d, .2f, .2g and so on),
 without zeros in exponents; s for a version or a share like 3 of 4; with a factor behind it, as `.2f*1e-3`.
 Code, formulas, links, titles, and what stands under `given` (regular expressions, by page) is not measured; every other
-number of a page has to be in a sentence of the list, or in a table:
+number of a page that is listed there has to be in a sentence of the list, or in a table:
 
     [[table]]           between `<!-- NAME -->` and `<!-- end of NAME -->`
     page = "README.md"
@@ -39,7 +39,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 MEASURED = ROOT / "docs" / "measured"
-PAGES = ("README.md", "docs/numbers.md", "CHANGELOG.md")
+PAGES = ("README.md", "docs/numbers.md", "docs/guide.md", "CHANGELOG.md")
 BULKY = (("planning", "settings"),)  # details that nothing quotes, 0.4 MB: not taken to docs/measured
 DIGITS = 6  # significant ones that are kept of what is taken
 WIDTH = 120  # of a line of JSON
@@ -167,8 +167,10 @@ def _table(table: dict[str, Any], studies: dict[str, Any]) -> str:
 
 
 def uncovered(page: str, text: str, spans: list[tuple[int, int]], listed: Quotes) -> list[str]:
-    """Numbers of a page that are in no quote and no table, with their lines."""
-    free = [*_UNMEASURED, *listed.given.get(page, [])]
+    """Numbers of a page that are in no quote and no table, with their lines; none of a page that `given` leaves out."""
+    if page not in listed.given:
+        return []
+    free = [*_UNMEASURED, *listed.given[page]]
     spans = [*spans, *((m.start(), m.end()) for p in free for m in re.finditer(p, text, re.DOTALL | re.MULTILINE))]
     missed = []
     for number in re.finditer(r"(?<![\w.])" + _NUMBER, text):

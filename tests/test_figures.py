@@ -28,7 +28,7 @@ def speeds():
     return {"speed": {"rows": rows, "tables": [table], "details": {"raw": [1.0, 2.0]}, "machine": {"numba": "0.68.1"}}}
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/numbers.md", "CHANGELOG.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/numbers.md", "docs/guide.md", "CHANGELOG.md"])
 def test_the_pages_say_what_was_measured(figures, studies, page):
     text = (figures.ROOT / page).read_text(encoding="utf-8")
     filled, spans = figures.fill(page, text, figures.quotes(), studies)
