@@ -74,22 +74,29 @@ def measured(folder: Path = MEASURED) -> dict[str, Any]:
 
 def value(studies: dict[str, Any], address: str) -> Any:
     """What is there.  KeyError: nothing is."""
+    try:
+        return _found(studies, address)
+    except (LookupError, ValueError) as error:
+        raise KeyError(f"{address}: not measured: {error}") from None
+
+
+def _found(studies: dict[str, Any], address: str) -> Any:
     study, *path = (part.strip() for part in address.split(" > "))
     report = studies[study]
     if path in (["bars"], ["bars met"]):
         judged = [row["met"] for row in report["rows"] if row["met"] is not None]
         return len(judged) if path == ["bars"] else sum(judged)
     if len(path) == 1:
-        return _only(address, (row["value"] for row in report["rows"] if row["name"] == path[0]))
+        return _only(row["value"] for row in report["rows"] if row["name"] == path[0])
     if path[0] in ("details", "machine"):
         found = report
         for key in path:
             found = found[int(key)] if isinstance(found, list) else found[key]
         return found
     title, label, column = path
-    table = _only(address, (table for table in report["tables"] if table["title"] == title))
+    table = _only(table for table in report["tables"] if table["title"] == title)
     cells = label.split("; ")
-    row = _only(address, (row for row in table["rows"] if [_label(c) for c in row[: len(cells)]] == cells))
+    row = _only(row for row in table["rows"] if [_label(c) for c in row[: len(cells)]] == cells)
     return row[list(table["header"]).index(column)]
 
 
@@ -97,11 +104,10 @@ def _label(cell: Any) -> str:
     return f"{cell:g}" if isinstance(cell, float) else str(cell)
 
 
-def _only(address: str, found: Iterator[Any]) -> Any:
-    """The first and only one."""
+def _only(found: Iterator[Any]) -> Any:
     values = list(found)
     if len(values) != 1:
-        raise KeyError(f"{address}: there are {len(values)} of it in docs/measured")
+        raise ValueError(f"there are {len(values)} of it")
     return values[0]
 
 
@@ -184,23 +190,16 @@ def take(folder: Path) -> None:
     """Copy what was measured to docs/measured, with six digits and without what is bulky; and the figures."""
     MEASURED.mkdir(exist_ok=True)
     for file in sorted(folder.glob("*.json")):
-        numbers = json.loads(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
+        numbers = json.loads(text, parse_float=lambda digits: float(f"{float(digits):.{DIGITS}g}"))
         for study, key in BULKY:
             left = numbers.get("studies", {}).get(study, {}).get("details", {})
             if key in left:
                 left[key] = "left out here"
-        (MEASURED / file.name).write_text(compact(_rounded(numbers)) + "\n", encoding="utf-8")
+        (MEASURED / file.name).write_text(compact(numbers) + "\n", encoding="utf-8")
     for name in ("accuracy.png", "hopper.png"):
         if (folder / name).is_file():
             shutil.copy(folder / name, ROOT / "docs" / name)
-
-
-def _rounded(numbers: Any) -> Any:
-    if isinstance(numbers, dict):
-        return {key: _rounded(item) for key, item in numbers.items()}
-    if isinstance(numbers, list):
-        return [_rounded(item) for item in numbers]
-    return float(f"{numbers:.{DIGITS}g}") if isinstance(numbers, float) else numbers
 
 
 def compact(numbers: Any, indent: str = "") -> str:
@@ -225,15 +224,19 @@ def main(argv: list[str] | None = None) -> int:
     args = parser.parse_args(argv)
     if args.take:
         take(args.take)
-    listed, studies, wrong = quotes(), measured(), []
+    listed, studies, wrong, filled = quotes(), measured(), [], {}
     for page in PAGES:
         before = (ROOT / page).read_text(encoding="utf-8")
-        after, spans = fill(page, before, listed, studies)
-        wrong += uncovered(page, after, spans, listed)
-        if after != before and args.check:
+        try:
+            filled[page], spans = fill(page, before, listed, studies)
+        except (KeyError, ValueError) as error:
+            print(f"figures: {error.args[0]}", file=sys.stderr)
+            return 2
+        wrong += uncovered(page, filled[page], spans, listed)
+        if args.check and filled[page] != before:
             wrong.append(f"{page}: not what docs/measured says; run python docs/figures.py")
-        elif after != before:
-            (ROOT / page).write_text(after, encoding="utf-8")
+    for page, text in filled.items() if not args.check else ():
+        (ROOT / page).write_text(text, encoding="utf-8")
     print("\n".join(wrong) or "every number of the pages is the measured one")
     return 1 if wrong else 0
 

@@ -81,7 +81,7 @@ def test_quotes_wrap_like_the_page_and_stand_in_it_once(figures, speeds):
 def test_tables_are_written_between_their_marks(figures, speeds):
     table = {"page": "page", "name": "cases", "source": "speed > Cases", "header": ["what", "why"]}
     table |= {"columns": ["h", "error"], "rows": [["a; 1", "10 times"]]}
-    quotes = figures.Quotes([], [table], {})
+    quotes = figures.Quotes([], [table], {"page": []})
     text, spans = figures.fill("page", "<!-- cases -->\nold\n<!-- end of cases -->\n3", quotes, speeds)
     assert text.splitlines()[1:4] == [
         "| what | why | h | error |",
@@ -89,6 +89,7 @@ def test_tables_are_written_between_their_marks(figures, speeds):
         "| a; 1 | 10 times | 1.0 | 2 of 3 |",
     ]
     assert figures.uncovered("page", text, spans, quotes) == ["page:6: 3: 3"]
+    assert figures.uncovered("page", text, spans, figures.Quotes([], [table], {})) == []  # a page that is not listed
     with pytest.raises(ValueError, match="there is no `<!-- cases -->`"):
         figures.fill("page", "no table", quotes, speeds)
 
