@@ -192,6 +192,8 @@ def take(folder: Path) -> None:
     for file in sorted(folder.glob("*.json")):
         text = file.read_text(encoding="utf-8")
         numbers = json.loads(text, parse_float=lambda digits: float(f"{float(digits):.{DIGITS}g}"))
+        if re.search(r'"command": "[^"]*--quick', text):
+            raise SystemExit(f"figures: {file} is of a --quick run, whose numbers are not quoted")
         for study, key in BULKY:
             left = numbers.get("studies", {}).get(study, {}).get("details", {})
             if key in left:

@@ -104,3 +104,6 @@ def test_what_is_taken_has_six_digits_and_nothing_bulky(figures, tmp_path, monke
     assert taken == {"settings": "left out here", "plans": [{"cost": 1.23457}] * 30}
     assert set(figures.measured(tmp_path / "measured")) == {"planning", "falls"}
     assert max(map(len, (tmp_path / "measured/report.json").read_text().splitlines())) <= 120
+    (tmp_path / "gaits.json").write_text(json.dumps({"command": "python benchmarks/gaits.py --quick", "rows": []}))
+    with pytest.raises(SystemExit, match="gaits.json is of a --quick run"):
+        figures.take(tmp_path)
