@@ -12,35 +12,35 @@ Far pairs: 20 balls in space that hardly move, on a grid; one pair of them may c
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from itertools import combinations
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.encounters import ALL, approaching, two
+from dojo_opt.report.result import Cell, Report, Table
 
 BALLS = [f"b{k}" for k in range(20)]
 GAIN = 1e-2  # [J] more than kappa pushes from afar
 
 
-def collisions(motions: int) -> None:
-    """Print a row per pair of shapes."""
-    print(
-        f"{'':<18}{'unsolved':>9}{'gain':>6}{'momentum':>10}{'iterations in contact: median':>31}{'99 %':>6}{'most':>6}"
-    )
-    names = list(ALL)
-    for k, a in enumerate(names):
-        for b in names[k:]:
-            sim = dojo.Simulator(two(ALL[a], ALL[b]), time_step=0.01)
-            runs = [sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu))) for seed in range(motions)]
-            gains = sum(bool(np.diff(sim.energy(run.x)).max() > GAIN) for run in runs)
-            drift = max(float(np.ptp(np.hstack(sim.momentum(run.x)), axis=0).max()) for run in runs)
-            touching = [np.abs(run.contacts.impulse).max(axis=(1, 2)) > 1e-2 for run in runs]
-            steps = np.concatenate([run.iterations[now] for run, now in zip(runs, touching, strict=True)])
-            counts = f"{sum(not run.success for run in runs):>9}{gains:>6}{drift:>10.0e}"
-            spread = f"{np.median(steps):>31.0f}{np.percentile(steps, 99):>6.0f}{steps.max():>6}"
-            print(f"{a + ' ' + b:<18}{counts}{spread}", flush=True)
+HEADER = ("", "not solved", "gain energy", "drift of momentum", "iterations in contact, median", "99 %", "most")
+
+
+def pair(a: str, b: str, motions: int) -> list[Cell]:
+    """A row of the table."""
+    sim = dojo.Simulator(two(ALL[a], ALL[b]), time_step=0.01)
+    runs = [sim.rollout(approaching(sim, seed, 1.0), np.zeros((60, sim.nu))) for seed in range(motions)]
+    gains = sum(bool(np.diff(sim.energy(run.x)).max() > GAIN) for run in runs)
+    drift = max(float(np.ptp(np.hstack(sim.momentum(run.x)), axis=0).max()) for run in runs)
+    touching = [np.abs(run.contacts.impulse).max(axis=(1, 2)) > 1e-2 for run in runs]
+    steps = np.concatenate([run.iterations[now] for run, now in zip(runs, touching, strict=True)])
+    unsolved = sum(not run.success for run in runs)
+    spread = (float(np.median(steps)), float(np.percentile(steps, 99)), int(steps.max()))
+    return [f"{a}, {b}", unsolved, gains, drift, *spread]
 
 
 def cost(pairs: list[tuple[str, str]], spacing: float, kappa: float) -> float:
@@ -61,24 +61,44 @@ def cost(pairs: list[tuple[str, str]], spacing: float, kappa: float) -> float:
     return 1e6 * best / len(us)
 
 
-def far_pairs() -> None:
-    """Print what pairs cost that may collide, by how far apart they are."""
-    print(f"\n{'us per step of 20 balls':<32}{'1 pair':>9}{'19 pairs':>10}{'190 pairs':>11}{'more, per pair':>16}")
-    for kappa in (1e-10, 1e-8, 1e-6):
-        for spacing in (0.4, 1.0, 3.0):
-            sets = [(BALLS[0], BALLS[1])], list(zip(BALLS[:-1], BALLS[1:], strict=True)), list(combinations(BALLS, 2))
-            one, chain, every = (cost(pairs, spacing, kappa) for pairs in sets)
-            label = f"kappa {kappa:g}, {spacing:g} m apart"
-            print(f"{label:<32}{one:>9.0f}{chain:>10.0f}{every:>11.0f}{(every - one) / 189:>16.2f}", flush=True)
+def far_pairs(kappas: tuple[float, ...]) -> Table:
+    """What pairs cost that may collide, by how far apart they are."""
+    settings = [(kappa, spacing) for kappa in kappas for spacing in (0.4, 1.0, 3.0)]
+    sets = [(BALLS[0], BALLS[1])], list(zip(BALLS[:-1], BALLS[1:], strict=True)), list(combinations(BALLS, 2))
+    lines: list[list[Cell]] = []
+    named = [(f"kappa {kappa:g}, {spacing:g} m apart", (kappa, spacing)) for kappa, spacing in settings]
+    for (kappa, spacing), (label, _) in zip(progress()(named, "far pairs"), named, strict=True):
+        one, chain, every = (cost(pairs, spacing, kappa) for pairs in sets)
+        lines.append([label, one, chain, every, (every - one) / 189])
+    header = ("", "1 pair", "19 pairs", "190 pairs", "more, per pair")
+    return Table("us per step of 20 balls", header, lines)
 
 
-def main() -> None:
-    """Run both."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--motions", type=int, default=60, help="per pair of shapes")
-    collisions(parser.parse_args().motions)
-    far_pairs()
+def run(args: argparse.Namespace) -> Report:
+    """Both tables."""
+    report = Report("Random collisions of two bodies", "")
+    names = list(ALL)[: 2 if args.quick else None]
+    motions = 5 if args.quick else args.motions
+    pairs = [(a, b) for k, a in enumerate(names) for b in names[k:]]
+    lines = [pair(a, b, motions) for a, b in progress()([(f"{a}, {b}", (a, b)) for a, b in pairs], "collisions")]
+    unsolved, gains, drift = ([line[k] for line in lines] for k in (1, 2, 3))
+    report.rows = [
+        number("motions of a pair", motions),
+        number("collisions", motions * len(pairs)),
+        number("not solved", sum(unsolved), note="; ".join(str(line[0]) for line in lines if line[1])),
+        number("gain energy", sum(gains), 0, note=f"more than {GAIN:g} J in a step"),
+        number("drift of momentum", max(drift), unit="N s, N m s"),
+    ]
+    report.tables = [Table("Collisions", HEADER, lines), far_pairs((1e-8,) if args.quick else (1e-10, 1e-8, 1e-6))]
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--motions", type=int, default=60, help="per pair of shapes")
+    return deliver("collisions", run, arguments, argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -11,14 +11,17 @@ robustness.py, do not find the jammed landings that a motion leads to by itself.
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Report, Table
 
 MODELS = (
     "ant", "atlas", "block", "exoskeleton", "halfcheetah", "hopper", "humanoid", "quadruped", "rexhopper", "snake",
@@ -26,6 +29,7 @@ MODELS = (
 )  # fmt: skip
 TIME_STEPS = (0.005, 0.01, 0.02)  # [s]
 KAPPAS = (None, 1e-6, 1e-10)  # [N s m]; None: the default
+BARS = (0, 0, None)  # falls that may end unsolved
 STARTS = 3
 
 
@@ -52,27 +56,38 @@ def unsolved(mechanism: dojo.Mechanism, time_step: float, kappa: float | None) -
     return messages
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--match", default="", help="only robots whose name contains this")
-    match = parser.parse_args().match
-    warnings.simplefilter("ignore")
-    totals = dict.fromkeys(KAPPAS, 0)
-    falls = 0
-    for name, build in robots():
-        if match not in name:
-            continue
+def run(args: argparse.Namespace) -> Report:
+    """Every robot whose name contains `match`."""
+    warnings.simplefilter("ignore")  # what MuJoCo says about gymnasium's files
+    report = Report("Falls of a second", "")
+    time_steps = TIME_STEPS[-1:] if args.quick else TIME_STEPS
+    chosen = [(name, (name, build)) for name, build in robots() if args.match in name][: 2 if args.quick else None]
+    lines, falls = [], 0
+    for name, build in progress()(chosen, "falls"):
         mechanism = build()
-        falls += STARTS * len(TIME_STEPS)
-        for kappa in KAPPAS:
-            messages = [m for h in TIME_STEPS for m in unsolved(mechanism, h, kappa)]
-            totals[kappa] += len(messages)
-            for message in messages:
-                print(f"{name}: {message}", flush=True)
-    for kappa, count in totals.items():
-        print(f"kappa {'default' if kappa is None else kappa}: {count} of {falls} falls not solved to the end")
+        falls += STARTS * len(time_steps)
+        messages = {kappa: [m for h in time_steps for m in unsolved(mechanism, h, kappa)] for kappa in KAPPAS}
+        lines.append([name, *(len(found) for found in messages.values())])
+        report.details[name] = {label(kappa): found for kappa, found in messages.items()}
+        report.notes += [f"{name}: {message}" for found in messages.values() for message in found]
+    report.rows = [number("robots", len(lines)), number("falls at each kappa", falls)]
+    for k, (kappa, bar) in enumerate(zip(KAPPAS, BARS, strict=True), start=1):
+        report.rows.append(number(f"not solved to the end, {label(kappa)}", sum(line[k] for line in lines), bar))
+    report.tables = [Table("Falls not solved to the end", ("", *map(label, KAPPAS)), lines)]
+    return report
+
+
+def label(kappa: float | None) -> str:
+    """The name of a kappa."""
+    return "default kappa" if kappa is None else f"kappa {kappa:g}"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--match", default="", help="only robots whose name contains this")
+    return deliver("falls", run, arguments, argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

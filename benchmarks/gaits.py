@@ -1,14 +1,15 @@
 """Gaits of a quadruped by iLQR: iterations, cost, and what is left of a plan at a fifth of its time step.
 
-    python benchmarks/gaits.py           the table below, and 72 random gaits (a minute)
-    python benchmarks/gaits.py --quick   the table with fewer rows, and 10 random gaits
+    python benchmarks/gaits.py           the table below, 72 random gaits, and 32 leaps (two minutes)
+    python benchmarks/gaits.py --quick   the table with fewer rows, 6 random gaits, and 1 leap
 
 Columns: iterations, rejected ones included, and the rejected ones; cost; largest violation of the constraints;
 least cosine between the base's z axis and the vertical; largest torque [N m]; how far the base rises [m]. Then, for
 the plan under its own gains with every knot cut into five steps: how far the base ends from the plan [m], its least
 cosine, the largest torque, the way that loaded feet slide [m, all feet together], and the greatest height of the lowest
-foot [m]. Periodic plans are repeated five times for that. Jumps and leaps end with every time step cut into
-`refinement`; their iterations are all of them, and what is left of them is at a fifth of the shorter step.
+foot [m]. Periodic plans are repeated twenty times for that. Jumps and leaps end with every time step cut into
+`refinement`; their iterations are all of them, and what is left of them is at a fifth of the shorter step. A leap is as
+asked when its base rises to within 1 cm of the height asked for.
 
 MuJoCo 4 with finite differences and a hand-written iLQR, same weights, on the first two rows: 4 iterations and cost
 .0161 at damping 5 (8 to 12 from a rollout); 27 to 50 and .041 to .049 at damping .5, with its feet pressed 2 mm into
@@ -17,14 +18,17 @@ the ground, and upside-down from a rollout.
 
 from __future__ import annotations
 
+import argparse
 import sys
+from itertools import product
 from typing import Any
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Cell, Report, Row, Table
 
-QUICK = "--quick" in sys.argv[1:]
 STANDING = {"guess": "standing"}
 TABLE: list[tuple[str, dict[str, Any]]] = [
     ("trot", {"damping": 5.0}),
@@ -35,6 +39,8 @@ TABLE: list[tuple[str, dict[str, Any]]] = [
     ("trot", STANDING),
     ("jump", STANDING),
     ("bound", STANDING),
+    ("jump", {"distance": -0.1, "refinement": 1}),
+    ("jump", {"distance": -0.1}),
     ("leap", {"refinement": 1}),
     ("leap", {}),
     ("leap", {"distance": 0.5}),
@@ -66,63 +72,132 @@ def upright(x: Any) -> float:
     return float((1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)).min())
 
 
-def replay(plan: Any) -> str:
-    """The plan under its gains at a fifth of the time step, a periodic one five times in a row."""
+HEADER = (
+    *("", "success", "iterations", "rejected", "cost", "violation", "upright", "torque", "rise"),
+    *("replayed", "off", "upright then", "torque then", "slid", "lift"),
+)
+REPEATS = 20  # of periodic plans
+DISTANCES = (-0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5)  # of leaps [m]
+HEIGHTS = (0.15, 0.2, 0.25, 0.3)  # [m]
+
+
+def replay(plan: Any) -> list[Cell]:
+    """The plan under its gains at a fifth of the time step, a periodic one many times in a row."""
     problem = plan.problem
-    plan = plan if plan.stride is None else plan.repeated(5)
+    plan = plan if plan.stride is None else plan.repeated(REPEATS)
     fine, cut = problem.sim.replace(time_step=problem.sim.time_step / 5), 5 * problem.substeps
     limits = problem.control_limits
     shot = fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=cut, limits=limits)
     if shot.status != 0:
-        return f"{shot.status.name} at knot {shot.knot}"
+        return [f"{shot.status.name} at knot {shot.knot}", *[None] * 5]
     knots = [fine.rollout(x, np.tile(u, (cut, 1))).contacts for x, u in zip(shot.x[:-1], shot.u, strict=True)]
     loaded = np.concatenate([c.normal_force for c in knots]) > 1.0
     slid = float((np.concatenate([c.slip for c in knots]) * loaded).sum() * fine.time_step)
     lift = max(float(c.gap.min(axis=1).max()) for c in knots)
     off = float(np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max())
-    return f"{off:7.4f} {upright(shot.x):7.4f} {np.abs(shot.u).max():6.1f} {slid:6.3f} {lift:6.3f}"
+    return ["to the end", off, upright(shot.x), float(np.abs(shot.u).max()), slid, lift]
 
 
-def random_gaits(count: int) -> None:
+def planned(name: str, settings: dict[str, Any]) -> list[Cell]:
+    """A row of the table."""
+    plan = dojo.ilqr(getattr(dojo.problems, name)(**settings))
+    rejected = sum(record["alpha"] == 0.0 for record in plan.history)
+    numbers = [plan.fun, plan.violation, upright(plan.x), np.abs(plan.u).max(), plan.x[:, 2].max() - plan.x[0, 2]]
+    end = plan.success if plan.success else plan.status.name
+    return [label(name, settings), end, plan.nit, rejected, *map(float, numbers), *replay(plan)]
+
+
+def replays(report: Report, lines: list[list[Cell]]) -> None:
+    """What is left of the plans of the table at a fifth of their time step, as rows."""
+    after = {str(line[0]): dict(zip(HEADER[9:], line[9:], strict=True)) for line in lines}
+    finished = {name: replay for name, replay in after.items() if replay["off"] is not None}
+    cut = [r["off"] for n, r in finished.items() if n.startswith(("jump", "leap")) and "refinement=1" not in n]
+    periodic = [r["upright then"] for n, r in finished.items() if "periodic" in n]
+    report.rows += [
+        Row("plans replayed to the end", len(finished), f"of {len(after)}", len(after), at_least=True),
+        number("jumps and leaps: off when replayed, most", max(cut, default=np.nan), unit="m"),
+        number("periodic gaits", sum("periodic" in name for name in after)),
+        number(f"periodic gaits, {REPEATS} times in a row: least cosine", min(periodic, default=np.nan)),
+    ]
+
+
+def label(name: str, settings: dict[str, Any]) -> str:
+    """A gait, and what is asked of it."""
+    return " ".join([name, *(f"{key}={value}" for key, value in settings.items())])
+
+
+def random_gait(index: int, rng: np.random.Generator) -> tuple[str, dict[str, Any]]:
+    """A gait of random speed and damping; every other one of its kind starts from standing still."""
+    names = ["trot", "bound", "pace", "walk", "turn", "jump"]
+    name = names[index % len(names)]
+    settings: dict[str, Any] = {"damping": 10 ** rng.uniform(-1.3, 0.0)}
+    settings["guess"] = "standing" if index // len(names) % 2 else "reference"
+    if name == "turn":
+        settings["heading_rate"] = rng.uniform(-1.0, 1.0)
+    elif name == "jump":
+        settings |= {"distance": rng.uniform(-0.2, 0.4), "height": rng.uniform(0.1, 0.3)}
+    else:
+        settings["speed"] = rng.uniform(0.0, {"trot": 0.4, "bound": 0.8, "pace": 0.5, "walk": 0.2}[name])
+    if name == "trot":
+        settings |= {"period": 0.5, "time_step": 0.025, "step_height": 0.05, "footholds": None, "height": None}
+    return name, settings
+
+
+def random_gaits(report: Report, count: int) -> None:
     """Gaits of random speed, damping and guess: how many are planned without falling over."""
     rng = np.random.default_rng(1)
-    names = ["trot", "bound", "pace", "walk", "turn", "jump"]
-    iterations, failed = [], 0
-    for i in range(count):
-        name = names[i % len(names)]
-        settings: dict[str, Any] = {"damping": 10 ** rng.uniform(-1.3, 0.0)}
-        settings["guess"] = "standing" if i // len(names) % 2 else "reference"
-        if name == "turn":
-            settings["heading_rate"] = rng.uniform(-1.0, 1.0)
-        elif name == "jump":
-            settings |= {"distance": rng.uniform(-0.2, 0.4), "height": rng.uniform(0.1, 0.3)}
-        else:
-            settings["speed"] = rng.uniform(0.0, {"trot": 0.4, "bound": 0.8, "pace": 0.5, "walk": 0.2}[name])
-        if name == "trot":
-            settings |= {"period": 0.5, "time_step": 0.025, "step_height": 0.05, "footholds": None, "height": None}
+    found = []
+    for name, settings in progress()([(f"{i + 1}", random_gait(i, rng)) for i in range(count)], "random gaits"):
         plan = dojo.ilqr(getattr(dojo.problems, name)(**settings))
-        good = plan.success and upright(plan.x) > 0.85
-        failed += not good
-        iterations.append(plan.nit)
+        good = bool(plan.success and upright(plan.x) > 0.85)
+        found.append({"gait": name, **settings, "planned": good, "status": plan.status.name, "iterations": plan.nit})
         if not good:
-            print(f"not planned: {name} {settings}: {plan.status.name}, upright {upright(plan.x):.3f}")
-    spread = f"iterations {np.median(iterations):.0f} at the median, {max(iterations)} at most"
-    print(f"{count - failed} of {count} random gaits planned and upright; {spread}")
+            report.notes.append(f"not planned: {label(name, settings)}: {plan.status.name}, {upright(plan.x):.3f}")
+    iterations = [gait["iterations"] for gait in found]
+    report.details["random gaits"] = found
+    report.rows += [
+        number("random gaits", count),
+        Row("random gaits planned and upright", sum(g["planned"] for g in found), "", count, at_least=True),
+        number("random gaits: iterations, median", float(np.median(iterations))),
+        number("random gaits: iterations, most", max(iterations)),
+    ]
 
 
-def main() -> None:
-    """Print the table."""
-    print(f"{'':42}   it  rej    cost    viol upright  torque   rise |    off upright torque   slid   lift")
-    for name, settings in TABLE[:5] if QUICK else TABLE:
-        plan = dojo.ilqr(getattr(dojo.problems, name)(**settings))
-        rejected = sum(record["alpha"] == 0.0 for record in plan.history)
-        label = f"{name} " + " ".join(f"{key}={value}" for key, value in settings.items())
-        row = f"{label:42} {plan.nit:4d} {rejected:4d} {plan.fun:7.4f} {plan.violation:7.1e} {upright(plan.x):7.4f}"
-        end = "" if plan.success else f"  {plan.status.name}"
-        rise = plan.x[:, 2].max() - plan.x[0, 2]
-        print(f"{row} {np.abs(plan.u).max():7.1f} {rise:6.3f} | {replay(plan)}{end}", flush=True)
-    random_gaits(10 if QUICK else 72)
+def leaps(report: Report, asked: list[tuple[float, float]]) -> None:
+    """Leaps by distance and height: how many are planned, and how far off the height asked for they rise."""
+    lines: list[list[Cell]] = []
+    named = [(f"{distance:g} m far, {height:g} m high", (distance, height)) for distance, height in asked]
+    for distance, height in progress()(named, "leaps"):
+        plan = dojo.ilqr(dojo.problems.leap(distance=distance, height=height))
+        rise = float(plan.x[:, 2].max() - plan.x[0, 2])
+        lines.append([distance, height, bool(plan.success), plan.nit, rise - height])
+    report.tables.append(Table("Leaps", ("far [m]", "high [m]", "success", "iterations", "off the height [m]"), lines))
+    good = [line for line in lines if line[2]]
+    report.rows += [
+        number("leaps", len(lines)),
+        number("leaps planned", len(good)),
+        number(
+            "leaps planned: off the height, most", max((abs(line[4]) for line in good), default=0.0), 0.01, unit="m"
+        ),
+    ]
+
+
+def run(args: argparse.Namespace) -> Report:
+    """The table, random gaits, leaps."""
+    report = Report("Gaits of a quadruped", "")
+    table = TABLE[:5] if args.quick else TABLE
+    lines = [planned(*gait) for gait in progress()([(label(*gait), gait) for gait in table], "gaits")]
+    report.tables.append(Table("Gaits", HEADER, lines, "torque in N m; rise, off, slid and lift in m"))
+    replays(report, lines)
+    random_gaits(report, 6 if args.quick else 72)
+    leaps(report, [(0.3, 0.2)] if args.quick else list(product(DISTANCES, HEIGHTS)))
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    return deliver("gaits", run, parser(__doc__), argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

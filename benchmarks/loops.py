@@ -10,13 +10,16 @@ us         processor time per step [us] of those, and of the same mechanism with
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import replace
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Report, Table
 
 NAMES = ("fourbar", "fivebar", "minitaur_leg", "stewart", "delta")
 STEP, CHUNK = 0.005, 5000
@@ -62,14 +65,14 @@ def gap(sim: dojo.Simulator, x: np.ndarray) -> float:
     return max(float(np.abs(g).max()) for g in sim.loop_gaps(x).values())
 
 
-def run(name: str, steps: int) -> tuple[int, float, float, float, float]:
-    """(steps solved, largest gap, energy error, us per step, us per step of the tree)."""
+def motion(name: str, steps: int) -> tuple[int, float, float, float, float, str]:
+    """(steps solved, largest gap, energy error, us per step, us per step of the tree, why it ended early)."""
     sim = dojo.Simulator(passive(name), time_step=STEP, tolerance=1e-11)
     x = start(sim, 0.3)
     cost = 1e6 * seconds(sim, x)
     tree = dojo.Simulator(replace(sim.mechanism, loops=()), time_step=STEP, tolerance=1e-11)
     apart = 1e6 * seconds(tree, x)
-    done, worst, energies, kinetic = 0, 0.0, [], 0.0
+    done, worst, energies, kinetic, end = 0, 0.0, [], 0.0, ""
     while done < steps:
         t = sim.rollout(x, np.zeros((min(CHUNK, steps - done), sim.nu)))
         worst = max(worst, *(gap(sim, y) for y in t.x[1::10]))
@@ -77,19 +80,39 @@ def run(name: str, steps: int) -> tuple[int, float, float, float, float]:
         kinetic = max(kinetic, float(sim.kinetic_energy(t.x[1:]).max()))
         x, done = t.x[-1], done + t.knot
         if not t.success:
-            print(f"{name}: {t.message}")
+            end = str(t.message)
             break
     energy = np.concatenate(energies)
-    return done, worst, float(np.abs(energy - energy[0]).max() / kinetic), cost, apart
+    return done, worst, float(np.abs(energy - energy[0]).max() / kinetic), cost, apart, end
 
 
-def main(steps: int) -> None:
-    """Print one row per mechanism."""
-    print(f"{'':14}{'steps':>8}{'gap':>10}{'energy':>10}{'us':>8}{'tree us':>9}")
-    for name in NAMES:
-        done, worst, energy, cost, apart = run(name, steps)
-        print(f"{name:14}{done:8d}{worst:10.1e}{energy:10.1e}{cost:8.1f}{apart:9.1f}", flush=True)
+def run(args: argparse.Namespace) -> Report:
+    """All mechanisms."""
+    report = Report("Closed loops over many steps", "")
+    steps = 1000 if args.quick else args.steps
+    lines = []
+    for name in progress()([(name, name) for name in NAMES], "loops"):
+        *numbers, end = motion(name, steps)
+        lines.append([name, *numbers])
+        report.notes += [f"{name}: {end}"] if end else []
+    done, gaps, energies, costs, trees = zip(*(line[1:] for line in lines), strict=True)
+    report.rows = [
+        number("steps of each mechanism", steps),
+        number("steps that are missing", len(NAMES) * steps - sum(done), 0),
+        number("largest gap", max(gaps), 1e-10, unit="m, rad"),
+        number("largest change of energy", max(energies), unit="of the kinetic energy"),
+        number("a step over that of the tree, most", max(c / t for c, t in zip(costs, trees, strict=True))),
+    ]
+    report.tables = [Table(f"{steps:,} steps of 5 ms", ("", "steps", "gap", "energy", "us", "tree us"), lines)]
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("steps", nargs="?", type=int, default=100_000)
+    return deliver("loops", run, arguments, argv)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100_000)
+    sys.exit(main())

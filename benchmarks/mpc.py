@@ -1,6 +1,6 @@
 """Closed-loop MPC: survival and tick times of the hopper and of the quadruped, in tables.
 
-python benchmarks/mpc.py [hopper] [quadruped] [monte_carlo] [terrain] [--runs N] [--seed N] [--quick]
+    NUMBA_NUM_THREADS=1 python benchmarks/mpc.py [hopper] [quadruped] [monte_carlo] [terrain] [--runs N] [--seed N]
 
 hopper       six cases times six seeds, one iteration per 50 ms, plant at 1 kHz with kappa 1e-8; beside it the control
              run whose ticks start from an open-loop rollout of the shifted inputs
@@ -11,21 +11,25 @@ terrain      the same trot for 6 s over five grounds, of which the model knows t
              square distance from the path is at most 0.08 m, and its trunk's mean height above the ground below it is
              within 0.03 m of the one it starts with
 
-Ticks are timed by the clock ("ms") and by the processor ("cpu"), which is what is left on a machine with other work.
-Use NUMBA_NUM_THREADS=1 for figures of one core.
+Distances from the path are root mean squares of a run along x and y, of the runs that survive: their median and the
+worst. Ticks are timed by the clock and by the processor, which is what is left on a machine with other work; with
+NUMBA_NUM_THREADS=1 they are those of one core.
 """
 
 from __future__ import annotations
 
 import argparse
-import time
+import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import milliseconds
+from dojo_opt.report.result import Cell, Report, Row, Table
 
 MASS = 4.7  # of the hopper [kg]
 HOPPER = {
@@ -60,8 +64,11 @@ TERRAIN = {
     ),
 }
 MODELS = ("knows", "learns", "blind")
+PATH = 0.08  # [m] off the path that a run over terrain may be
+ABOVE = 0.03  # [m] that its mean height above the ground may change
 HEADER = (
-    f"{'case':<22}{'survive':>9}{'rms xy':>8}{'worst':>8}{'ms':>8}{'99 %':>8}{'cpu':>8}{'99 %':>8}{'fell back':>11}"
+    *("case", "survive", "of", "off the path [m]", "worst [m]", "tick [ms]", "99 % [ms]", "tick, cpu [ms]"),
+    *("99 %, cpu [ms]", "fell back", "of ticks", ""),
 )
 
 
@@ -76,48 +83,65 @@ def hopper_perturbation(case: dict[str, float], seed: int) -> dojo.Perturbation:
     return dojo.Perturbation(offset=offset, pushes=pushes, **fields)
 
 
-def row(name: str, loops: Sequence[Any]) -> str:
-    """One line of a table; rms and worst are those of the runs that survive [m]."""
-    rms = [loop.rms() for loop in loops if loop.survived] or [np.nan]
+def row(name: str, loops: Sequence[Any], distances: Sequence[float] | None = None) -> list[Cell]:
+    """One line of a table; the distances from the path are those that the loops say, or these [m]."""
+    distances = distances or [loop.rms() for loop in loops]
+    rms = [d for loop, d in zip(loops, distances, strict=True) if loop.survived] or [np.nan]
     ms, cpu = (np.concatenate([milliseconds(loop.log, cpu=c) for loop in loops]) for c in (False, True))
     ticks, fallbacks = sum(len(loop.log) for loop in loops), sum(t.fallback for loop in loops for t in loop.log)
-    survive = f"{sum(loop.survived for loop in loops)}/{len(loops)}"
-    times = "".join(f"{np.median(a):8.2f}{np.percentile(a, 99):8.2f}" for a in (ms, cpu))
-    return f"{name:<22}{survive:>9}{np.median(rms):8.3f}{max(rms):8.3f}{times}{f'{fallbacks}/{ticks}':>11}"
+    times = [float(f(a)) for a in (ms, cpu) for f in (np.median, lambda a: np.percentile(a, 99))]
+    end = "; ".join(sorted({loop.message for loop in loops if not loop.survived}))
+    survived = sum(loop.survived for loop in loops)
+    return [name, survived, len(loops), float(np.median(rms)), max(rms), *times, fallbacks, ticks, end]
 
 
-def hopper(seeds: int, duration: float) -> None:
-    """Two tables of the hopper."""
-    for title, settings in (
-        ("shifted states as guess", {}),
-        ("the same without feedback between ticks", {"gain_scale": 0.0}),
-        ("control run: open-loop rollout of the shifted inputs as guess", {"guess": "open loop"}),
+def rows(name: str, line: Sequence[Any], bars: bool = True) -> list[Row]:
+    """The numbers of one line of a table as rows; with bars, every run has to survive, at most 0.08 m off."""
+    _, survived, runs, median, worst, _, _, tick, late, *_ = line
+    return [
+        Row(f"{name}: survive", survived, f"of {runs}", runs if bars else None, at_least=True),
+        number(f"{name}: runs", runs),
+        number(f"{name}: off the path, median", median, unit="m"),
+        number(f"{name}: off the path, worst", worst, PATH if bars else None, unit="m"),
+        number(f"{name}: tick, median", tick, unit="ms"),
+        number(f"{name}: tick, 99 %", late, unit="ms"),
+    ]
+
+
+def hopper(report: Report, seeds: int, duration: float) -> None:
+    """Three tables of the hopper."""
+    for name, title, settings in (
+        ("hopper", "shifted states as guess", {}),
+        ("hopper without feedback", "the same without feedback between ticks", {"gain_scale": 0.0}),
+        ("hopper, control", "open-loop rollout of the shifted inputs as guess", {"guess": "open loop"}),
     ):
         mpc = dojo.tasks.hopper_mpc(**settings)
         plant = dojo.tasks.plant(mpc, 1e-3)
-        print(f"\nhopper, {title}\n{HEADER}")
-        everything = []
-        for name, case in HOPPER.items():
-            perturbations = [hopper_perturbation(case, seed) for seed in range(seeds)]
+        everything, lines = [], []
+        for case in progress()([(c, c) for c in HOPPER], name):
+            perturbations = [hopper_perturbation(HOPPER[case], seed) for seed in range(seeds)]
             loops = [dojo.closed_loop(mpc, plant.perturbed(p), duration) for p in perturbations]
             everything += loops
-            print(row(name, loops), flush=True)
-        print(row("all", everything), flush=True)
+            lines.append(row(case, loops))
+        lines.append(row("all", everything))
+        report.tables.append(Table(f"Hopper, {title}", HEADER, lines))
+        report.rows += rows(name, lines[-1], bars=name == "hopper")
 
 
-def quadruped(duration: float) -> None:
+def quadruped(report: Report, duration: float) -> None:
     """The table of the quadruped."""
-    print(f"\nquadruped, trot at 0.2 m/s for {duration:g} s\n{HEADER}")
-    everything = []
-    for name, case in QUADRUPED.items():
-        mpc = dojo.tasks.quadruped_mpc(delay=0.02 if name.endswith("known") else 0.0)
-        loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, **case), duration)
+    everything, lines = [], []
+    for case in progress()([(c, c) for c in QUADRUPED], "quadruped"):
+        mpc = dojo.tasks.quadruped_mpc(delay=0.02 if case.endswith("known") else 0.0)
+        loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, **QUADRUPED[case]), duration)
         everything.append(loop)
-        print(row(name, [loop]) + ("" if loop.survived else "  " + loop.message), flush=True)
-    print(row("all", everything))
+        lines.append(row(case, [loop]))
+    lines.append(row("all", everything))
+    report.tables.append(Table(f"Quadruped, trot at 0.2 m/s for {duration:g} s", HEADER, lines))
+    report.rows += rows("quadruped", lines[-1])
 
 
-def monte_carlo(runs: int, duration: float, seed: int) -> None:
+def monte_carlo(report: Report, runs: int, duration: float, seed: int) -> None:
     """The study of the quadruped."""
     mpc = dojo.tasks.quadruped_mpc()
     disturbances = dojo.Disturbances(
@@ -130,58 +154,77 @@ def monte_carlo(runs: int, duration: float, seed: int) -> None:
         friction=(0.4, 0.8),
         slope=(0.0, float(np.radians(5.0))),
     )
-    print(f"\nquadruped, {runs} runs of {duration:g} s, seed {seed}, every disturbance in every run:\n  {disturbances}")
-    begin = time.perf_counter()
-    study = mpc.monte_carlo(dojo.tasks.plant(mpc, 2e-3), disturbances, duration, runs=runs, seed=seed)
-    cpu = np.concatenate([milliseconds(o.log, cpu=True) for o in study.outcomes])
-    print(study.summary())
-    print(f"cpu median {np.median(cpu):.2f} ms, 99 % {np.percentile(cpu, 99):.2f} ms of a period of 40 ms")
-    softened = sum(o.softened for o in study.outcomes)
-    print(f"{softened} steps of the plant needed softer contact; {time.perf_counter() - begin:.0f} s in all")
-    for i, outcome in enumerate(study.outcomes):
-        if not outcome.survived:
-            print(f"  run {i}: {outcome.message}")
+    for _ in progress()([(f"{runs} runs", None)], "Monte Carlo"):
+        study = mpc.monte_carlo(dojo.tasks.plant(mpc, 2e-3), disturbances, duration, runs=runs, seed=seed)
+    line = row("every disturbance in every run", study.outcomes, [o.rms for o in study.outcomes])
+    report.tables.append(Table(f"Quadruped, {duration:g} s, seed {seed}", HEADER, [line], str(disturbances)))
+    report.rows += rows("Monte Carlo", line)
+    report.rows.append(
+        number("Monte Carlo: steps of the plant with softer contact", sum(o.softened for o in study.outcomes))
+    )
+    report.notes += [f"Monte Carlo, {study.summary()}"]
+    report.details["Monte Carlo"] = [
+        {"survived": o.survived, "message": o.message, "rms": o.rms, "perturbation": asdict(o.perturbation)}
+        for o in study.outcomes
+    ]
 
 
-def terrain(duration: float) -> None:
+def terrain(report: Report, duration: float) -> None:
     """The table of the quadruped on ground that is not level."""
-    print(f"\nquadruped on terrain, {duration:g} s; above: mean height over the ground, less the first [m]")
-    print(f"{'ground':<24}{'model':<8}{'passes':>8}{'rms xy':>8}{'above':>8}{'cpu':>8}{'99 %':>8}{'fell back':>11}")
-    passed = []
-    for name, ground in TERRAIN.items():
-        for model in MODELS:
-            knows = model == "knows"
-            mpc = dojo.tasks.quadruped_mpc(terrain=ground if knows else None, learn_ground=model == "learns")
-            plant = dojo.tasks.plant(mpc, 2e-3, **({} if knows else {"terrain": ground}))
-            loop = dojo.closed_loop(mpc, plant, duration)
-            over = loop.x[:, 2] - ground.height(loop.x[:, 0], loop.x[:, 1])
-            above, cpu = float(over.mean() - over[0]), milliseconds(loop.log, cpu=True)
-            passed.append(loop.survived and loop.rms() <= 0.08 and abs(above) <= 0.03)
-            back = f"{sum(t.fallback for t in loop.log)}/{len(loop.log)}"
-            times = f"{np.median(cpu):8.2f}{np.percentile(cpu, 99):8.2f}{back:>11}"
-            end = "" if loop.survived else "  " + loop.message
-            print(f"{name:<24}{model:<8}{passed[-1]!s:>8}{loop.rms():8.3f}{above:8.3f}{times}{end}", flush=True)
-    share = ", ".join(f"{sum(passed[i :: len(MODELS)])} of {len(TERRAIN)} {m}" for i, m in enumerate(MODELS))
-    print(f"{sum(passed)} of {len(passed)} pass: {share}")
+    lines: list[list[Cell]] = []
+    cases = [(f"{name}, {model}", (name, model)) for name in TERRAIN for model in MODELS]
+    for name, model in progress()(cases, "terrain"):
+        ground, knows = TERRAIN[name], model == "knows"
+        mpc = dojo.tasks.quadruped_mpc(terrain=ground if knows else None, learn_ground=model == "learns")
+        plant = dojo.tasks.plant(mpc, 2e-3, **({} if knows else {"terrain": ground}))
+        loop = dojo.closed_loop(mpc, plant, duration)
+        over = loop.x[:, 2] - ground.height(loop.x[:, 0], loop.x[:, 1])
+        above, cpu = float(over.mean() - over[0]), milliseconds(loop.log, cpu=True)
+        passed = bool(loop.survived and loop.rms() <= PATH and abs(above) <= ABOVE)
+        ticks = [float(np.median(cpu)), float(np.percentile(cpu, 99)), sum(t.fallback for t in loop.log)]
+        lines.append([name, model, passed, loop.rms(), above, *ticks, "" if loop.survived else loop.message])
+    header = (
+        "ground",
+        "model",
+        "passes",
+        "off the path [m]",
+        "above [m]",
+        "tick, cpu [ms]",
+        "99 % [ms]",
+        "fell back",
+        "",
+    )
+    report.tables.append(Table(f"Quadruped on terrain, {duration:g} s", header, lines))
+    report.rows.append(number("terrain: grounds", len(TERRAIN)))
+    for model in MODELS:
+        passing = sum(bool(line[2]) for line in lines if line[1] == model)
+        bar = None if model == "blind" else len(TERRAIN)
+        report.rows.append(Row(f"terrain, {model}: passes", passing, f"of {len(TERRAIN)}", bar, at_least=True))
 
 
-def main() -> None:
-    """Print what was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("tables", nargs="*", default=["hopper", "quadruped", "monte_carlo", "terrain"])
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0, help="of the Monte Carlo study")
-    parser.add_argument("--quick", action="store_true")
-    args = parser.parse_args()
+def run(args: argparse.Namespace) -> Report:
+    """What was asked for."""
+    report = Report("Closed loops of MPC", "")
     if "hopper" in args.tables:
-        hopper(1 if args.quick else 6, 1.0 if args.quick else 4.0)
+        hopper(report, 1 if args.quick else 6, 1.0 if args.quick else 4.0)
     if "quadruped" in args.tables:
-        quadruped(0.4 if args.quick else 6.0)
+        quadruped(report, 0.4 if args.quick else 6.0)
     if "monte_carlo" in args.tables:
-        monte_carlo(2 if args.quick else args.runs, 0.4 if args.quick else 6.0, args.seed)
+        monte_carlo(report, 2 if args.quick else args.runs, 0.4 if args.quick else 6.0, args.seed)
     if "terrain" in args.tables:
-        terrain(0.4 if args.quick else 6.0)
+        terrain(report, 0.4 if args.quick else 6.0)
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    tables = ["hopper", "quadruped", "monte_carlo", "terrain"]
+    arguments.add_argument("tables", nargs="*", default=tables, metavar="TABLE", help=", ".join(tables))
+    arguments.add_argument("--runs", type=int, default=100)
+    arguments.add_argument("--seed", type=int, default=0, help="of the Monte Carlo study")
+    return deliver("mpc", run, arguments, argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

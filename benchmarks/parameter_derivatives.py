@@ -1,21 +1,22 @@
-"""Parameter x situation: error of the derivative of a step, and what the derivatives by all parameters cost.
+"""What the derivatives by all parameters cost: a quadruped that stands, also `vjp`, per step of a rollout.
 
     python benchmarks/parameter_derivatives.py
 
-Error: along a random direction of all parameters of a kind, against differences of the solver at the same kappa,
-relative to the derivative. Cost: processor time of a quadruped that stands, also of `vjp`, per step of a rollout.
+How exact they are: `dojo-opt report mechanics`.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Callable
 from time import process_time
 
 import numpy as np
+from command import deliver, number, parser
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.parameters import check
-from dojo_opt.report.mechanics.situations import CASES
+from dojo_opt.report.result import Report
 from sim.parameters.parameters import KINDS, all_parameters
 from sim.parameters.selection import select
 from sim.parameters.sensitivity import parameter_columns
@@ -34,13 +35,13 @@ def seconds(call: Callable[[], object]) -> float:
     return min(rounds)
 
 
-def cost() -> str:
-    """A sentence about the standing quadruped."""
+def run(args: argparse.Namespace) -> Report:
+    """The standing quadruped, over 50 steps (5 quick)."""
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
     x, u = sim.neutral(), np.zeros(sim.nu)
     calls = sim._calls
     every, plan = select("benchmark", all_parameters(sim.mechanism, sim.time_step), sim.parameters().names)
-    T = 50
+    T = 5 if args.quick else 50
     us = np.zeros((T, sim.nu))
     t = sim.rollout(x, us, throw=True)
     loss = np.ones((T + 1, sim.ndx))
@@ -51,24 +52,24 @@ def cost() -> str:
     both = seconds(lambda: sim.linearize_rollout(x, us)) / T
     sweep = seconds(lambda: sim.vjp(t, loss)) / T
     full = seconds(lambda: sim.vjp(t, loss, wrt=("state", "input", *kinds))) / T
-    return (
-        f"quadruped, {len(every.names)} parameters [us]: step {1e6 * step:.1f}, step with state-input gradient "
-        f"{1e6 * both:.1f}, all parameters {1e6 * columns:.1f} more; vjp per step {1e6 * sweep:.1f} "
-        f"({sweep / both:.2f} of step with gradient), with all parameters {1e6 * full:.1f} ({full / both:.2f})"
-    )
+    report = Report("Derivatives by parameters of a standing quadruped", "")
+    report.rows = [
+        number("parameters", len(every.names)),
+        number("step", 1e6 * step, unit="us"),
+        number("step with gradient", 1e6 * both, unit="us"),
+        number("derivatives by all parameters", 1e6 * columns, unit="us"),
+        number("vjp, per step", 1e6 * sweep, unit="us"),
+        number("vjp, per step / step with gradient", sweep / both),
+        number("vjp by all parameters, per step", 1e6 * full, unit="us"),
+        number("vjp by all parameters, per step / step with gradient", full / both),
+    ]
+    return report
 
 
-def main() -> None:
-    """Print the table as Markdown, and the cost."""
-    errors = {name: check(name) for name in CASES}
-    print("| | " + " | ".join(errors) + " |")
-    print("|---" * (len(errors) + 1) + "|")
-    for kind in KINDS:
-        cells = (f"{row[kind]:.0e}" if kind in row else "" for row in errors.values())
-        print(f"| {kind} | " + " | ".join(cells) + " |")
-    print()
-    print(cost())
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    return deliver("parameter_derivatives", run, parser(__doc__), argv)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

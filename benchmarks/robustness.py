@@ -1,7 +1,7 @@
 """Solve one step from thousands of random extreme states and count every miss.
 
     python benchmarks/robustness.py                     20,000 states, the whole table
-    python benchmarks/robustness.py --states 2000 --mechanism hopper --json
+    python benchmarks/robustness.py --states 2000 --mechanism hopper
 
 Mechanisms: block (8 corners), hopper (2 balls), quadruped with 4 and with 12 contacts. Orientation uniform, joints
 uniform within their limits, linear, angular and joint speeds uniform up to 20 m/s and 20 rad/s; the lowest contact is
@@ -12,18 +12,19 @@ uniform within their limits, linear, angular and joint speeds uniform up to 20 m
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import time
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
 import numpy as np
+from command import deliver, number, parser, progress
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Cell as TableCell
+from dojo_opt.report.result import Report, Table
 
 Vector = NDArray[np.float64]
 
@@ -132,24 +133,24 @@ def run_cell(name: str, friction: float, h: float, kappa: float, states: int, se
 
 
 HEADER = (
-    f"{'mechanism':<12} {'friction':>8} {'h':>6} {'kappa':>7} {'states':>7} {'refused':>8} {'solved':>9} "
-    f"{'median':>6} {'99 %':>5} {'max':>4}  misses"
+    "",
+    "states",
+    "cannot be represented",
+    "solved",
+    "not solved",
+    "median",
+    "99 %",
+    "most",
+    "not solved by status",
 )
 
 
-def line(cell: Cell) -> str:
-    """One row of the table; a sum over settings shows them as '-'."""
-    tried = cell.states - cell.refused
-    its = np.array(cell.iterations) if cell.iterations else np.array([0])
-    share = 100.0 * cell.solved / tried if tried else 100.0
-    settings = [f"{value:g}" if value > -1.0 else "-" for value in (cell.friction, cell.time_step, cell.kappa)]
+def line(cell: Cell, label: str) -> list[TableCell]:
+    """One row of a table."""
+    its = cell.iterations or [0]
+    spread = [float(np.median(its)), float(np.percentile(its, 99)), max(its)]
     misses = ", ".join(f"{name} {count}" for name, count in cell.misses.items())
-    if cell.unreported:
-        misses += f"  UNREPORTED {cell.unreported}"
-    return (
-        f"{cell.mechanism:<12} {settings[0]:>8} {settings[1]:>6} {settings[2]:>7} {cell.states:>7} {cell.refused:>8} "
-        f"{share:>8.2f}% {np.median(its):>6.0f} {np.percentile(its, 99):>5.0f} {its.max():>4}  {misses}"
-    )
+    return [label, cell.states, cell.refused, cell.solved, cell.misses.total(), *spread, misses]
 
 
 def total(cells: list[Cell], name: str) -> Cell:
@@ -160,44 +161,52 @@ def total(cells: list[Cell], name: str) -> Cell:
     return out
 
 
-def study(states: int, mechanisms: list[str], seed: int, out: Any = None) -> list[Cell]:
+def study(states: int, mechanisms: list[str], seed: int) -> list[Cell]:
     """All cells; about `states` states over all mechanisms."""
     per_cell = max(1, round(states / (len(mechanisms) * len(FRICTIONS) * len(TIME_STEPS) * len(KAPPAS))))
-    cells: list[Cell] = []
-    if out:
-        print(HEADER, file=out)
-    for name, friction, h, kappa in product(mechanisms, FRICTIONS, TIME_STEPS, KAPPAS):
-        cells.append(run_cell(name, friction, h, kappa, per_cell, seed))
-        if out:
-            print(line(cells[-1]), file=out, flush=True)
-    return cells
+    settings = list(product(mechanisms, FRICTIONS, TIME_STEPS, KAPPAS))
+    named = [
+        (f"{name}, friction {mu:g}, {1e3 * h:g} ms, kappa {kappa:g}", (name, mu, h, kappa))
+        for name, mu, h, kappa in settings
+    ]
+    return [run_cell(*setting, per_cell, seed) for setting in progress()(named, "robustness")]
+
+
+def summary(cells: list[Cell]) -> Report:
+    """The sums as a table, what was missed as rows, the cells as details."""
+    report = Report("One step from random extreme states", "")
+    whole = total(cells, "all")
+    its = whole.iterations or [0]
+    report.rows = [
+        number("states", whole.states),
+        number("not solved", whole.misses.total(), 0),
+        number("called solved without being so", whole.unreported, 0, note="not finite, or below the ground"),
+        number("iterations, median", float(np.median(its))),
+        number("iterations, 99 %", float(np.percentile(its, 99))),
+        number("iterations, most", max(its)),
+    ]
+    parts = {name: [c for c in cells if c.mechanism == name] for name in MECHANISMS}
+    parts |= {f"h = {h:g} s": [c for c in cells if c.time_step == h] for h in TIME_STEPS}
+    parts |= {f"kappa {kappa:g}": [c for c in cells if c.kappa == kappa] for kappa in KAPPAS}
+    lines = [line(total(part, name), name) for name, part in parts.items() if part]
+    report.tables = [Table("Iterations", HEADER, [*lines, line(whole, "all")])]
+    report.details = {"cells": [{**vars(c), "iterations": dict(sorted(Counter(c.iterations).items()))} for c in cells]}
+    return report
+
+
+def run(args: argparse.Namespace) -> Report:
+    """The whole table."""
+    states = 256 if args.quick else args.states
+    return summary(study(states, args.mechanism or list(MECHANISMS), args.seed))
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print the table and the sums; exit status 1 if a miss was not reported."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--states", type=int, default=20_000, help="states over all cells")
-    parser.add_argument("--mechanism", choices=MECHANISMS, action="append", help="only this one (may be repeated)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", action="store_true", help="print the cells as JSON")
-    args = parser.parse_args(argv)
-    names = args.mechanism or list(MECHANISMS)
-    begin = time.perf_counter()
-    cells = study(args.states, names, args.seed, None if args.json else sys.stdout)
-    if args.json:
-        print(json.dumps([asdict(cell) for cell in cells]))
-    else:
-        print()
-        print(HEADER)
-        for name in names:
-            print(line(total([cell for cell in cells if cell.mechanism == name], name)))
-        for h in TIME_STEPS:
-            print(line(total([cell for cell in cells if cell.time_step == h], f"h = {h:g}")))
-        for kappa in KAPPAS:
-            print(line(total([cell for cell in cells if cell.kappa == kappa], f"kappa {kappa:g}")))
-        print(line(total(cells, "all")))
-        print(f"{time.perf_counter() - begin:.1f} s")
-    return 1 if any(cell.unreported for cell in cells) else 0
+    """Print or write the report; exit status 1 if a state was missed."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--states", type=int, default=20_000, help="states over all cells")
+    arguments.add_argument("--mechanism", choices=MECHANISMS, action="append", help="only this one (may be repeated)")
+    arguments.add_argument("--seed", type=int, default=0)
+    return deliver("robustness", run, arguments, argv)
 
 
 if __name__ == "__main__":

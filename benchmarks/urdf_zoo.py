@@ -2,7 +2,7 @@
 
     pip install example-robot-data pybullet
     python benchmarks/urdf_zoo.py                      one line per file, and the counts
-    python benchmarks/urdf_zoo.py --match a1 --json
+    python benchmarks/urdf_zoo.py --match a1
     python benchmarks/urdf_zoo.py my_robot.urdf        files of your own instead
 
 Each file is loaded as it is, on a floating base; when that is refused, with a fixed base, then with repaired inertias,
@@ -20,11 +20,9 @@ all of them, are simulated once, and are one line of the table.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import time
 import warnings
-from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, files
 from itertools import pairwise, product
@@ -32,8 +30,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
+from dojo_opt.report.result import Cell, Report, Row, Table
 
 PACKAGES = ("example-robot-data", "pybullet")
 DURATION = 2.0  # [s]
@@ -41,6 +41,7 @@ TIME_STEPS = (0.005, 0.001, 0.0002)  # [s]
 CLEARANCE = 0.01  # [m] of a robot on a fixed base
 DEPTH = 1e-6  # [m]
 GROWTH = 0.01  # of the largest kinetic energy
+STILL = ("no joint is free to move", "nothing that moves has a mass")  # reasons of a refusal
 
 
 @dataclass
@@ -135,25 +136,32 @@ def fall(out: Outcome, mech: Any, time_step: float) -> Outcome:
 
 
 HEADER = (
-    f"{'file':<44} {'bodies':>6} {'dofs':>4} {'contacts':>8} {'iter':>4} {'growth':>8} {'depth':>8}  verdict (settings)"
+    "file",
+    "alike",
+    "bodies",
+    "dofs",
+    "contacts",
+    "most iterations",
+    "growth",
+    "depth",
+    "verdict",
+    "settings",
+    "why",
 )
 
 
-def line(o: Outcome) -> str:
+def line(o: Outcome) -> list[Cell]:
     """One row of the table."""
-    copies = f" x {o.copies}" if o.copies > 1 else ""
+    why = " ".join(o.reason.split())[:160]
     if o.verdict == "refused":
-        return f"{o.file + copies:<44} refused: {' '.join(o.reason.split())[:160]}"
-    settings = f" ({o.how})" if o.how else ""
-    return (
-        f"{o.file + copies:<44} {o.bodies:>6} {o.dofs:>4} {o.contacts:>8} {o.iterations:>4} {o.growth:>8.2g} "
-        f"{o.depth:>8.1e}  {o.verdict}{settings}"
-    )
+        return [o.file, o.copies, *[None] * 6, o.verdict, o.how, why]
+    return [o.file, o.copies, o.bodies, o.dofs, o.contacts, o.iterations, o.growth, o.depth, o.verdict, o.how, why]
 
 
-def study(paths: list[Path], out: Any = None) -> list[Outcome]:
+def study(paths: list[Path]) -> list[Outcome]:
     """All files; of the random objects of PyBullet, those with the same body as one."""
-    outcomes = [_told(run(path), out) for path in paths if "random_urdfs" not in path.parts]
+    several = [path for path in paths if "random_urdfs" not in path.parts]
+    outcomes = [run(path) for path in progress()([(path.name, path) for path in several], "files")]
     alike: dict[Any, list[Path]] = {}
     for path in paths:
         if "random_urdfs" in path.parts:
@@ -163,52 +171,61 @@ def study(paths: list[Path], out: Any = None) -> list[Outcome]:
     for copies in alike.values():
         outcome = run(copies[0])
         outcome.copies = len(copies)
-        outcomes.append(_told(outcome, out))
+        outcomes.append(outcome)
     return outcomes
 
 
-def _told(outcome: Outcome, out: Any) -> Outcome:
-    """The outcome, after its line is printed."""
-    if out:
-        print(line(outcome), file=out, flush=True)
-    return outcome
+def number_of(outcomes: Iterable[Outcome]) -> int:
+    """How many files they stand for."""
+    return sum(o.copies for o in outcomes)
 
 
-def counts(outcomes: list[Outcome]) -> Counter[str]:
-    """Number of files by verdict and settings."""
-    total: Counter[str] = Counter()
-    for o in outcomes:
-        kind = o.verdict if o.verdict in ("fine", "refused") else "not fine"
-        how = o.how.partition("; ")[0]
-        total[f"{kind}, {how}" if how else kind] += o.copies
-    return total
+def summary(outcomes: list[Outcome]) -> Report:
+    """Counts as rows, one line per file as a table."""
+    report = Report("URDF files of others", "")
+    fine = [o for o in outcomes if o.verdict == "fine"]
+    refused = [o for o in outcomes if o.verdict == "refused"]
+    still = [o for o in refused if any(reason in o.reason for reason in STILL)]
+
+    def row(name: str, chosen: Iterable[Outcome], bar: float | None = None) -> Row:
+        return number(name, number_of(chosen), bar)
+
+    report.rows = [
+        row("files", outcomes),
+        row("files, alike", (o for o in outcomes if o.copies > 1)),
+        row("fine", fine),
+        row("fine, alike", (o for o in fine if o.copies > 1)),
+        row("fine, with repair=True", (o for o in fine if "repair" in o.how)),
+        row("fine, with repair=True, alike", (o for o in fine if "repair" in o.how and o.copies > 1)),
+        *(row(f"fine, with {1e3 * h:g} ms", (o for o in fine if f"{1e3 * h:g} ms; " in o.how)) for h in TIME_STEPS[1:]),
+        row("fine, with a fixed base", (o for o in fine if "fixed base" in o.how)),
+        row("refused", refused),
+        row("refused: nothing in it can move", still),
+        row("refused for another reason", (o for o in refused if o not in still)),
+        row("not fine", (o for o in outcomes if o not in fine + refused), 0),
+        row("can touch the ground", (o for o in outcomes if o.contacts)),
+    ]
+    lines = [line(o) for o in outcomes]
+    report.tables = [Table("Files", HEADER, lines, "growth of energy over what is allowed; depth in m")]
+    report.details = {"files": [asdict(o) for o in outcomes]}
+    return report
+
+
+def measure(args: argparse.Namespace) -> Report:
+    """All files whose path has `match` in it.  SystemExit: there are none."""
+    paths = [p for p in args.files or package_files() if args.match in str(p)][: 20 if args.quick else None]
+    if not paths:
+        print(f"urdf_zoo: no files; pip install {' '.join(PACKAGES)}", file=sys.stderr)
+        raise SystemExit(2)
+    return summary(study(paths))
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print the table and the counts; exit status 1 if a robot that was loaded did not do well."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("files", nargs="*", type=Path, help="URDF files; default: those of the two packages")
-    parser.add_argument("--match", default="", help="only files with this in their path")
-    parser.add_argument("--json", action="store_true", help="print the outcomes as JSON")
-    args = parser.parse_args(argv)
-    paths = [p for p in args.files or package_files() if args.match in str(p)]
-    if not paths:
-        print(f"urdf_zoo: no files; pip install {' '.join(PACKAGES)}", file=sys.stderr)
-        return 2
-    begin = time.perf_counter()
-    if not args.json:
-        print(HEADER)
-    outcomes = study(paths, None if args.json else sys.stdout)
-    if args.json:
-        print(json.dumps([asdict(o) for o in outcomes]))
-    else:
-        print()
-        for kind, number in counts(outcomes).most_common():
-            print(f"{number:>5}  {kind}")
-        touching = sum(o.copies for o in outcomes if o.contacts)
-        print(f"{touching:>5}  can touch the ground; the others have meshes only, and fall freely, or are refused")
-        print(f"{sum(o.copies for o in outcomes):>5}  files in {time.perf_counter() - begin:.0f} s")
-    return 1 if any(o.verdict not in ("fine", "refused") for o in outcomes) else 0
+    """Print or write the report; exit status 1 if a robot that was loaded did not do well."""
+    arguments = parser(__doc__)
+    arguments.add_argument("files", nargs="*", type=Path, help="URDF files; default: those of the two packages")
+    arguments.add_argument("--match", default="", help="only files with this in their path")
+    return deliver("urdf_zoo", measure, arguments, argv)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,13 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 from programs import HOME
-from urdf_files import branched
+from urdf_files import branched, collision, inertial, joint, link, write
 
 import dojo_opt as dojo
 from dojo_opt import cli
@@ -73,7 +74,7 @@ def test_a_missed_bar_exits_with_1_only_when_strict(
     report = Report(
         "title", "command", [Row("fast", np.float64(1.0), "us", 2.0), Row("slow", np.float64(3.0), "us", 2.0)]
     )
-    monkeypatch.setattr(cli, "run_report", lambda name, **_: report)
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", lambda name, **_: report)
     assert cli.main(["report", "timing", "--out", str(tmp_path)]) == 0
     assert "NO" in capsys.readouterr().out
     assert cli.main(["report", "timing", "--strict", "--json"]) == 1
@@ -81,6 +82,45 @@ def test_a_missed_bar_exits_with_1_only_when_strict(
     assert numbers["command"] == "dojo-opt report timing"
     assert numbers["studies"]["timing"]["rows"][1]["met"] is False
     capsys.readouterr()
+
+
+def test_a_study_that_fails_takes_no_other_with_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(name: str, **_: object) -> Report:
+        if name == "contact":
+            raise RuntimeError("MuJoCo has no license")
+        return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
+
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", run)
+    assert cli.main(["report", "all", "--out", str(tmp_path)]) == 1
+    studies = json.loads((tmp_path / "report.json").read_text())["studies"]
+    assert [name for name, study in studies.items() if not study["met"]] == ["contact"]
+    assert studies["contact"]["details"] == {"error": "RuntimeError: MuJoCo has no license"}
+    assert "MuJoCo has no license" in capsys.readouterr().out
+    with pytest.raises(RuntimeError, match="no license"):
+        cli.main(["report", "contact"])
+
+
+def test_links_that_touch_the_ground_are_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured = []
+
+    def run(name: str, mechanism: dojo.Mechanism, **_: object) -> Report:
+        measured.append(mechanism)
+        return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
+
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", run)
+    foot = link("foot", inertial(), collision('<box size="0.1 0.1 0.1"/>'))
+    robot = write(tmp_path, link("base", inertial()), foot, joint("hip", "base", "foot"), name="leg")
+    assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot", "base=0.2", "--out", str(tmp_path)]) == 0
+    assert [c.body for c in measured[0].contacts].count("foot") == 8
+    assert [c.radius for c in measured[0].contacts if c.body == "base"] == [0.2]
+    command = json.loads((tmp_path / "report.json").read_text())["command"]
+    assert command.endswith("leg.urdf --contacts foot base=0.2")
+    assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot=wide"]) == 2
+    assert "--contacts foot=wide: expected LINK or LINK=RADIUS in metres" in capsys.readouterr().err
 
 
 def test_the_module_runs_as_a_program() -> None:

@@ -1,5 +1,7 @@
 """A small version of benchmarks/robustness.py: random extreme states, no miss unreported and none at all."""
 
+import json
+
 import numpy as np
 import pytest
 from benchmark import loaded
@@ -14,5 +16,22 @@ def robustness():
 def test_no_extreme_state_is_missed(robustness, name):
     whole = robustness.total(robustness.study(160, [name], seed=7), name)
     assert whole.unreported == 0
-    assert not whole.misses, robustness.line(whole)
-    assert np.median(whole.iterations) <= 6, robustness.line(whole)
+    assert not whole.misses, robustness.line(whole, name)
+    assert np.median(whole.iterations) <= 6, robustness.line(whole, name)
+
+
+def test_a_benchmark_writes_what_a_study_writes(robustness, tmp_path, capsys):
+    assert robustness.main(["--states", "64", "--mechanism", "block", "--out", str(tmp_path / "new")]) == 0
+    assert "iterations, 99 %" in capsys.readouterr().out
+    written = json.loads((tmp_path / "new/robustness.json").read_text())
+    assert written["command"].endswith("python benchmarks/robustness.py --states 64 --mechanism block")
+    assert {row["name"]: row["value"] for row in written["rows"]}["states"] == 64
+    assert sum(sum(cell["iterations"].values()) for cell in written["details"]["cells"]) == 64
+    assert robustness.main(["--quick", "--mechanism", "block", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["met"] is True
+
+
+def test_a_missed_bar_is_the_exit_status(robustness, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(robustness, "lowest", lambda sim, x: -1.0)  # everything is below the ground
+    assert robustness.main(["--states", "32", "--mechanism", "block"]) == 1
+    assert "NO" in capsys.readouterr().out

@@ -43,7 +43,7 @@ def test_own_files_are_simulated_or_refused(zoo, tmp_path, capsys):
     leg = link("leg", inertial(), collision('<sphere radius="0.1"/>'))
     good = write(tmp_path, link("base", inertial()), leg, joint("hip", "base", "leg"), name="good")
     assert zoo.main([str(good), "--json"]) == 0
-    (out,) = json.loads(capsys.readouterr().out)
+    (out,) = json.loads(capsys.readouterr().out)["details"]["files"]
     assert (out["verdict"], out["bodies"], out["dofs"], out["contacts"]) == ("fine", 2, 7, 1)
     assert 0.0 < out["iterations"] < 60
     flat = write(tmp_path, link("base", inertial(inertia=(1, 1, 3, 0, 0, 0))), name="flat")
@@ -52,8 +52,12 @@ def test_own_files_are_simulated_or_refused(zoo, tmp_path, capsys):
     assert "exceeds the sum of the others" in repaired.reason
     massless = write(tmp_path, link("base", ""), name="massless")
     assert zoo.main([str(massless)]) == 0
-    assert "refused: nothing that moves has a mass" in capsys.readouterr().out
-    assert zoo.main(["--match", "no file has this in its path"]) == 2
+    assert "nothing that moves has a mass" in capsys.readouterr().out
+    rows = {row.name: row.value for row in zoo.summary(zoo.study([good, flat, massless])).rows}
+    assert (rows["files"], rows["fine"], rows["fine, with repair=True"], rows["refused"]) == (3, 2, 1, 1)
+    assert rows["refused: nothing in it can move"] == 1 and rows["can touch the ground"] == 1
+    with pytest.raises(SystemExit, match="2"):
+        zoo.main(["--match", "no file has this in its path"])
     capsys.readouterr()
 
 
@@ -61,7 +65,7 @@ def test_a_robot_that_does_badly_is_reported(zoo, tmp_path, capsys, monkeypatch)
     ball = write(tmp_path, link("ball", inertial(), collision('<sphere radius="0.1"/>')), name="ball")
     monkeypatch.setattr(zoo, "DEPTH", -1.0)
     assert zoo.main([str(ball)]) == 1
-    assert "in the ground (0.2 ms; with 1 ms: in the ground)" in capsys.readouterr().out
+    assert "in the ground  0.2 ms; with 1 ms: in the ground" in capsys.readouterr().out
 
 
 @pytest.mark.slow

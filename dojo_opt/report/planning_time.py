@@ -19,7 +19,7 @@ from dojo_opt.problem import Problem
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.crocoddyl_trot import CrocoddylTrot
 from dojo_opt.report.mujoco_ilqr import MujocoIlqr
-from dojo_opt.report.result import Report, Row
+from dojo_opt.report.result import Cell, Report, Row, Table
 
 CROCODDYL, PIN = "3.2.1", "4.0.0"  # wheels that fit one another: with others crocoddyl ends the process
 
@@ -49,25 +49,33 @@ def _trot(report: Report, rounds: int) -> None:
     if not plan.success:
         raise RuntimeError(f"report timing: the trot is not planned: {plan.message}")
     cases: dict[str, Callable[[], Any]] = {"ours": lambda: dojo.ilqr(problem)}
-    iterations = {"ours": plan.nit}
-    notes = {"ours": f"cost {plan.fun:.3g}"}
+    iterations, costs, notes = {"ours": plan.nit}, {"ours": plan.fun}, {"ours": ""}
     for name, prepare in (("mujoco", _mujoco), ("crocoddyl", _crocoddyl)):
         missing = _missing(name)
         if missing:
             report.notes.append(missing)
         else:
-            cases[name], iterations[name], notes[name] = prepare(problem)
+            cases[name], iterations[name], costs[name], notes[name] = prepare(problem)
     seconds = interleave(cases, rounds)
     each = {name: 1e3 * s / iterations[name] for name, s in seconds.items()}
     report.details["trot"] = {
-        name: {"seconds": s.tolist(), "iterations": iterations[name]} for name, s in seconds.items()
+        name: {"seconds": s.tolist(), "iterations": iterations[name], "cost": costs[name]}
+        for name, s in seconds.items()
     }
 
     def row(name: str, label: str, bar: float | None = None) -> Row:
         whole = 1e3 * float(np.median(seconds[name]))
-        note = f"{problem.horizon} knots, {iterations[name]} iterations, {whole:.3g} ms per solve, {notes[name]}"
-        return Row(f"quadruped trot: {label}", float(np.median(each[name])), "ms", bar, note=note)
+        note = (
+            f"{problem.horizon} knots, {iterations[name]} iterations, {whole:.3g} ms per solve, cost {costs[name]:.3g}"
+        )
+        return Row(f"quadruped trot: {label}", float(np.median(each[name])), "ms", bar, note=note + notes[name])
 
+    lines: list[list[Cell]] = []
+    for name in cases:
+        over = float(np.median(each[name] / each["ours"]))
+        lines.append([name, iterations[name], float(np.median(each[name])), over, costs[name]])
+    header = ("planner", "iterations", "ms per iteration", "iteration / ours", "cost")
+    report.tables.append(Table("Planners of the trot", header, lines))
     report.rows.append(row("ours", "iLQR iteration", 5.0))
     for name, label in (("mujoco", "MuJoCo + NumPy iteration"), ("crocoddyl", "crocoddyl iteration, contacts given")):
         if name in each:
@@ -89,23 +97,23 @@ def _missing(package: str) -> str:
     return "" if fits else f"trot: without crocoddyl, it has to be {CROCODDYL} with pin {PIN}, not {found}"
 
 
-def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, str]:
-    """Solve by MuJoCo's finite differences and NumPy; iterations; what it is."""
+def _mujoco(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
+    """Solve by MuJoCo's finite differences and NumPy; iterations; cost; what it is."""
     solver = MujocoIlqr(problem)
     solution = solver.solve()
     if max(solution.violation, solution.gap) > 1e-3:
         raise RuntimeError(f"report timing: MuJoCo's trot ends with a violation of {solution.violation:.2g}")
-    note = f"cost {solution.cost:.3g}, {solver.substeps} steps of {1e3 * solver.time_step:.3g} ms per knot"
-    return solver.solve, solution.iterations, note
+    note = f", {solver.substeps} steps of {1e3 * solver.time_step:.3g} ms per knot"
+    return solver.solve, solution.iterations, solution.cost, note
 
 
-def _crocoddyl(problem: Problem) -> tuple[Callable[[], Any], int, str]:
-    """Solve by FDDP with the contact sequence given; iterations; what it is."""
+def _crocoddyl(problem: Problem) -> tuple[Callable[[], Any], int, float, str]:
+    """Solve by FDDP with the contact sequence given; iterations; cost; what it is."""
     trot = CrocoddylTrot(problem)
     iterations = trot.solve()
     if not trot.solver.isFeasible:
         raise RuntimeError(f"report timing: crocoddyl's trot is not feasible after {iterations} iterations")
-    return trot.solve, iterations, f"cost {trot.solver.cost:.3g}, FDDP, one thread"
+    return trot.solve, iterations, float(trot.solver.cost), ", FDDP, one thread"
 
 
 def _ticks(report: Report, duration: float) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from importlib import import_module
 from typing import Protocol, TextIO, TypeVar
 
-from dojo_opt.report.result import Report
+from dojo_opt.report.result import Report, Row
 from sim.mechanism import Mechanism
 
 Item = TypeVar("Item")
@@ -83,3 +83,24 @@ def study(name: str, *, quick: bool = False, mechanism: Mechanism | None = None)
 def run_report(name: str, *, quick: bool = False, mechanism: Mechanism | None = None, verbose: bool = False) -> Report:
     """Run the study of that name; verbose shows a progress bar on stderr."""
     return study(name, quick=quick, mechanism=mechanism).run(Progress(sys.stderr if verbose else None))
+
+
+def run_reports(
+    names: Sequence[str], *, quick: bool = False, mechanism: Mechanism | None = None, verbose: bool = False
+) -> dict[str, Report]:
+    """The studies of those names; of several, one that ends with an error is a report that says so.
+
+    Its only bar is missed, and its details have the "error". A single study raises it.
+    """
+    reports: dict[str, Report] = {}
+    for name in names:
+        try:
+            reports[name] = run_report(name, quick=quick, mechanism=mechanism, verbose=verbose)
+        except Exception as error:
+            if len(names) == 1:
+                raise
+            reports[name] = Report(STUDIES[name][0], f"dojo-opt report {name}")
+            reason = f"{type(error).__name__}: {error}"
+            reports[name].details["error"] = reason
+            reports[name].rows = [Row("run to its end", 0.0, "", 1.0, at_least=True, note=reason)]
+    return reports

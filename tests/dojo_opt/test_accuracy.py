@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.report import Progress, study
-from dojo_opt.report.accuracy import Accuracy, curves, robot, scenes, start
+from dojo_opt.report.accuracy import Accuracy, advice, curves, robot, scenes, start
 from dojo_opt.report.accuracy.curves import Point
 from dojo_opt.report.accuracy.robot import Trial
 from dojo_opt.report.engines import Ours
@@ -122,6 +122,9 @@ def test_a_robot_gets_a_recommendation() -> None:
     report = study("accuracy", quick=True, mechanism=dojo.models.raiberthopper()).run(Progress())
     rows = {row.name: row for row in report.rows}
     assert "after 0.1 s" in rows["recommended time step"].note
+    h, kappa = rows["recommended time step"].value / 1e3, rows["recommended kappa"].value
+    assert report.summary.startswith(f"Take dojo.Simulator(mechanism, time_step={h:g}, kappa={kappa:g}): ")
+    assert any("smaller steps need a smaller kappa" in note for note in report.notes)
     assert 0.1 < rows["recommended time step"].value < 100.0
     assert [table.title for table in report.tables] == [
         "With contacts and limits",
@@ -141,7 +144,28 @@ def test_a_robot_without_contacts_and_limits_is_measured_too() -> None:
 def test_a_robot_that_the_reference_does_not_know_is_compared_with_itself() -> None:
     report = study("accuracy", quick=True, mechanism=dojo.models.orbital(2)).run(Progress())
     assert report.rows[0].name == "recommended time step"
-    assert report.notes == ["not compared with an independent ODE: that has no joint with two rotations ('joint_1')"]
+    assert "not compared with an independent ODE: that has no joint with two rotations ('joint_1')" in report.notes
+
+
+def trial(h: float, kappa: float, error: float, message: str = "") -> robot.Trial:
+    return robot.Trial(h, kappa, 1e-8, error, 0.05, message)
+
+
+def test_advice_is_what_the_trials_say() -> None:
+    fine, rough = trial(1e-3, 1e-6, 8e-4), trial(2e-2, 1e-4, 6e-3)
+    assert "time_step=0.001, kappa=1e-06): 0.8 mm off" in advice.recommendation(fine, 1e-3, 1e-5)
+    assert "as exact as asked for, 1 mm. The best one is" in advice.recommendation(rough, 1e-3, 1e-5)
+    assert "asked for, 4 mm, twice what the converged motion" in advice.recommendation(rough, 4e-3, 2e-3)
+    lost = trial(1e-3, 1e-6, np.inf, "step 3 was not solved")
+    assert advice.recommendation(lost, 1e-3, 1e-5).endswith("to its end: step 3 was not solved")
+    hopper = advice.hints(dojo.models.raiberthopper(), fine, [fine, rough], robot.choose)
+    assert "To plan with, where 6 mm" in hopper[0] and "time_step=0.02 and kappa=0.0001" in hopper[0]
+    alone = advice.hints(dojo.models.raiberthopper(), fine, [fine], robot.choose)
+    assert len(alone) == 1 and "kappa/(gap h)" in alone[0]
+    arm = advice.hints(dojo.models.npendulum(2), fine, [fine, rough], robot.choose)
+    assert len(arm) == 1 and "has no contacts" in arm[0]
+    flier = advice.hints(replace(dojo.models.raiberthopper(), contacts=()), fine, [fine], robot.choose)
+    assert "has no contacts" in flier[0] and "--contacts LINK" in flier[1]
 
 
 def test_what_the_reference_does_not_know_is_named() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.report.engines import Engine, Ours, Run, installed
-from dojo_opt.report.engines.run import nodes
+from dojo_opt.report.engines.run import ended, nodes
 
 ENGINES = [Ours(rounds=1), *installed()]
 SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]
@@ -81,6 +81,26 @@ def test_a_run_that_is_lost_says_so_and_keeps_what_was_good() -> None:
         run = euler.simulate(stiff, v=[5.0, 0.0], **args)
         assert "lost between" in run.message
         assert len(run.time) == len(run.energy) < 11 and np.isfinite(run.position).all()
+
+
+def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
+    """And one that cannot represent a mechanism still says so."""
+
+    class Breaking:
+        name = "breaking"
+
+        def __init__(self, error: Exception) -> None:
+            self.error = error
+
+        @ended
+        def simulate(self, mechanism: dojo.Mechanism, **_: object) -> Run:
+            raise self.error
+
+    run = swing(Breaking(RuntimeError("no license\nat all")))
+    assert run.message == "RuntimeError: no license" and run.steps == 0
+    np.testing.assert_allclose(run.position, swing(ENGINES[0]).position[:1], atol=1e-12)
+    with pytest.raises(ValueError, match="no springs"):
+        swing(Breaking(ValueError("no springs")))
 
 
 def test_nothing_is_written_where_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,4 +90,5 @@ def test_every_quick_trial_passes() -> None:
     report = Stability(quick=True).run(Progress())
     missed = [row.name for row in report.rows if row.met is False]
     assert not missed
-    assert len(report.tables[-1].header) == 1 + min(1, len(engines.installed()[1:2]))
+    assert len(report.tables[-1].header) == 2 + min(1, len(engines.installed()[1:2]))
+    assert report.tables[-1].rows[-1][:2] == ["all", f"{len(report.rows) - 1} of {len(report.rows) - 1}"]

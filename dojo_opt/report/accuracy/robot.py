@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.plots.axes import plain_ticks
 from dojo_opt.report.accuracy import curves, drawing, scenes
+from dojo_opt.report.accuracy.advice import hints, recommendation
 from dojo_opt.report.accuracy.start import start
 from dojo_opt.report.engines import Engine, Ours, installed
 from dojo_opt.report.result import Cell, Report, Row, Table
@@ -171,6 +172,8 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
     header = ["step, ms", "kappa", "tolerance", "error, mm", "times real time", "ended early"]
     report.tables.append(Table("With contacts and limits", header, rows, note="the last rows vary the tolerance"))
     report.details["trials"] = [{**vars(t), "realtime": t.realtime} for t in (*trials, *tolerances)]
+    report.summary = f"{recommendation(best, target, own)} {report.summary}"
+    report.notes += hints(mechanism, best, trials, choose)
     report.figure = _figure(mechanism.name, best, trials, own, target)
 
 

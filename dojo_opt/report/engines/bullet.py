@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines import bullet_scene
 from dojo_opt.report.engines.bullet_scene import World
-from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
+from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_scene import is_free
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Model
@@ -37,6 +37,7 @@ class Bullet:
     rounds: int = 1  # a run shorter than a second is clocked so many times
     name: str = "PyBullet"
 
+    @ended
     def simulate(
         self,
         mechanism: Mechanism,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines import drake_scene
 from dojo_opt.report.engines.drake_scene import Plant
-from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
+from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Model
 from sim.simulator import Simulator
@@ -36,6 +36,7 @@ class Drake:
         """As it stands in a table."""
         return f"Drake {self.approximation.lower() or 'RK3'}"
 
+    @ended
     def simulate(
         self,
         mechanism: Mechanism,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report import mujoco_scene
-from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
+from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_warnings import quiet
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
@@ -39,6 +39,7 @@ class MuJoCo:
         """As it stands in a table."""
         return f"MuJoCo {self.integrator}" + (f", {self.label}" if self.label else "")
 
+    @ended
     def simulate(
         self,
         mechanism: Mechanism,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from functools import wraps
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]
+Simulate = TypeVar("Simulate", bound=Callable[..., Any])
 
 
 class Run(NamedTuple):
@@ -63,6 +65,27 @@ class Engine(Protocol):
         shape, or a mechanism that the engine cannot represent.
         """
         ...
+
+
+def ended(simulate: Simulate) -> Simulate:
+    """A `simulate` whose exceptions are runs that end at their start: a cell of a table, not the end of a report.
+
+    ValueErrors pass: they say that a mechanism cannot be represented.
+    """
+
+    @wraps(simulate)
+    def run(engine: Engine, mechanism: Mechanism, **given: Any) -> Run:
+        try:
+            return simulate(engine, mechanism, **given)
+        except ValueError:
+            raise
+        except Exception as error:  # whatever a library raises
+            sim = Simulator(mechanism, time_step=given["time_step"])
+            q, v = (np.atleast_2d(np.asarray(given[name], dtype=np.float64)) for name in ("q", "v"))
+            reason = str(error).partition("\n")[0].partition(". ")[0][:200]
+            return observe(sim, np.zeros(1), q, v, 0.0, 0, f"{type(error).__name__}: {reason}")
+
+    return run  # type: ignore[return-value]
 
 
 def nodes(time_step: float, duration: float, samples: int) -> NDArray[np.int64]:

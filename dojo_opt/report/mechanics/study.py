@@ -45,6 +45,7 @@ class Mechanics:
         lines = [[kind, *values.values()] for kind, values in found.items()]
         report.tables.append(Table("Joint kinds", ("", *joints.BARS), lines, _note(joints.__doc__)))
         report.details["joints"] = found
+        report.rows.append(Row("kinds of joints", len(found), ""))
         for name, bar in joints.BARS.items():
             values = {kind: value for kind, v in found.items() if (value := v[name]) is not None}
             least = name == "energy"
@@ -61,6 +62,7 @@ class Mechanics:
         lines = [[name, *(_short(values[c]) for c in columns)] for name, values in found.items()]
         report.tables.append(Table("Pairs of shapes", ("", *columns), lines, _note(collisions.__doc__)))
         report.details["pairs"] = found
+        report.rows.append(Row("pairs of shapes", len(found), ""))
         groups: dict[tuple[str, float], dict[str, float]] = {}
         for name, values in found.items():
             for c, value in values.items():
@@ -83,6 +85,13 @@ class Mechanics:
                 title = f"Derivatives by parameters{title}"
                 report.tables.append(Table(title, ("", *part), lines, _note(parameters.__doc__)))
         report.details["parameters"] = found
+        every = {kind for values in found.values() for kind in values}
+        right = [k for k in every if all(values.get(k, 0.0) <= parameters.BAR for values in found.values())]
+        report.rows += [
+            Row("kinds of parameters", len(every), ""),
+            Row("situations of parameters", len(found), ""),
+            Row("kinds of parameters whose derivatives are right", len(right), "", len(every), at_least=True),
+        ]
         for name, values in found.items():
             report.rows.append(_worst(f"parameters: {name}", values, parameters.BAR, ""))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 from math import isnan
 from typing import Any
 
@@ -107,10 +108,18 @@ def _tables(
                 cost = float(numbers[k]["dojo-opt"].get("us_per_step", 0.0))
                 rows.append([trial.name, trial.rule, *(found[k].text for found in verdicts.values()), cost])
         tables.append(Table(group, ("", "passes when", *verdicts, "dojo-opt [us per step]"), rows))
-    given = [[v.passed for v in found if v.text != NOT_GIVEN] for found in verdicts.values()]
-    passed: list[Cell] = [f"{sum(found)} of {len(found)}" for found in given]
-    tables.append(Table("passed", tuple(verdicts), [passed]))
-    return tables
+    groups = [*(table.title for table in tables), "all"]
+    passed: list[list[Cell]] = []
+    for group in groups:
+        rows_of = [group in (trial.group, "all") for trial in trials]
+        passed.append([group, *(_share(list(compress(found, rows_of))) for found in verdicts.values())])
+    return [*tables, Table("passed", ("", *verdicts), passed)]
+
+
+def _share(verdicts: Sequence[Verdict]) -> str:
+    """How many passed, of those that were given."""
+    given = [verdict.passed for verdict in verdicts if verdict.text != NOT_GIVEN]
+    return f"{sum(given)} of {len(given)}" if given else ""
 
 
 def _passed(verdicts: Sequence[Verdict]) -> Row:

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Measure everything that the pages quote; half an hour on a quiet machine.
+#
+#   pip install ".[bench,drake,bullet,crocoddyl,gym]"          the other engines, and gymnasium's robots
+#   pip install --no-deps "example-robot-data>=6"              URDF files; crocoddyl asks for older ones, needs none
+#   benchmarks/all.sh DIR            writes report.html, report.json, a JSON per benchmark, and figures to DIR
+#   benchmarks/all.sh DIR --quick    a check that it runs
+#   python docs/figures.py --take DIR        puts the numbers into docs/measured and the pages
+#
+# What is not installed is left out. Ends with 1 when a study failed, or a benchmark missed a bar; the others still run.
+set -uo pipefail
+
+out="$(mkdir -p "${1:?benchmarks/all.sh: where to? benchmarks/all.sh DIR [--quick]}" && cd "$1" && pwd)" || exit 2
+quick="${2:-}"
+case "$quick" in "" | --quick) ;; *) echo "benchmarks/all.sh: expected --quick, got $quick" >&2; exit 2 ;; esac
+here="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+python="${PYTHON:-python}"
+cd "$out" || exit 2
+missed=""
+
+measure() {  # NAME COMMAND...: what it prints goes to NAME.txt
+    local name="$1" begin="$SECONDS"
+    shift
+    "$@" >"$name.txt" || missed="$missed $name"
+    printf '== %s: %d s\n' "$name" "$((SECONDS - begin))"
+}
+
+measure report "$python" -m dojo_opt report all $quick --out "$out"
+export NUMBA_NUM_THREADS=1  # one core, as the tables say
+measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
+measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
+measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
+measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"
+measure collisions "$python" "$here/benchmarks/collisions.py" --motions 120 $quick --out "$out"
+measure mpc "$python" "$here/benchmarks/mpc.py" $quick --out "$out"
+measure parameter_derivatives "$python" "$here/benchmarks/parameter_derivatives.py" $quick --out "$out"
+if "$python" -c 'import importlib.metadata as m; m.version("example-robot-data")' 2>/dev/null; then
+    measure urdf_zoo "$python" "$here/benchmarks/urdf_zoo.py" $quick --out "$out"
+else
+    echo "== urdf_zoo: left out, example-robot-data is not installed"
+fi
+measure hopper "$python" "$here/examples/hopper.py" $quick
+
+printf '%d s in all\n' "$SECONDS"
+if [ -n "$missed" ]; then
+    echo "failed, or missed a bar:$missed"
+    exit 1
+fi
