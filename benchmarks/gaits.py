@@ -1,7 +1,7 @@
 """Gaits of a quadruped by iLQR: iterations, cost, and what is left of a plan at a fifth of its time step.
 
-    python benchmarks/gaits.py           the table below, and 72 random gaits (a minute)
-    python benchmarks/gaits.py --quick   the table with fewer rows, and 10 random gaits
+    python benchmarks/gaits.py           the table below, 72 random gaits, 32 leaps, 40 random leaps (three minutes)
+    python benchmarks/gaits.py --quick   the table with fewer rows, 10 random gaits, 8 leaps, 4 random leaps
 
 Columns: iterations, rejected ones included, and the rejected ones; cost; largest violation of the constraints;
 least cosine between the base's z axis and the vertical; largest torque [N m]; how far the base rises [m]. Then, for
@@ -42,6 +42,7 @@ TABLE: list[tuple[str, dict[str, Any]]] = [
     ("leap", {"distance": 0.0, "height": 0.3}),
     ("leap", {"distance": 0.5, "height": 0.3}),
     ("trot", {"cycles": 1, "periodic": True}),
+    ("trot", {"cycles": 2, "periodic": True}),
     ("trot", {"speed": 0.0}),
     ("trot", {"speed": 0.4}),
     ("trot", {"damping": 0.05}),
@@ -110,6 +111,33 @@ def random_gaits(count: int) -> None:
     print(f"{count - failed} of {count} random gaits planned and upright; {spread}")
 
 
+def leaps(count: int) -> None:
+    """Leaps on a grid of distances and heights, then random ones: how many are planned, and rise as asked within 1 cm.
+
+    Random: -.3 to .55 m far, .1 to .33 m high, crouch .05 to .14 m, damping .05 to 1 N m s/rad, .8 to 1.2 s long.
+    """
+    rng = np.random.default_rng(5)
+    far = np.arange(-2, 6)[:: 7 if QUICK else 1] / 10.0
+    grid = [{"distance": float(d), "height": h} for d in far for h in (0.15, 0.2, 0.25, 0.3)]
+    ranges = {"distance": (-0.3, 0.55), "height": (0.1, 0.33), "crouch": (0.05, 0.14), "duration": (0.8, 1.2)}
+    drawn = [
+        {key: rng.uniform(*ends) for key, ends in ranges.items()} | {"damping": 10 ** rng.uniform(-1.3, 0.0)}
+        for _ in range(count)
+    ]
+    for kind, cases in (("leaps", grid), ("random leaps", drawn)):
+        plans = [dojo.ilqr(dojo.problems.leap(**settings)) for settings in cases]
+        good = [
+            plan.success and upright(plan.x) > 0.85 and plan.x[:, 2].max() - plan.x[0, 2] > settings["height"] - 0.01
+            for plan, settings in zip(plans, cases, strict=True)
+        ]
+        for settings, plan, fine in zip(cases, plans, good, strict=True):
+            if not fine:
+                print(f"not planned: leap {settings}: {plan.status.name}, violated by {plan.violation:.2g}")
+        iterations = [plan.nit for plan in plans]
+        spread = f"iterations {np.median(iterations):.0f} at the median, {max(iterations)} at most"
+        print(f"{sum(good)} of {len(cases)} {kind} planned, upright, and as high as asked; {spread}", flush=True)
+
+
 def main() -> None:
     """Print the table."""
     print(f"{'':42}   it  rej    cost    viol upright  torque   rise |    off upright torque   slid   lift")
@@ -122,6 +150,7 @@ def main() -> None:
         rise = plan.x[:, 2].max() - plan.x[0, 2]
         print(f"{row} {np.abs(plan.u).max():7.1f} {rise:6.3f} | {replay(plan)}{end}", flush=True)
     random_gaits(10 if QUICK else 72)
+    leaps(4 if QUICK else 40)
 
 
 if __name__ == "__main__":

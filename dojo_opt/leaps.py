@@ -9,7 +9,7 @@ import numpy as np
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.locomotion import EFFORT, RATE, TORQUE_LIMIT, VELOCITY
+from dojo_opt.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
@@ -35,7 +35,8 @@ def leap(
     As in `hop`, the cost asks for a few poses: for a fifth of `duration` [s] the standing one lowered by `crouch` [m],
     for two fifths that half-way to the goal, `height` up, then that at the goal. Squares of place weigh 1, 1, 20,
     attitude 2, angles .05 per second, the rest as in `follow`, and the pose of the base at the end is a constraint. The
-    guess is the rollout of the torques of standing: single shooting.
+    guess is a robot that stands still, at the smoothing of the planner's first stage: states and torques. Its torques
+    alone are no guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
 
     Legs that push from where they stand reach their torque limits below .27 m: hence the crouch, which no planner finds
     from a goal that is up. `ilqr` ends with every step cut into `refinement`, since most leaps planned with steps of
@@ -45,35 +46,26 @@ def leap(
     """
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=time_step, kappa=PLANNED)
     horizon = max(5, round(checks.number("problems.leap(duration=...)", duration, above=0.0) / time_step))
-    start, torques = equilibrium(sim)
-    goal, low = start.copy(), start.copy()
-    goal[0] += distance
+    start, _ = equilibrium(sim)
+    still, torques = standing(sim)
+    goal, low, apex = start.copy(), start.copy(), start.copy()
+    goal[0] += checks.number("problems.leap(distance=...)", distance)
     low[2] -= checks.number("problems.leap(crouch=...)", crouch, at_least=0.0)
-    apex = start.copy()
-    apex[[0, 2]] += 0.5 * distance, height
+    apex[[0, 2]] += 0.5 * distance, checks.number("problems.leap(height=...)", height)
     down, up = round(0.2 * horizon), round(0.4 * horizon)
-    legs = sim.nv - 6
-    parts = [
-        np.array([1.0, 1.0, 20.0]),
-        np.full(3, 2.0),
-        np.full(legs, 0.05),
-        np.full(6, VELOCITY),
-        np.full(legs, RATE),
-    ]
+    poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
     problem = Problem(
         sim,
         start,
         horizon,
         cost=[
-            Tracking(
-                np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up)),
-                time_step * np.concatenate(parts),
-            ),
+            Tracking(poses, time_step * weights(sim, (1.0, 1.0, 20.0), 2.0, 0.05)),
             Effort(time_step * EFFORT),
         ],
         constraints=[Goal(goal, components=np.arange(6))],
         control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
         controls0=torques,
+        states0=np.tile(still, (horizon + 1, 1)),
     )
     problem.refinement = refinement
     problem.refined_constraints = (Goal(apex, components=[2], knots=down + up // 2),)

@@ -59,6 +59,8 @@ CALLS = {
     "speed nan": (lambda: dojo.problems.trot(speed=np.nan), "gaits.trot(speed=...)", "nan"),
     "unknown keyword": (lambda: dojo.problems.trot(sped=0.1), "gaits.trot(...)", "'sped'", "'speed'"),
     "half a cycle": (lambda: dojo.problems.walk(cycles=0.5), "gaits.walk(cycles=...)", "0.5"),
+    "leap of a word": (lambda: dojo.problems.leap(distance="far"), "problems.leap(distance=...)", "far"),
+    "height nan": (lambda: dojo.problems.leap(height=np.nan), "problems.leap(height=...)", "nan"),
     "distance as a word": (lambda: dojo.problems.jump(distance="far"), "gaits.jump(distance=...)", "far"),
     "rest of a mechanism": (lambda: dojo.equilibrium(SIM.mechanism), "equilibrium(sim)", "Simulator"),
     "negative noise": (lambda: dojo.Plant(SIM, noise=-1.0), "Perturbation(noise=...)", "-1.0"),

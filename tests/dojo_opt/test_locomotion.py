@@ -157,14 +157,17 @@ def test_jumps_up_and_back_land_in_short_steps(distance, height):
 @pytest.mark.parametrize(
     "distance, height",
     [(0.3, 0.2), (0.2, 0.2)]
-    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.2), (0.3, 0.3), (-0.2, 0.2)]],
+    + [pytest.param(*leap, marks=pytest.mark.slow) for leap in [(0.5, 0.25), (0.4, 0.15), (0.4, 0.3), (-0.2, 0.2)]],
 )
 def test_leap_is_found_from_standing_and_a_goal(distance, height):
-    """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms."""
+    """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms.
+
+    The slow ones but the last were never found from the rollout of the torques of standing, which falls on its back.
+    """
     problem = problems.leap(distance=distance, height=height)
-    assert problem.states0 is None and np.ptp(problem.controls0, axis=0).max() == 0.0
+    assert np.ptp(problem.states0[1:], axis=0).max() == 0.0 and np.ptp(problem.controls0, axis=0).max() == 0.0
     plan = ilqr(problem)
-    assert plan.success and plan.nit <= 140, plan.summary()
+    assert plan.success and plan.nit <= 130, plan.summary()
     assert plan.nit == len(plan.history) and plan.substeps == 5 and plan.time[-1] == pytest.approx(1.0)
     assert plan.x[:, 2].max() - plan.x[0, 2] == pytest.approx(height, abs=0.01)
     assert lowest_foot(problem, plan).max() > 0.1
@@ -194,7 +197,9 @@ def test_a_leap_that_is_too_high_is_no_success():
     assert "Violated most: Goal of trunk" in plan.message
 
 
-@pytest.mark.parametrize("name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("walk", {})])
+@pytest.mark.parametrize(
+    "name, settings", [("trot", {"damping": 5.0}), ("trot", {}), ("trot", {"cycles": 4}), ("walk", {})]
+)
 def test_periodic_gaits_choose_their_start(name, settings):
     problem = getattr(problems, name)(periodic=True, **settings)
     plan = ilqr(problem)
