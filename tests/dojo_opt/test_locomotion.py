@@ -162,7 +162,7 @@ def test_jumps_up_and_back_land_in_short_steps(distance, height):
 def test_leap_is_found_from_standing_and_a_goal(distance, height):
     """Planned with steps of 20 ms it may stumble in shorter ones; cut into five at last, it holds at 1 ms.
 
-    The slow ones but the last were never found from the rollout of the torques of standing, which falls on its back.
+    From the rollout of the torques of standing, which falls on its back, half of such leaps are not found.
     """
     problem = problems.leap(distance=distance, height=height)
     assert np.ptp(problem.states0[1:], axis=0).max() == 0.0 and np.ptp(problem.controls0, axis=0).max() == 0.0
