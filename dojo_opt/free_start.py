@@ -59,6 +59,7 @@ class FreeStart:
             X = R[:n] + K[t].T @ (Quu @ S[t] + R[n:]) + Qux.T @ S[t]
             v = q[:n] + K[t].T @ (Quu @ k[t] + q[n:]) + Qux.T @ k[t]
             V = Q[:n, :n] + K[t].T @ (Quu @ K[t] + Qux) + Qux.T @ K[t]
+            V = 0.5 * (V + V.T)  # its asymmetry would grow with the motion without feedback: 1e17 in two trots
         self.step = self._newton(V + X + X.T + W, v + w, mu)
         k = k + S @ self.step
         return k, *self._predict(model, K, k, ends)

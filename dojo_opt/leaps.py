@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.locomotion import EFFORT, RATE, TORQUE_LIMIT, VELOCITY
+from dojo_opt.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
@@ -39,7 +39,8 @@ def leap(
     As in `hop`, the cost asks for a few poses: for a fifth of `duration` [s] the standing one lowered by `crouch` [m],
     for two fifths that half-way to the goal, `height` up, then that at the goal. Squares of place weigh 1, 1, 20,
     attitude 2, angles .05 per second, the rest as in `follow`, and the pose of the base at the end is a constraint. The
-    guess is the rollout of the torques of standing: single shooting.
+    guess is a robot that stands still, at the smoothing of the planner's first stage: states and torques. Its torques
+    alone are no guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
 
     Legs that push from where they stand reach their torque limits below .27 m: hence the crouch, which no planner finds
     from a goal that is up. `ilqr` ends with every step cut into `refinement`, since most leaps planned with steps of
@@ -55,7 +56,8 @@ def leap(
     step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
     refinement = whole(f"{call}(refinement=...)", refinement)
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
-    start, torques = equilibrium(sim)
+    start, _ = equilibrium(sim)
+    still, torques = standing(sim)
     low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
     horizon = max(5, round(duration / step))
     down, up = round(0.2 * horizon), round(0.4 * horizon)
@@ -64,10 +66,11 @@ def leap(
         sim,
         start,
         horizon,
-        cost=[Tracking(poses, step * _weights(sim.nv - 6)), Effort(step * EFFORT)],
+        cost=[Tracking(poses, step * weights(sim, (1.0, 1.0, 20.0), 2.0, 0.05)), Effort(step * EFFORT)],
         constraints=[Goal(goal, components=np.arange(6))],
         control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
         controls0=torques,
+        states0=np.tile(still, (horizon + 1, 1)),
     )
     problem.refinement = refinement
     problem.refined_constraints = (Goal(apex, components=[2], knots=down + up // 2),)
@@ -79,8 +82,3 @@ def _moved(x: Array, ahead: float, up: float) -> Array:
     out = x.copy()
     out[[0, 2]] += ahead, up
     return out
-
-
-def _weights(legs: int) -> Array:
-    """(12 + 2 legs,) weights of place, attitude, angles of the legs, velocities of the base, rates of the legs."""
-    return np.repeat([1.0, 20.0, 2.0, 0.05, VELOCITY, RATE], [2, 1, 3, legs, 6, legs])

@@ -63,13 +63,11 @@ def follow(
         raise ValueError(f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are no multiple of {substeps}")
     reference = gait.x[::substeps]
     horizon = len(reference) - 1
-    knot, legs = sim.time_step * substeps, sim.nv - 6
-    weight = np.concatenate([np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, ANGLE)])
-    weight = np.concatenate([weight, np.full(6, VELOCITY), np.full(legs, RATE)])
+    knot = sim.time_step * substeps
     if guess == "reference":
         states, controls = reference, gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
     else:
-        still, torques = _standing(gait)
+        still, torques = standing(sim, gait.foot_names)
         states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
     if control_limits is not None:
         controls = np.clip(controls, *control_limits)
@@ -80,7 +78,7 @@ def follow(
         sim,
         reference[0],
         horizon,
-        cost=[Tracking(reference, knot * weight), Effort(knot * effort)],
+        cost=[Tracking(reference, knot * weights(sim, place, attitude, ANGLE)), Effort(knot * effort)],
         constraints=[constraint],
         free_start=np.setdiff1d(np.arange(sim.ndx), [0, 1, 5]) if periodic else None,
         control_limits=control_limits,
@@ -90,11 +88,17 @@ def follow(
     )
 
 
-def _standing(gait: Gait) -> tuple[Array, Array]:
-    """State and torques of a robot that stands on the feet of a gait, at the smoothing a planner begins with."""
-    sim = gait.simulator
-    feet = replace(sim.mechanism, contacts=Feet(sim, gait.foot_names).contacts)
-    return equilibrium(sim.replace(mechanism=feet, kappa=CONTINUATION[0].kappa_eval))
+def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> Array:
+    """(ndx,) weights of squares: base place and attitude, joint angles, then their velocities."""
+    legs = sim.nv - 6
+    pose = [np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, angle)]
+    return np.concatenate([*pose, np.full(6, VELOCITY), np.full(legs, RATE)])
+
+
+def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Array, Array]:
+    """State and torques of a robot that stands on its feet at the smoothing a planner begins with."""
+    on_feet = replace(sim.mechanism, contacts=Feet(sim, feet).contacts)
+    return equilibrium(sim.replace(mechanism=on_feet, kappa=CONTINUATION[0].kappa_eval))
 
 
 def _stride(sim: Simulator, reference: Array) -> Array:

@@ -1,22 +1,25 @@
-"""Atlas, 174 kg on eight balls under its soles, takes one step: torques of 30 hinges planned through the contacts.
+"""Atlas, 174 kg on eight balls under its soles, takes three steps: torques of 30 hinges planned through the contacts.
 
-python examples/atlas_step.py        prints one line per iteration, writes atlas_step.png and atlas_step.html
+python examples/atlas_step.py            prints one line per iteration, writes atlas_step.png and atlas_step.html
+python examples/atlas_step.py --quick    one step
 
-The guess is a kinematic reference in balance: the weight goes onto one foot, the other swings 0.2 m forward, the weight
-goes between the two. The plan is replayed at a fifth of its time step, where it would fall over without its gains.
+The guess is a kinematic reference in balance: the weight goes onto one foot, the other swings forward, the weight goes
+between the two. The plan is replayed at a fifth of its time step, where it would fall over without its gains.
 """
 
 import numpy as np
-from _common import finish
+from _common import QUICK, finish
 
 import dojo_opt as dojo
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
 
-LENGTH = 0.2  # [m]
+STEPS = [("l_foot", 0.2), ("r_foot", 0.4), ("l_foot", 0.2)][: 1 if QUICK else 3]  # [m]
 sim = dojo.Simulator(dojo.models.atlas(damper=5.0), time_step=0.05, kappa=1e-6)  # that of plans
-reference = dojo.gaits.step(sim, length=LENGTH)
+reference = None
+for foot, length in STEPS:
+    reference = dojo.gaits.step(sim, swinging=foot, length=length, lower=0.1, after=reference)
 torques = reference.torques()
 # squares per second: place and attitude of the pelvis, hinges; their velocities; torques
 weight = np.concatenate([np.full(3, 30.0), np.full(3, 10.0), np.full(30, 0.2), np.full(6, 0.01), np.full(30, 1e-3)])

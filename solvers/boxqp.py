@@ -16,15 +16,15 @@ Integers = NDArray[np.int64]
 _MAX_ITERATIONS = 50
 _ARMIJO = 0.1
 _MIN_STEP = 1e-10
-_TOLERANCE = 1e-12  # of the free gradient, relative to the entries of the two terms it is the sum of
+_TOLERANCE = 1e-12  # of the free gradient, relative to the terms it is the sum of
 
 
 @kernel
-def _value(H: Matrix, g: Vector, x: Vector) -> float:
-    """1/2 x^T H x + g^T x"""
+def _change(H: Matrix, gradient: Vector, d: Vector) -> float:
+    """1/2 d^T H d + gradient^T d: of the value, without the rounding of two values that are nearly the same."""
     total = 0.0
-    for i in range(x.shape[0]):
-        total += x[i] * (0.5 * dot(H[i], x) + g[i])
+    for i in range(d.shape[0]):
+        total += d[i] * (0.5 * dot(H[i], d) + gradient[i])
     return total
 
 
@@ -59,16 +59,17 @@ def factor_free(H: Matrix, free: Integers, nfree: int, sub: Vector, out: Vector)
 
 
 @inlined
-def _search(H: Matrix, g: Vector, lo: Vector, hi: Vector, slope: float, x: Vector, step: Vector, trial: Vector) -> bool:
+def _search(
+    H: Matrix, gradient: Vector, lo: Vector, hi: Vector, slope: float, x: Vector, step: Vector, move: Vector
+) -> bool:
     """Armijo search along the projected path x <- clip(x + a step); False when no a gives enough decrease."""
-    old = _value(H, g, x)
     a = 1.0
     while a > _MIN_STEP:
         for i in range(x.shape[0]):
-            trial[i] = min(max(x[i] + a * step[i], lo[i]), hi[i])
-        if _value(H, g, trial) <= old + _ARMIJO * a * slope:
+            move[i] = min(max(x[i] + a * step[i], lo[i]), hi[i]) - x[i]
+        if _change(H, gradient, move) <= _ARMIJO * a * slope:
             for i in range(x.shape[0]):
-                x[i] = trial[i]
+                x[i] = min(max(x[i] + a * step[i], lo[i]), hi[i])
             return True
         a *= 0.5
     return False
@@ -115,10 +116,13 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
         for i in range(nfree):
             f = free[i]
             size = max(size, abs(gradient[f]))
-            scale = max(scale, abs(g[f]), abs(gradient[f] - g[f]))
+            terms = abs(g[f])
+            for j in range(n):
+                terms += abs(H[f, j] * x[j])
+            scale = max(scale, terms)
         if size <= _TOLERANCE * scale:
             return Status.SOLVED, nfree
         slope = _newton_step(gradient, free, nfree, work, trial, step)
-        if not _search(H, g, lo, hi, slope, x, step, trial):
+        if not _search(H, gradient, lo, hi, slope, x, step, trial):
             return Status.SOLVED, nfree  # rounding: no representable decrease is left
     return Status.MAX_ITERATIONS, nfree

@@ -1,4 +1,4 @@
-"""One step of a biped: the weight goes onto one foot, the other swings forward, the weight goes between the two."""
+"""Steps of a biped: the weight goes onto one foot, the other swings forward, the weight goes between the two."""
 
 from __future__ import annotations
 
@@ -28,13 +28,20 @@ def step(
     shift: float = 1.2,
     swing: float = 0.6,
     settle: float = 0.4,
+    after: Gait | None = None,
 ) -> Gait:
     """Reference of one step of the body `swinging` (by default the first foot) by `length` [m] along x.
 
     So slow that the robot is in balance all the way: in `shift` seconds the centre of mass moves over the middle of the
     other foot, in `swing` seconds the foot moves, rising by `step_height` [m], in `shift` seconds the centre of mass
-    moves between the feet, and for `settle` seconds nothing does. The base goes `lower` [m] down during the first shift
-    and stays there. Joints that lead to no foot keep their neutral angles.
+    moves between the feet, and for `settle` seconds nothing does. The base goes down during the first shift, to `lower`
+    [m] below the neutral state, and stays there. Joints that lead to no foot keep their neutral angles.
+
+    after: a gait at whose end the step begins; both are returned, as one. Three steps of Atlas in a row:
+
+        gait = None
+        for foot, length in (("l_foot", 0.2), ("r_foot", 0.4), ("l_foot", 0.2)):
+            gait = dojo.gaits.step(sim, swinging=foot, length=length, lower=0.1, after=gait)
 
     Feet are the bodies at the ends of the tree that have contacts: two, with three contacts or more each, or the
     ankles would be free. ValueError: they are not two, or a foot cannot reach its place.
@@ -42,31 +49,41 @@ def step(
     for name, value in (("length", length), ("step_height", step_height), ("lower", lower)):
         checks.number(f"gaits.step({name}=...)", value)
     feet = Feet(sim)
-    owner = np.array([contact.body for contact in feet.contacts])
-    names = list(dict.fromkeys(owner.tolist()))
-    if len(names) != 2:
-        raise ValueError(f"gaits.step({sim.mechanism.name}): expected two feet, got {', '.join(names)}")
-    moving = names[0] if swinging is None else swinging
-    checks.one_of("gaits.step(swinging=...)", moving, names)
+    swung = _swung(feet, swinging)
     spans = [checks.number(f"gaits.step({n}=...)", t, above=0.0) for n, t in (("shift", shift), ("swing", swing))]
     total = 2.0 * spans[0] + spans[1] + checks.number("gaits.step(settle=...)", settle, at_least=0.0)
     time = sim.time_step * np.arange(-1.0, round(total / sim.time_step) + 1.0)
     out, over, back = (
         _smooth((time - begin) / span) for begin, span in ((0.0, shift), (shift, swing), (shift + swing, shift))
     )
-    places = feet.positions(sim.neutral())
-    path = np.tile(places, (len(time), 1, 1))
-    swung = owner == moving
+    start = sim.neutral() if after is None else _end(sim, after)
+    path = np.tile(feet.positions(start), (len(time), 1, 1))
     path[:, swung, 0] += length * over[:, None]
     path[:, swung, 2] += step_height * (4.0 * over * (1.0 - over))[:, None]
-    stance = places[~swung].mean(axis=0)
-    first = places.mean(axis=0)
-    last = first + (0.5 * length, 0.0, 0.0)
+    first, last = path[0, :, :2].mean(axis=0), path[-1, :, :2].mean(axis=0)
+    stance = path[0, ~swung, :2].mean(axis=0)
     goal = first + out[:, None] * (stance - first) + back[:, None] * (last - stance)
-    base = _balanced(sim, feet, path, goal[:, :2], lower * out)
-    contact = np.ones((len(time), len(owner)), dtype=bool)
+    x = np.tile(start, (len(time), 1))
+    x[:, 2] += out * (sim.neutral()[2] - lower - start[2])
+    try:
+        base = _balanced(feet, x, path, goal)
+    except ValueError as error:
+        raise ValueError(f"gaits.step(length={length:g}, lower={lower:g}): {error}") from error
+    contact = np.ones((len(time), len(swung)), dtype=bool)
     contact[:, swung] = ((over <= 0.0) | (over >= 1.0))[:, None]
-    return assemble(sim, "step", base, path, contact, names=feet.names)
+    gait = assemble(sim, "step", base, path, contact, names=feet.names)
+    return gait if after is None else after.then(gait)
+
+
+def _swung(feet: Feet, swinging: str | None) -> NDArray[np.bool_]:
+    """(k,) which contacts belong to the foot that swings."""
+    owner = np.array([contact.body for contact in feet.contacts])
+    names = list(dict.fromkeys(owner.tolist()))
+    if len(names) != 2:
+        raise ValueError(f"gaits.step({feet.sim.mechanism.name}): expected two feet, got {', '.join(names)}")
+    moving = names[0] if swinging is None else swinging
+    checks.one_of("gaits.step(swinging=...)", moving, names)
+    return np.asarray(owner == moving)
 
 
 def _smooth(t: Array) -> Array:
@@ -75,11 +92,25 @@ def _smooth(t: Array) -> Array:
     return np.asarray(t**3 * (10.0 - 15.0 * t + 6.0 * t**2))
 
 
-def _balanced(sim: Simulator, feet: Feet, path: Array, goal: Array, lower: Array) -> Array:
-    """Poses (n, 7) of the base, upright, for which the centre of mass is above `goal` (n, 2)."""
+def _end(sim: Simulator, after: Gait) -> Array:
+    """The last state of `after`, at rest."""
+    if not isinstance(after, Gait):
+        raise TypeError(f"gaits.step(after=...): expected a Gait, got {after!r}")
+    other = after.simulator
+    if (other.mechanism.name, other.nx, other.time_step) != (sim.mechanism.name, sim.nx, sim.time_step):
+        raise ValueError(
+            f"gaits.step(after=...): expected a gait of {sim.mechanism.name!r} with steps of {sim.time_step:g} s, got "
+            f"one of {other.mechanism.name!r} with {other.time_step:g} s"
+        )
+    state = after.x[-1].copy()
+    state[sim.nq :] = 0.0
+    return np.asarray(state)
+
+
+def _balanced(feet: Feet, x: Array, path: Array, goal: Array) -> Array:
+    """Poses (n, 7) of the base near those of x (n, nx) for which the centre of mass is above `goal` (n, 2)."""
+    sim = feet.sim
     mass = np.array([body.mass for body in sim.mechanism.bodies])
-    x = np.tile(sim.neutral(), (len(path), 1))
-    x[:, 2] -= lower
     for _ in range(_CORRECTIONS):
         x = feet.place(x, path)
         centre = np.einsum("b,nbk->nk", mass / mass.sum(), sim.maximal(x)[..., :2])

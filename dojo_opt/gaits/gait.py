@@ -38,6 +38,12 @@ class Gait:
     contact: Booleans  # (T + 1, k) whether a foot is on the ground
     foot_names: tuple[str, ...]  # names of the contacts
 
+    def then(self, other: Gait) -> Gait:
+        """This motion, and after it `other`, which begins where this one ends."""
+        x, feet, contact = (np.concatenate([getattr(self, f), getattr(other, f)[1:]]) for f in ("x", "feet", "contact"))
+        time = np.concatenate([self.time, self.time[-1] + other.time[1:]])
+        return replace(self, time=time, x=x, feet=feet, contact=contact)
+
     def torques(self, *, iterations: int = 3) -> Array:
         """(T, nu) inputs by inverse dynamics: what moves the joints as the reference says while its feet carry it.
 

@@ -66,6 +66,8 @@ CALLS = {
     "stand at a word": (lambda: dojo.gaits.stand(QUADRUPED, height="low"), "gaits.stand(height=...)", "low"),
     "half a link": (lambda: dojo.models.npendulum(2.5), "npendulum(n)", "whole number >= 1", "2.5"),
     "half a cycle": (lambda: dojo.problems.walk(cycles=0.5), "gaits.walk(cycles=...)", "0.5"),
+    "leap of a word": (lambda: dojo.problems.leap(distance="far"), "problems.leap(distance=...)", "far"),
+    "height nan": (lambda: dojo.problems.leap(height=np.nan), "problems.leap(height=...)", "nan"),
     "distance as a word": (lambda: dojo.problems.jump(distance="far"), "gaits.jump(distance=...)", "far"),
     "refinement of a jump": (lambda: dojo.problems.jump(refinement=0), "problems.jump(refinement=...)", ">= 1", "0"),
     "no substeps of a gait": (lambda: dojo.problems.trot(substeps=0), "problems.follow(substeps=...)", ">= 1", "0"),

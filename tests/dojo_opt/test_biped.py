@@ -25,22 +25,43 @@ def test_equilibrium_on_rigid_feet(atlas, kappa):
     assert np.abs(step.x[sim.nq :]).max() < 1e-6
 
 
+def balanced(sim, gait):
+    """Asserts that the centre of mass is over the feet on the ground whenever one is in the air."""
+    mass = np.array([body.mass for body in sim.mechanism.bodies])
+    centre = np.einsum("b,tbk->tk", mass / mass.sum(), sim.maximal(gait.x)[..., :2])
+    swings = np.flatnonzero(~gait.contact.all(axis=1))
+    assert len(swings)
+    for t in swings:
+        stance = gait.feet[t, gait.contact[t], :2]
+        assert np.all(centre[t] > stance.min(axis=0)) and np.all(centre[t] < stance.max(axis=0))
+    np.testing.assert_allclose(Feet(sim).positions(gait.x), gait.feet, atol=1e-7)
+
+
 def test_reference_step_is_in_balance(atlas):
     """The centre of mass goes over the other foot, and stays over it while one foot is in the air."""
     gait = dojo.gaits.step(atlas, length=0.15)
-    mass = np.array([body.mass for body in atlas.mechanism.bodies])
-    centre = np.einsum("b,tbk->tk", mass / mass.sum(), atlas.maximal(gait.x)[..., :2])
-    swings = ~gait.contact.all(axis=1)
-    assert swings.any()
-    stance = gait.feet[swings][:, gait.contact[swings][0]]
-    for axis in (0, 1):
-        assert np.all(centre[swings, axis] > stance[..., axis].min(axis=1))
-        assert np.all(centre[swings, axis] < stance[..., axis].max(axis=1))
-    np.testing.assert_allclose(Feet(atlas).positions(gait.x), gait.feet, atol=1e-8)
+    balanced(atlas, gait)
     moved = gait.feet[-1] - gait.feet[0]
     np.testing.assert_allclose(moved[:4, 0], 0.15, atol=1e-12)
     np.testing.assert_allclose(moved[4:], 0.0, atol=1e-12)
     np.testing.assert_allclose(gait.x[-1, atlas.nq :], 0.0, atol=1e-6)
+
+
+def test_steps_in_a_row(atlas):
+    """Left, right past it, left beside it: in balance, at rest between them, and with velocities of its own path."""
+    gait = None
+    for foot, length in (("l_foot", 0.15), ("r_foot", 0.3), ("l_foot", 0.15)):
+        gait = dojo.gaits.step(atlas, swinging=foot, length=length, lower=0.06, after=gait)
+    balanced(atlas, gait)
+    knots = (len(gait.x) - 1) // 3
+    assert gait.x.shape == (3 * knots + 1, atlas.nx) and len(gait.feet) == len(gait.contact) == len(gait.time)
+    np.testing.assert_allclose(np.diff(gait.time), 0.05, atol=1e-12)
+    moved = gait.feet[::knots, :, 0] - gait.feet[0, :, 0]
+    np.testing.assert_allclose(moved[:, 0], [0.0, 0.15, 0.15, 0.3], atol=1e-7)
+    np.testing.assert_allclose(moved[:, 4], [0.0, 0.0, 0.3, 0.3], atol=1e-7)
+    np.testing.assert_allclose(gait.x[knots::knots, atlas.nq :], 0.0, atol=1e-6)
+    mean = atlas.difference(gait.x[1:], gait.x[:-1])[:, : atlas.nv] / atlas.time_step
+    np.testing.assert_allclose(gait.x[1:, atlas.nq :], mean, atol=1e-4)
 
 
 def test_wrong_steps_are_named(atlas):
@@ -50,6 +71,12 @@ def test_wrong_steps_are_named(atlas):
         dojo.gaits.step(dojo.Simulator(dojo.models.quadruped()))
     with pytest.raises(ValueError, match=r"gaits\.step\(swing=\.\.\.\)"):
         dojo.gaits.step(atlas, swing=0.0)
+    with pytest.raises(TypeError, match=r"gaits\.step\(after=\.\.\.\): expected a Gait, got 3"):
+        dojo.gaits.step(atlas, after=3)
+    with pytest.raises(ValueError, match=r"expected a gait of 'atlas' with steps of 0\.05 s, got one of 'quadruped'"):
+        dojo.gaits.step(atlas, after=dojo.gaits.stand(dojo.Simulator(dojo.models.quadruped())))
+    with pytest.raises(ValueError, match=r"gaits\.step\(length=1, lower=0\.03\): .*'l_sole_\d' comes no nearer"):
+        dojo.gaits.step(atlas, length=1.0)
 
 
 def test_tracking_gains_are_those_of_the_regulator():

@@ -44,6 +44,30 @@ def test_without_limits_it_is_a_linear_solve():
     np.testing.assert_allclose(x, -np.linalg.solve(H, g), rtol=1e-12)
 
 
+def test_a_start_beside_the_solution_is_finished():
+    """The decrease that is left is less than the rounding of the value, whose comparison then says anything."""
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        n = 12
+        M, g = rng.normal(size=(3, n)), 2.0 * rng.normal(size=n)
+        H = np.eye(n) + 0.1 * M.T @ M
+        lo, hi = np.full(n, -60.0), np.where(np.arange(n) == 9, 0.0, 60.0)
+        _, exact, _, _ = solve(H, g, lo, hi)
+        for off in (3e-9, 1e-9, 3e-10, 1e-10):
+            status, x, _, _ = solve(H, g, lo, hi, exact * (1.0 + off * rng.normal(size=n)))
+            assert status == Status.SOLVED
+            np.testing.assert_allclose(x, exact, atol=1e-11)
+
+
+def test_terms_that_cancel_are_solved_to_their_rounding():
+    """The free gradient is the difference of terms 1e9 times larger than it and g are."""
+    H = np.array([[1e6, -1e6, 0.3], [-1e6, 1e6 + 1.0, 0.1], [0.3, 0.1, 1.0]])
+    g = np.array([1e-6, 1e-6, -10.0])
+    status, x, _, _ = solve(H, g, np.full(3, -100.0), np.full(3, 100.0))
+    assert status == Status.SOLVED
+    np.testing.assert_allclose(H @ x + g, 0.0, atol=1e-8)
+
+
 def test_all_controls_held():
     status, x, free, _ = solve(np.eye(2), np.array([5.0, -5.0]), -np.ones(2), np.ones(2))
     assert status == Status.SOLVED and len(free) == 0
