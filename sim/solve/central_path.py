@@ -25,7 +25,7 @@ from solvers.jit import inlined, kernel
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
 _BALANCED = 0.3  # the residual at kappa, over that of such a start, of a motion that may start at kappa
-_GOES_ON = 0.01  # the residual with the impulses of the step before, over that without any, where they are kept
+_GOES_ON = 0.1  # the residual with the impulses of the step before, over that without any, where they are kept
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949

@@ -90,7 +90,7 @@ def try_from(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), min(0.01 * kappa, 0.1 * options.tolerance), _ROUNDING)
+    spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
     worse = _WORSE if attempt < _LED else _WORSE_LED
     smoothing = beginning.kappa
