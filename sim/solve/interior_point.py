@@ -41,7 +41,7 @@ from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
-from sim.solve.residual import residual_scale, rounding
+from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.status import Status
@@ -176,4 +176,7 @@ def interior_point(
         if came_near(model, work):
             continue
         if out.status != _SOLVED or not gained_energy(model, work, options.h):
-            return out
+            break
+    if out.status == _SOLVED:
+        absorb_residual(model, work)
+    return out
