@@ -64,7 +64,7 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, near: bool) -> None:
+def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, linear: bool) -> None:
     """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
 
     Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
@@ -77,8 +77,7 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, 
     mu = model.contact_friction[c]
     b0 = mu * z[1]
     room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
-    against = z[2] * k[1] + z[3] * k[2]
-    if near and room > _INSIDE * b0 * b0 and against <= 0.0:
+    if linear and room > _INSIDE * b0 * b0:
         condense_sticking(z, k, b0, kappa, share, W, q)
     else:
         condense_sliding(z, k, b0, kappa, share, W, q)
@@ -106,22 +105,30 @@ def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float
 
 @kernel
 def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
-    """(kappa I - 2 v_t beta^T) dbeta = -c dv_t - share 2 b v_t db - (c v_t + kappa beta),   c = b^2 - |beta|^2
+    """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
-    by the inverse  (I + e v_t beta^T)/kappa,   e = 2/(kappa - 2 v_t.beta).
+    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where the law may have it, no
+    faster than -kappa beta/c and not along beta, and otherwise -kappa beta/c: then the matrix is definite.
     """
     x, y, b1, b2 = k[1], k[2], z[2], z[3]
     n = b1 * b1 + b2 * b2
     c = b0 * b0 - n
-    e = 2.0 / (kappa - 2.0 * (x * b1 + y * b2))
-    W[4] = -c / kappa * (1.0 + e * x * b1)
-    W[5] = -c / kappa * e * x * b2
-    W[7] = -c / kappa * e * y * b1
-    W[8] = -c / kappa * (1.0 + e * y * b2)
-    q[0] = -share * b0 * e * x
-    q[1] = -share * b0 * e * y
-    q[2] = (0.5 * c + n) * e * x + b1
-    q[3] = (0.5 * c + n) * e * y + b2
+    r1, r2 = c * x + kappa * b1, c * y + kappa * b2
+    s1, s2 = x, y
+    f = kappa / c
+    if x * b1 + y * b2 > 0.0 or x * x + y * y > f * f * n:
+        s1, s2 = -f * b1, -f * b2
+    e = 2.0 / (kappa - 2.0 * (s1 * b1 + s2 * b2))
+    g = -c / kappa
+    W[4] = g * (1.0 + e * s1 * b1)
+    W[5] = g * e * s1 * b2
+    W[7] = g * e * s2 * b1
+    W[8] = g * (1.0 + e * s2 * b2)
+    q[0] = -share * b0 * e * s1
+    q[1] = -share * b0 * e * s2
+    d = e * (b1 * r1 + b2 * r2)
+    q[2] = (r1 + s1 * d) / kappa
+    q[3] = (r2 + s2 * d) / kappa
 
 
 @kernel

@@ -181,11 +181,11 @@ def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> 
 
 
 @kernel
-def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float, near: bool) -> None:
+def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float, linear: bool) -> None:
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
     share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
-    near: whether a contact that sticks may take the form of its law that is linear in the slip.
+    linear: whether a contact that sticks may take the form of its law that is linear in the slip.
     """
     W = work.contact_W[c]
     for e in range(9):
@@ -193,7 +193,7 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float, share: floa
     W[0] = -work.cone[c, 1] / work.cone[c, 0]
     law = law_of(model, c)
     if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa, share, near)
+        condense_cone(model, work, c, kappa, share, linear)
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
 

@@ -4,49 +4,32 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.dynamics import momentum_balance
-from sim.late import choose_pairs
 from sim.model import Model, Vector
-from sim.moves import turn_bodies
 from sim.options import Guess, Options
 from sim.solve.inequalities import (
-    inequality_kinematics,
     keep_inequalities,
     move_inequalities,
     resume_inequalities,
     start_inequalities,
+    total_impulse,
 )
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
-from sim.solve.prediction import predict, predictable, release, touch_inequalities
+from sim.solve.placing import place
+from sim.solve.prediction import predict, predictable
 from sim.work import Work
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before
 _BALANCED = 0.3  # the residual at kappa, over that of such a start, of a motion that may start at kappa
-_GOES_ON = 0.1  # the residual with the impulses of the step before, over that without any, where they are kept
+_GOES_ON = 0.1  # the residual with the impulses of the step before, over their sum, where they are kept
 _GROWTH = 3.0  # of the starting kappa, per attempt; it begins again after
 _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949
 AGAIN = -1  # instead of the number of an attempt
 _BEYOND = 2.0  # [rad] from a fold to a start on its other side
-
-
-@kernel
-def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float) -> bool:
-    """nu = share v, slowed down until no body turns by half a turn; False if that fails."""
-    for _ in range(30):
-        for d in range(v.shape[0]):
-            work.nu[d] = share * v[d]
-            work.nu_trial[d] = work.nu[d]
-        if momentum_balance(model, work, h, q):
-            turn_bodies(work, work.rot3)
-            choose_pairs(model, work)
-            inequality_kinematics(model, work, h)
-            return True
-        share *= 0.7
-    return False
+_NOWHERE = (1e300, 1e300)
 
 
 class Beginning(NamedTuple):
@@ -70,7 +53,7 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
     if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         if place(model, work, h, q, guess.velocity, 1.0):
             return Beginning(0, kappa, residuals(model, work, h, q, v, u))
-        return Beginning(1, kappa, (1e300, 1e300))
+        return Beginning(1, kappa, _NOWHERE)
     keep_inequalities(model, work)
     if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
         if predictable(model, work):
@@ -79,14 +62,14 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
                 return beginning
         return resume(model, work, options, inputs, guess.velocity)
     if not place(model, work, h, q, v, 1.0):
-        return Beginning(1, kappa, (1e300, 1e300))
+        return Beginning(1, kappa, _NOWHERE)
     start_inequalities(model, work, h, kappa, 1.0)
     usual, _ = residuals(model, work, h, q, v, u)
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and guess.velocity[d] == v[d]
     if not placed and not place(model, work, h, q, guess.velocity, 1.0):
-        return Beginning(1, kappa, (1e300, 1e300))
+        return Beginning(1, kappa, _NOWHERE)
     start_inequalities(model, work, h, kappa, 0.0)
     hard = residuals(model, work, h, q, v, u)
     return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard)
@@ -101,20 +84,13 @@ def go_on(
     Attempt 1 where that fails.
     """
     q, v, u = inputs
-    h = options.h
-    if not place(model, work, h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, (1e300, 1e300))
+    if not place(model, work, options.h, q, velocity, 1.0):
+        return Beginning(1, options.kappa, _NOWHERE)
     move_inequalities(model, work, 0.0)
-    last = residuals(model, work, h, q, v, u)
-    release(model, work)
-    free, _ = residuals(model, work, h, q, v, u)
-    if last[0] < _GOES_ON * free:
-        move_inequalities(model, work, 0.0)
-        return Beginning(0, options.kappa, residuals(model, work, h, q, v, u))
-    if not predict(model, work, options, inputs) or not place(model, work, h, q, work.dnu, 1.0):
-        return Beginning(1, options.kappa, (1e300, 1e300))
-    touch_inequalities(model, work, options)
-    return Beginning(0, options.kappa, residuals(model, work, h, q, v, u))
+    balance = residuals(model, work, options.h, q, v, u)
+    if balance[0] > _GOES_ON * total_impulse(model, work):
+        balance = predict(model, work, options, inputs)
+    return Beginning(0 if balance[0] < 1e300 else 1, options.kappa, balance)
 
 
 @inlined
@@ -128,7 +104,7 @@ def resume(
     q, v, u = inputs
     h = options.h
     if not place(model, work, h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, (1e300, 1e300))
+        return Beginning(1, options.kappa, _NOWHERE)
     kappa = max(options.kappa, _RESUMED)
     resume_inequalities(model, work, h, kappa)
     away, _ = residuals(model, work, h, q, v, u)

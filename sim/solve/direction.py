@@ -19,24 +19,26 @@ _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
 
 
 @inlined
-def linearize_step(model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float, near: bool) -> bool:
+def linearize_step(
+    model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float, whole: bool, linear: bool
+) -> bool:
     """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular.
 
     Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
     growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
     without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
-    Newton's direction where no share of them helps, and near a solution: its determinant may be negative, too. Four
+    Newton's direction where no share of them helps, and where `whole`, near a solution: its determinant may be negative, too. Four
     corners on curved ground hold a box in more directions than a plane does, one of them hardly, and friction that
     grows with the impulses outweighs that hold. All other directions lead away from such a solution.
     """
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     sign = 0
-    shares = 0 if near else _SHARES
+    shares = 0 if whole else _SHARES
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share, near)
+        condense_inequalities(model, work, h, smoothing, share, linear)
         sign = factor(model, work)
         if sign >= 0:
             break

@@ -23,6 +23,7 @@ from sim.contacts.friction import (
     recover_contact,
     resume_contact,
     start_contact,
+    touch_contact,
 )
 from sim.elimination import dot_six, subtree_sums
 from sim.joints.limits import (
@@ -32,6 +33,7 @@ from sim.joints.limits import (
     limit_gaps,
     recover_limits,
     resume_limits,
+    touch_limits,
 )
 from sim.late import (
     add_frame_matrix,
@@ -107,6 +109,27 @@ def resume_inequalities(model: Model, work: Work, h: float, kappa: float) -> Non
 
 
 @kernel
+def touch_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
+    """Slacks for the present impulses, on the central path of kappa."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            touch_contact(model, work, h, c, kappa)
+    touch_limits(model, work, h / LIMIT_INERTIA, kappa)
+
+
+@kernel
+def total_impulse(model: Model, work: Work) -> float:
+    """Sum of the normal impulses of near contacts and limits: of what they balance, an estimate."""
+    total = 0.0
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            total += work.cone[c, 1]
+    for k in range(model.limit_dof.shape[0]):
+        total += work.bound[k, 1]
+    return total
+
+
+@kernel
 def apply_inequalities(model: Model, work: Work) -> float:
     """wrench -= contact impulses, residual is left to the caller; returns the largest equality residual."""
     r = 0.0
@@ -130,29 +153,29 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float, near: bool) -> None:
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_into`."""
-    condense_into(model, work, h, kappa, share, near, work.A)
+    condense_into(model, work, h, kappa, share, linear, work.A)
     add_limit_blocks(model, work, h)
 
 
 @kernel
-def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, near: bool, out: Matrix) -> None:
+def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)
 
     share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
     turning of the arms of the impulses; 1 for the derivative.
-    near: the solution, see `condense_cone`.
+    linear: the law of contacts that stick, see `condense_cone`.
     """
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
-            condense_contact(model, work, c, kappa, share, near)
+            condense_contact(model, work, c, kappa, share, linear)
             fn, f1, f2 = contact_impulse(model, work, c)
             add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
                 add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
-    condense_pairs(model, work, h, kappa, share, near)
+    condense_pairs(model, work, h, kappa, share, linear)
 
 
 @late.add_stiffness.defined()

@@ -14,7 +14,9 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 * Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
   overlap is none (pairs/choice.py).
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
-  velocity, or beyond the fold; at another kappa0.
+  velocity, or beyond the fold; at another kappa0. Some solutions lie beyond folds (legs that jam between a joint limit
+  and the ground), and without a part of the friction Newton's method only creeps towards them: two attempts of four
+  take its direction as it is.
 """
 
 from __future__ import annotations
@@ -60,6 +62,8 @@ _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
+_CUT = 0.9  # of the Newton step: a boundary closer than this says that something slides which should have stuck
+_FASTER = 0.1  # times the residual before: what Newton's method leaves of it where that is so
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -99,6 +103,8 @@ def try_from(
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
+    at_kappa = smoothing <= kappa  # what sticks and what slides is known from the start
+    beyond = attempt > 0 and attempt % 4 >= 2
     patience = iterations + _PATIENCE
     halvings = 0
     merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)
@@ -124,10 +130,18 @@ def try_from(
         if iterations >= patience or halvings > _FEW:
             break
         iterations += 1
-        if not linearize_step(model, work, h, q, v, smoothing, is_near(merit, kappa)):
-            return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
-        boundary = direction(model, work, h, kappa, merit.mean)
+        near = is_near(merit, kappa)
+        boundary = 0.0
+        while boundary < _CUT:
+            if not linearize_step(model, work, h, q, v, smoothing, near or beyond, near or at_kappa):
+                return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
+            boundary = direction(model, work, h, kappa, merit.mean)
+            if near or not at_kappa:
+                break
+            at_kappa = boundary >= _CUT
+        last = merit.residual
         merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)
+        at_kappa = at_kappa and halvings == 0 and merit.residual < _FASTER * last
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
