@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sim import late
 from sim.model import Model
 from sim.work import Work
+from solvers.lanes import LANES, whole
 from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
@@ -29,7 +30,7 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
+    body_above nbody nblock, body_below nbody nblock, dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
@@ -80,8 +81,8 @@ WORK_FLOATS = _shapes(
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
     loop_open nrow, gear_rate ngear 2,
-    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
+    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 24, S_across 18 nwide, F_across 12 nwide,
+    dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 37, far_law 2,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """
@@ -112,6 +113,8 @@ class Sizes(NamedTuple):
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     """Rows and columns of one field."""
+    nv, nu = sizes.nv, sizes.nu
+    columns = whole(max(2 * nv + whole(nu), nv + whole(nv)))  # what their lanes write behind them included
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
@@ -124,6 +127,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
         "nlate": late.COUNT,
+        "nblock": whole(nv) // LANES,
+        "nwide": whole(nv),
+        "ncolumn": columns,
+        "npanel": columns if sizes.nrow else LANES,
         "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
@@ -134,9 +141,12 @@ def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
     extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
     line = 128 // 8  # a pair of cache lines: what two threads write must not share one
-    buffer: NDArray[Any] = np.zeros(sum(rows * cols for rows, cols in extents.values()) + 2 * line, dtype=kind)
-    arrays, start = {}, -(buffer.ctypes.data // 8) % line
+    buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
+    first = -(buffer.ctypes.data // 8) % line
+    arrays, start = {}, first
     for name, (rows, cols) in extents.items():
+        if len(fields[name]) == 2 and cols % LANES == 0:  # rows of whole lanes begin where cache lines do
+            start = first + whole(start - first)
         flat = buffer[start : start + rows * cols]
         arrays[name] = flat if len(fields[name]) == 1 else flat.reshape(rows, cols)
         start += rows * cols

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.jit import kernel
+from solvers.lanes import load, store
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -100,3 +101,24 @@ def lu_solve_rows(A: Vector, n: int, swaps: int, B: Matrix, first: int) -> None:
         f = A[k * n + k]
         for c in range(m):
             x[c] *= f
+
+
+@kernel
+def lu_solve_lanes(A: Vector, n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
+    """`lu_solve_rows` for the LANES columns of B from c on."""
+    for k in range(n):
+        row = (swaps >> (4 * k)) & 15
+        if row != k:
+            x = load(B, first + k, c)
+            store(B, first + k, c, load(B, first + row, c))
+            store(B, first + row, c, x)
+    for k in range(1, n):
+        x = load(B, first + k, c)
+        for r in range(k):
+            x = x - A[k * n + r] * load(B, first + r, c)
+        store(B, first + k, c, x)
+    for k in range(n - 1, -1, -1):
+        x = load(B, first + k, c)
+        for r in range(k + 1, n):
+            x = x - A[k * n + r] * load(B, first + r, c)
+        store(B, first + k, c, A[k * n + k] * x)
