@@ -70,18 +70,22 @@ def _up(model: Model, work: Work, c: int, at: int) -> None:
         d0 = model.body_vadr[i]
         end = model.body_vadr[i + 1]
         q = model.body_parent[i]
-        w = _zero()
-        if model.body_leaf[i] == 0:
-            w = _six(P, 6 * i, at)
-            for d in range(d0, end):
-                store(X, d, c, load(X, d, c) - _dot(work.S2, d, w))
+        leaf = model.body_leaf[i] == 1
+        w = _zero() if leaf else _six(P, 6 * i, at)
         if end == d0 + 1:
-            store(X, d0, c, work.D[i, 0] * load(X, d0, c))
+            x = load(X, d0, c) if leaf else load(X, d0, c) - _dot(work.S2, d0, w)
+            x = work.D[i, 0] * x
+            store(X, d0, c, x)
+            w = _plus(w, work.U, d0, x)
         elif end > d0:
+            if not leaf:
+                for d in range(d0, end):
+                    store(X, d, c, load(X, d, c) - _dot(work.S2, d, w))
             lu_solve_lanes(work.D[i], end - d0, int(work.D[i, 36]), X, d0, c)
+            if q >= 0:
+                for d in range(d0, end):
+                    w = _plus(w, work.U, d, load(X, d, c))
         if q >= 0:
-            for d in range(d0, end):
-                w = _plus(w, work.U, d, load(X, d, c))
             _put(P, 6 * q, at, _sum(_six(P, 6 * q, at), w))
 
 

@@ -105,7 +105,32 @@ def lu_solve_rows(A: Vector, n: int, swaps: int, B: Matrix, first: int) -> None:
 
 @kernel
 def lu_solve_lanes(A: Vector, n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
-    """`lu_solve_rows` for the LANES columns of B from c on."""
+    """`lu_solve_rows` for the LANES columns of B from c on; two or three rows stay in registers."""
+    if n == 2:
+        second = swaps & 15  # 1 where the first pivot is in the second row
+        x = load(B, first + second, c)
+        y = A[3] * (load(B, first + 1 - second, c) - A[2] * x)
+        store(B, first + 1, c, y)
+        store(B, first, c, A[0] * (x - A[1] * y))
+    elif n == 3:
+        a = swaps & 15
+        b = (swaps >> 4) & 15  # 1 or 2, in the order that the first exchange leaves
+        x = load(B, first + a, c)
+        y = load(B, first + (0 if b == a else b), c)
+        z = load(B, first + (0 if 3 - b == a else 3 - b), c)
+        y = y - A[3] * x
+        z = A[8] * (z - A[6] * x - A[7] * y)
+        y = A[4] * (y - A[5] * z)
+        store(B, first + 2, c, z)
+        store(B, first + 1, c, y)
+        store(B, first, c, A[0] * (x - A[1] * y - A[2] * z))
+    else:
+        _solve_rows_of_lanes(A, n, swaps, B, first, c)
+
+
+@kernel
+def _solve_rows_of_lanes(A: Vector, n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
+    """`lu_solve_lanes` of any number of rows."""
     for k in range(n):
         row = (swaps >> (4 * k)) & 15
         if row != k:
