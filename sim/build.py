@@ -84,6 +84,15 @@ def _pack_branches(model: Model) -> None:
         model.body_below[:, block] |= below[:, body].astype(np.int64) << bit
         above = below[body] & (np.arange(len(below)) != body)
         model.body_above[:, block] |= above.astype(np.int64) << bit
+    for i, row in enumerate(below):
+        own = model.dof_body == i
+        for rows, counts, chosen in (
+            (model.dofs_above, model.count_above, below[model.dof_body, i] & ~own),
+            (model.dofs_below, model.count_below, row[model.dof_body] & ~own),
+        ):
+            dofs = np.flatnonzero(chosen)
+            counts[i] = len(dofs)
+            rows[i, : len(dofs)] = dofs
 
 
 def _pack_joints(joints: Sequence[Joint], model: Model) -> None:

@@ -1,111 +1,94 @@
 """The elimination applied to many right-hand sides at once: as many columns as a processor takes in one instruction.
 
-A block of columns goes up the tree and down again before the next one begins, so that its wrenches and twists stay in
-the nearest cache. Rows of right-hand sides end in zeros (`sim/layout.py`): the last block needs no care.
+In joint space it is a substitution with two triangles and the factors of the joint blocks between them,
+
+    up      z = D^-1 (b - sum of (S2 . U_k) z_k over the dofs k below)
+    down    y = z - sum of (L . S3nu_k) y_k over the dofs k above
+
+which takes one product where wrenches and twists take twelve, but as many as there are pairs of dofs on a branch: on
+trees that are deep throughout, elimination_deep.py takes less. Rows of right-hand sides end in zeros (`sim/layout.py`),
+so that the last block of columns needs no care.
 """
 
 from __future__ import annotations
 
-from sim.model import Matrix, Model
+from sim.late import solve_deep_panel
+from sim.model import Model
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.lanes import LANES, Lanes, load, spread, store
+from solvers.lanes import LANES, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.lu import lu_solve_lanes
 
-Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]  # a wrench, or a twist, of every column
+
+@kernel
+def _fill_triangles(model: Model, work: Work) -> None:
+    """triangles[d, k] = S2_d . U_k for k below d, L_d . S3nu_k for k above."""
+    across = work.triangle_across
+    for d in range(work.U.shape[0]):
+        for r in range(6):
+            across[r, d] = work.U[d, r]
+            across[6 + r, d] = work.S3nu[d, r]
+    for b in range(model.body_above.shape[1]):
+        u, s = six(across, 0, b * LANES), six(across, 6, b * LANES)
+        for i in range(model.body_parent.shape[0]):
+            above, below = model.body_above[i, b], model.body_below[i, b]
+            if above == 0 and below == 0:
+                continue
+            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                t = spread(0.0)
+                if above != 0:
+                    t = keep(above, dot_lanes(work.L, d, 0, s))
+                if below != 0:
+                    t = t + keep(below, dot_lanes(work.S2, d, 0, u))
+                store(work.triangles, d, b * LANES, t)
 
 
 @kernel
-def _six(P: Matrix, r: int, c: int) -> Six:
-    """P[r : r + 6] of the columns from c on."""
-    return load(P, r, c), load(P, r + 1, c), load(P, r + 2, c), load(P, r + 3, c), load(P, r + 4, c), load(P, r + 5, c)
-
-
-@kernel
-def _put(P: Matrix, r: int, c: int, w: Six) -> None:
-    """P[r : r + 6] = w."""
-    store(P, r, c, w[0])
-    store(P, r + 1, c, w[1])
-    store(P, r + 2, c, w[2])
-    store(P, r + 3, c, w[3])
-    store(P, r + 4, c, w[4])
-    store(P, r + 5, c, w[5])
-
-
-@kernel
-def _dot(S: Matrix, d: int, w: Six) -> Lanes:
-    """S[d] . w"""
-    s = S[d]
-    return (s[0] * w[0] + s[1] * w[1]) + (s[2] * w[2] + s[3] * w[3]) + (s[4] * w[4] + s[5] * w[5])
-
-
-@kernel
-def _plus(w: Six, S: Matrix, d: int, x: Lanes) -> Six:
-    """w + S[d] x"""
-    s = S[d]
-    return w[0] + s[0] * x, w[1] + s[1] * x, w[2] + s[2] * x, w[3] + s[3] * x, w[4] + s[4] * x, w[5] + s[5] * x
-
-
-@kernel
-def _sum(v: Six, w: Six) -> Six:
-    """v + w"""
-    return v[0] + w[0], v[1] + w[1], v[2] + w[2], v[3] + w[3], v[4] + w[4], v[5] + w[5]
-
-
-@kernel
-def _zero() -> Six:
-    """No wrench."""
-    o = spread(0.0)
-    return o, o, o, o, o, o
-
-
-@kernel
-def _up(model: Model, work: Work, c: int, at: int) -> None:
-    """From the leaves to the root: columns = D^-1 (columns - S2^T p), p_parent += p + U columns; of a leaf p = 0."""
-    X, P = work.columns, work.panel
-    for i in range(model.body_parent.shape[0]):
-        if model.body_leaf[i] == 0:
-            _put(P, 6 * i, at, _zero())
+def _up(model: Model, work: Work, c: int) -> None:
+    """LANES columns from c on, from the leaves to the root."""
+    X, T = work.columns, work.triangles
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
-        end = model.body_vadr[i + 1]
-        q = model.body_parent[i]
-        leaf = model.body_leaf[i] == 1
-        w = _zero() if leaf else _six(P, 6 * i, at)
-        if end == d0 + 1:
-            x = load(X, d0, c) if leaf else load(X, d0, c) - _dot(work.S2, d0, w)
-            x = work.D[i, 0] * x
-            store(X, d0, c, x)
-            w = _plus(w, work.U, d0, x)
-        elif end > d0:
-            if not leaf:
-                for d in range(d0, end):
-                    store(X, d, c, load(X, d, c) - _dot(work.S2, d, w))
-            lu_solve_lanes(work.D[i], end - d0, int(work.D[i, 36]), X, d0, c)
-            if q >= 0:
-                for d in range(d0, end):
-                    w = _plus(w, work.U, d, load(X, d, c))
-        if q >= 0:
-            _put(P, 6 * q, at, _sum(_six(P, 6 * q, at), w))
+        n = model.body_vadr[i + 1] - d0
+        below = model.dofs_below[i]
+        for d in range(d0, d0 + n):
+            x = load(X, d, c)
+            for m in range(model.count_below[i]):
+                k = below[m]
+                x = x - T[d, k] * load(X, k, c)
+            store(X, d, c, work.D[i, 0] * x if n == 1 else x)
+        if n > 1:
+            lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, c)
 
 
 @kernel
-def _down(model: Model, work: Work, c: int, at: int, leaves: bool) -> None:
-    """From the root to the leaves: columns -= L V_parent, V = V_parent + S3nu columns."""
+def _down(model: Model, work: Work, c: int) -> None:
+    """LANES columns from c on, from the root to the leaves."""
+    X, T = work.columns, work.triangles
+    for i in range(model.body_parent.shape[0]):
+        above = model.dofs_above[i]
+        if model.count_above[i] == 0:
+            continue
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            x = load(X, d, c)
+            for m in range(model.count_above[i]):
+                k = above[m]
+                x = x - T[d, k] * load(X, k, c)
+            store(X, d, c, x)
+
+
+@kernel
+def _twists(model: Model, work: Work, count: int) -> None:
+    """panel[6 i : 6 i + 6] = twist of body i, V_parent + S3nu columns."""
     X, P = work.columns, work.panel
     for i in range(model.body_parent.shape[0]):
-        d0 = model.body_vadr[i]
-        end = model.body_vadr[i + 1]
         q = model.body_parent[i]
-        above = _zero()
-        if q >= 0:
-            above = _six(P, 6 * q, at)
-            for d in range(d0, end):
-                store(X, d, c, load(X, d, c) - _dot(work.L, d, above))
-        if leaves or model.body_leaf[i] == 0:
-            for d in range(d0, end):
-                above = _plus(above, work.S3nu, d, load(X, d, c))
-            _put(P, 6 * i, at, above)
+        for c in range(0, count, LANES):
+            for r in range(6):
+                v: Lanes = load(P, 6 * q + r, c) if q >= 0 else spread(0.0)
+                for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                    v = v + work.S3nu[d, r] * load(X, d, c)
+                store(P, 6 * i + r, c, v)
 
 
 @kernel
@@ -120,8 +103,11 @@ def solve_panel(model: Model, work: Work) -> None:
 
     Leaves the twists of the bodies in `panel` where there are couplings, which ask for them.
     """
-    coupled = work.couple_panel.shape[0] > 0
-    for c in range(0, column_count(model, work), LANES):
-        at = c if coupled else 0
-        _up(model, work, c, at)
-        _down(model, work, c, at, coupled)
+    count = column_count(model, work)
+    if not solve_deep_panel(model, work, count):
+        _fill_triangles(model, work)
+        for c in range(0, count, LANES):
+            _up(model, work, c)
+            _down(model, work, c)
+    if work.couple_panel.shape[0] > 0:
+        _twists(model, work, count)

@@ -30,7 +30,8 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
-    body_above nbody nblock, body_below nbody nblock, dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
+    body_above nbody nblock, body_below nbody nblock,
+    dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody, dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
@@ -81,7 +82,8 @@ WORK_FLOATS = _shapes(
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
     loop_open nrow, gear_rate ngear 2,
-    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 24, S_across 18 nwide, F_across 12 nwide,
+    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
+    triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 37, far_law 2,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach

@@ -21,10 +21,14 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 from numpy.typing import NDArray
 
-__all__ = ["LANES", "Lanes", "keep", "load", "spread", "store", "whole"]
+from solvers.jit import kernel
+
+__all__ = ["LANES", "Lanes", "Six", "dot_lanes", "keep", "load", "six", "spread", "store", "whole"]
 
 LANES = 8
+Matrix = NDArray[np.float64]
 Lanes = NDArray[np.float64]  # without compilation; (LANES,)
+Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]  # rows of a wrench, or of a twist
 
 _Vector = ir.VectorType(ir.DoubleType(), LANES)
 _Bits = ir.VectorType(ir.IntType(1), LANES)
@@ -101,12 +105,12 @@ def _spread_number(typing: Any, number: Any) -> Any:
     return _LANES(types.float64), lower
 
 
-def load(A: NDArray[np.float64], i: int, j: int) -> Lanes:
+def load(A: Matrix, i: int, j: int) -> Lanes:
     """A[i, j : j + LANES]; the matrix has to have that many columns left, or rows behind."""
     return A.reshape(-1)[i * A.shape[1] + j :][:LANES].copy()
 
 
-def store(A: NDArray[np.float64], i: int, j: int, x: Lanes) -> None:
+def store(A: Matrix, i: int, j: int, x: Lanes) -> None:
     """A[i, j : j + LANES] = x, as `load`."""
     A.reshape(-1)[i * A.shape[1] + j :][:LANES] = x
 
@@ -162,3 +166,16 @@ def _operator(function: Any, instruction: str) -> None:
 
 for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
     _operator(_function, _instruction)
+
+
+@kernel
+def six(P: Matrix, r: int, c: int) -> Six:
+    """P[r : r + 6] of the columns from c on."""
+    return load(P, r, c), load(P, r + 1, c), load(P, r + 2, c), load(P, r + 3, c), load(P, r + 4, c), load(P, r + 5, c)
+
+
+@kernel
+def dot_lanes(S: Matrix, d: int, first: int, w: Six) -> Lanes:
+    """S[d, first : first + 6] . w"""
+    s = S[d, first : first + 6]
+    return (s[0] * w[0] + s[1] * w[1]) + (s[2] * w[2] + s[3] * w[3]) + (s[4] * w[4] + s[5] * w[5])
