@@ -92,7 +92,7 @@ def _pack_branches(model: Model) -> None:
         ):
             dofs = np.flatnonzero(chosen)
             counts[i] = len(dofs)
-            rows[i, : len(dofs)] = dofs
+            rows[i, : len(dofs)] = dofs if rows is model.dofs_above else dofs[::-1]
 
 
 def _pack_joints(joints: Sequence[Joint], model: Model) -> None:

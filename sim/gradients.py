@@ -7,7 +7,7 @@ central path the condensed contact matrices W are the exact derivatives of the i
 from __future__ import annotations
 
 from sim import late
-from sim.elimination import factor
+from sim.elimination import factor_of
 from sim.elimination_panel import solve_panel
 from sim.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
@@ -47,10 +47,7 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
     add_bounce_composites(model, work)
-    for i in range(work.A.shape[0]):
-        for k in range(36):
-            work.A[i, k] = work.A3[i, k]
-    if not factor(model, work):
+    if not factor_of(model, work, work.A3):
         return False
     add_coupling_composites(model, work, h)
     sum_composites(model, work)

@@ -31,7 +31,8 @@ MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
     body_above nbody nblock, body_below nbody nblock,
-    dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody, dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
+    dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
@@ -66,7 +67,8 @@ WORK_FLOATS = _shapes(
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
     S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, body_impulse nbody 6,
     arm nbody 6, turn_matrix nbody 9, move_in nbody 3, move nbody 3, turn_in nbody 4, turn nbody 4,
-    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
+    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
+    articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
@@ -84,7 +86,8 @@ WORK_FLOATS = _shapes(
     loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
     triangles nv nwide, triangle_across 12 nwide,
-    dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
+    dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
+    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 37, far_law 2,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """

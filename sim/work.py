@@ -46,9 +46,10 @@ class Work(NamedTuple):
     residual: Vector  # (nv,) generalized residual
     rhs: Vector  # (nv,)
     # elimination
-    A: Matrix  # (nbody, 36) articulated matrix of each subtree
+    A: Matrix  # (nbody, 36) Newton matrix of each body, contacts condensed
+    articulated: Matrix  # (6 nbody, 8) articulated matrix of each subtree, and scratch in the last two columns
     U: Matrix  # (nv, 6) columns A S3nu
-    L: Matrix  # (nv, 6) rows D^-1 S2^T A
+    L: Matrix  # (nv, 8) rows D^-1 S2^T A, six numbers, and scratch
     D: Matrix  # (nbody, 37) LU factors of the joint blocks S2^T A S3nu + joint_block, and their row exchanges
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)

@@ -23,9 +23,26 @@ from numpy.typing import NDArray
 
 from solvers.jit import kernel
 
-__all__ = ["LANES", "Lanes", "Six", "dot_lanes", "keep", "load", "six", "spread", "store", "whole"]
+__all__ = [
+    "LANES",
+    "Lanes",
+    "Six",
+    "dot_lanes",
+    "keep",
+    "load",
+    "minus_outer",
+    "plus",
+    "plus_outer",
+    "put",
+    "six",
+    "spread",
+    "store",
+    "whole",
+    "zeros",
+]
 
 LANES = 8
+Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Lanes = NDArray[np.float64]  # without compilation; (LANES,)
 Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]  # rows of a wrench, or of a twist
@@ -107,7 +124,8 @@ def _spread_number(typing: Any, number: Any) -> Any:
 
 def load(A: Matrix, i: int, j: int) -> Lanes:
     """A[i, j : j + LANES]; the matrix has to have that many columns left, or rows behind."""
-    return A.reshape(-1)[i * A.shape[1] + j :][:LANES].copy()
+    found = A.reshape(-1)[i * A.shape[1] + j :][:LANES]
+    return np.pad(found, (0, LANES - len(found)))
 
 
 def store(A: Matrix, i: int, j: int, x: Lanes) -> None:
@@ -172,6 +190,42 @@ for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), 
 def six(P: Matrix, r: int, c: int) -> Six:
     """P[r : r + 6] of the columns from c on."""
     return load(P, r, c), load(P, r + 1, c), load(P, r + 2, c), load(P, r + 3, c), load(P, r + 4, c), load(P, r + 5, c)
+
+
+@kernel
+def put(P: Matrix, r: int, c: int, w: Six) -> None:
+    """P[r : r + 6] = w, of the columns from c on."""
+    store(P, r, c, w[0])
+    store(P, r + 1, c, w[1])
+    store(P, r + 2, c, w[2])
+    store(P, r + 3, c, w[3])
+    store(P, r + 4, c, w[4])
+    store(P, r + 5, c, w[5])
+
+
+@kernel
+def zeros() -> Six:
+    """Six rows of zeros."""
+    o = spread(0.0)
+    return o, o, o, o, o, o
+
+
+@kernel
+def plus(v: Six, w: Six) -> Six:
+    """v + w"""
+    return v[0] + w[0], v[1] + w[1], v[2] + w[2], v[3] + w[3], v[4] + w[4], v[5] + w[5]
+
+
+@kernel
+def plus_outer(w: Six, s: Vector, x: Lanes) -> Six:
+    """w + s x"""
+    return w[0] + s[0] * x, w[1] + s[1] * x, w[2] + s[2] * x, w[3] + s[3] * x, w[4] + s[4] * x, w[5] + s[5] * x
+
+
+@kernel
+def minus_outer(w: Six, s: Vector, x: Lanes) -> Six:
+    """w - s x"""
+    return w[0] - s[0] * x, w[1] - s[1] * x, w[2] - s[2] * x, w[3] - s[3] * x, w[4] - s[4] * x, w[5] - s[5] * x
 
 
 @kernel
