@@ -45,36 +45,42 @@ def _fill_triangles(model: Model, work: Work) -> None:
 
 @kernel
 def _up(model: Model, work: Work, c: int) -> None:
-    """LANES columns from c on, from the leaves to the root."""
+    """2 LANES columns from c on, at which the processor works side by side, from the leaves to the root."""
     X, T = work.columns, work.triangles
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         below = model.dofs_below[i]
         for d in range(d0, d0 + n):
-            x = load(X, d, c)
+            x, y = load(X, d, c), load(X, d, c + LANES)
             for m in range(model.count_below[i]):
                 k = below[m]
                 x = x - T[d, k] * load(X, k, c)
-            store(X, d, c, work.D[i, 0] * x if n == 1 else x)
+                y = y - T[d, k] * load(X, k, c + LANES)
+            f = work.D[i, 0] if n == 1 else 1.0
+            store(X, d, c, f * x)
+            store(X, d, c + LANES, f * y)
         if n > 1:
             lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, c)
+            lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, c + LANES)
 
 
 @kernel
 def _down(model: Model, work: Work, c: int) -> None:
-    """LANES columns from c on, from the root to the leaves."""
+    """2 LANES columns from c on, at which the processor works side by side, from the root to the leaves."""
     X, T = work.columns, work.triangles
     for i in range(model.body_parent.shape[0]):
         above = model.dofs_above[i]
         if model.count_above[i] == 0:
             continue
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            x = load(X, d, c)
+            x, y = load(X, d, c), load(X, d, c + LANES)
             for m in range(model.count_above[i]):
                 k = above[m]
                 x = x - T[d, k] * load(X, k, c)
+                y = y - T[d, k] * load(X, k, c + LANES)
             store(X, d, c, x)
+            store(X, d, c + LANES, y)
 
 
 @kernel
@@ -106,7 +112,7 @@ def solve_panel(model: Model, work: Work) -> None:
     count = column_count(model, work)
     if not solve_deep_panel(model, work, count):
         _fill_triangles(model, work)
-        for c in range(0, count, LANES):
+        for c in range(0, count, 2 * LANES):
             _up(model, work, c)
             _down(model, work, c)
     if work.couple_panel.shape[0] > 0:

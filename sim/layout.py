@@ -119,7 +119,8 @@ class Sizes(NamedTuple):
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     """Rows and columns of one field."""
     nv, nu = sizes.nv, sizes.nu
-    columns = whole(max(2 * nv + whole(nu), nv + whole(nv)))  # what their lanes write behind them included
+    columns = max(2 * nv + whole(nu), nv + whole(nv))  # with what lanes write behind dR_dv and the inputs
+    columns = whole(-(-columns // 2)) * 2  # an even number of blocks
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,

@@ -53,9 +53,7 @@ class Model(NamedTuple):
     body_above: IntegerMatrix  # (nbody, nblock) dofs above its joint, as bits of blocks of LANES (solvers/lanes.py)
     body_below: IntegerMatrix  # (nbody, nblock) dofs of its joint and below
     dofs_above: IntegerMatrix  # (nbody, nv) the dofs above the joint of a body, root first
-    dofs_below: (
-        IntegerMatrix  # (nbody, nv) those of the bodies below, last first, as solutions become known
-    )
+    dofs_below: IntegerMatrix  # (nbody, nv) those of the bodies below, in the order in which solutions are found
     count_above: Integers  # (nbody,) how many
     count_below: Integers  # (nbody,)
     joint_ntrans: Integers  # (nbody,) free translations, 0 to 3

@@ -147,14 +147,14 @@ class Work(NamedTuple):
     A3: Matrix  # (nbody, 36)
     F: Matrix  # (nv, 24) scratch; from 12 on, six numbers, what turns of test directions make of the residual wrench
     G: Matrix  # (nv, 24) rows of test directions times the composites, 18, and scratch
-    S_across: Matrix  # (18, nv and zeros) S1, S2, S3, a dof per column
-    F_across: Matrix  # (12, nv and zeros) composites times unit columns, likewise
-    dR_dq: Matrix  # (nv, nv and zeros)
-    dR_dv: Matrix  # (nv, nv and zeros)
-    columns: Matrix  # (nv, 2 nv + nu and zeros) right-hand sides and solutions
-    triangles: Matrix  # (nv, nv and zeros) of the substitution with `columns`, see elimination_panel.py
-    triangle_across: Matrix  # (12, nv and zeros) U, S3nu, a dof per column
-    panel: Matrix  # (6 nbody, n) wrenches, then twists, of a block of columns; of all where there are couplings
+    S_across: Matrix  # (18, nwide) S1, S2, S3, a dof per column
+    F_across: Matrix  # (12, nwide) composites times unit columns, likewise
+    dR_dq: Matrix  # (nv, nwide) nwide: nv, and zeros up to a multiple of LANES (solvers/lanes.py)
+    dR_dv: Matrix  # (nv, nwide)
+    columns: Matrix  # (nv, ncolumn) right-hand sides and solutions, 2 nv + nu and zeros
+    triangles: Matrix  # (nv, nwide) of the substitution with `columns`, see elimination_panel.py
+    triangle_across: Matrix  # (12, nwide) U, S3nu, a dof per column
+    panel: Matrix  # (6 nbody, npanel) twists of all columns where there are couplings, otherwise scratch of deep trees
     step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
