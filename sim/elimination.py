@@ -14,6 +14,8 @@ from solvers.jit import inlined, kernel
 from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
 from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_lanes
 
+Twist = tuple[float, float, float, float, float, float]
+
 
 @kernel
 def add_children(model: Model, out: Matrix) -> None:
@@ -41,6 +43,18 @@ def dot_six(a: Vector, b: Vector) -> float:
 
 
 @kernel
+def numbers(s: Vector) -> Twist:
+    """Six numbers that are read once: the processor cannot know that what is written meanwhile leaves them alone."""
+    return s[0], s[1], s[2], s[3], s[4], s[5]
+
+
+@kernel
+def times_row(A: Vector, k: int, s: Twist) -> float:
+    """A[k : k + 6] . s"""
+    return (A[k] * s[0] + A[k + 1] * s[1]) + (A[k + 2] * s[2] + A[k + 3] * s[3]) + (A[k + 4] * s[4] + A[k + 5] * s[5])
+
+
+@kernel
 def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
     """out[d] = S[d] . subtree[body of d].  (nv,)"""
     for d in range(out.shape[0]):
@@ -56,8 +70,9 @@ def _joint_products(model: Model, work: Work, i: int, a: Six) -> None:
     d0 = model.body_vadr[i]
     n = model.body_vadr[i + 1] - d0
     for d in range(d0, d0 + n):
+        s = numbers(work.S3nu[d])
         for r in range(6):
-            work.U[d, r] = dot_six(work.articulated[6 * i + r], work.S3nu[d])
+            work.U[d, r] = times_row(work.articulated[6 * i + r], 0, s)
         if model.body_parent[i] >= 0:
             store(work.L, d, 0, dot_lanes(work.S2, d, 0, a))
     D = work.D[i]

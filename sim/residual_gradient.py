@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.elimination import dot_six
+from sim.elimination import dot_six, numbers, times_row
 from sim.model import Matrix, Model, Vector
 from sim.rotation import cross
 from sim.work import Work
@@ -89,12 +89,12 @@ def _turned_tests(model: Model, work: Work) -> None:
 @kernel
 def _composite_products(work: Work, d: int, i: int) -> None:
     """Column d of F_across = (A3 S3 + A2 S2 + A1 S1, A1 S1), G[d] = (S2 A1, S2 A2 + t, S2 A3), A of body i, t in F."""
-    s1, s, s3 = work.S1[d], work.S2[d], work.S3[d]
+    s = work.S2[d]
+    a1, a2, a3 = numbers(work.S1[d]), numbers(s), numbers(work.S3[d])
     A1, A2, A3 = work.A1[i], work.A2[i], work.A3[i]
     for r in range(6):
-        k = 6 * r
-        momentum = dot_six(A1[k : k + 6], s1)
-        work.F_across[r, d] = momentum + dot_six(A2[k : k + 6], s) + dot_six(A3[k : k + 6], s3)
+        momentum = times_row(A1, 6 * r, a1)
+        work.F_across[r, d] = momentum + times_row(A2, 6 * r, a2) + times_row(A3, 6 * r, a3)
         work.F_across[6 + r, d] = momentum
     store(work.G, d, 0, _row(work.A1, i, s))
     store(work.G, d, 6, _row(work.A2, i, s) + load(work.F, d, 12))
