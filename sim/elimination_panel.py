@@ -110,7 +110,7 @@ def solve_panel(model: Model, work: Work) -> None:
     Leaves the twists of the bodies in `panel` where there are couplings, which ask for them.
     """
     count = column_count(model, work)
-    if not solve_deep_panel(model, work, count):
+    if solve_deep_panel(model, work, count) == 0:
         _fill_triangles(model, work)
         for c in range(0, count, 2 * LANES):
             _up(model, work, c)
