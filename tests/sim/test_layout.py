@@ -106,7 +106,9 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
     work = allocate_work(sizes)
     assert _mark_work(table(work)) == 1000 * work.columns.shape[1] + sizes.nbody
     np.testing.assert_array_equal(work.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
-    np.testing.assert_array_equal(work.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(work.panel.shape[1]))
+    np.testing.assert_array_equal(
+        work.panel, np.arange(6 * sizes.nbody)[:, None] + 0.5 * np.arange(work.panel.shape[1])
+    )
 
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])
