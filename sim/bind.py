@@ -76,6 +76,9 @@ _COUPLING_GRADIENT = (
 )
 
 
+_DEEP = 24.0  # dofs above one, on average, from where wrenches and twists take less (sim/elimination_deep.py)
+
+
 def _bind(model: Model, kernels: tuple[LateKernel, ...]) -> None:
     for kernel in kernels:
         model.late[kernel.index] = kernel.address()
@@ -141,6 +144,8 @@ def bind_step(model: Model) -> None:
 def bind_gradient(model: Model) -> None:
     """What the derivatives of a time step need beyond it."""
     _bind(model, (late.gradient,))
+    if np.sum(model.count_above[model.dof_body]) > _DEEP * len(model.dof_body):
+        _bind(model, (late.solve_deep_panel,))
     if len(model.contact_body) + len(model.limit_dof):
         _bind(model, (late.add_stiffness,))
     if len(model.limit_dof):

@@ -16,6 +16,7 @@ from sim.pairs.touch import couples
 from sim.parts import WORLD, Contact, Joint
 from sim.shapes import rotation_matrix
 from sim.terrain.terrain import Terrain
+from solvers.lanes import LANES
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def pack(mech: Mechanism) -> Model:
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
     _pack_joints(mech.joints, model)
+    _pack_branches(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)
     pack_collisions(mech, model)
@@ -69,6 +71,28 @@ def _pack_tree(mech: Mechanism, model: Model) -> None:
         model.body_mass[i] = body.mass
         model.body_leaf[i] = body.name not in {j.parent for j in mech.joints}
         model.body_inertia[i] = np.ravel(np.asarray(body.inertia, dtype=np.float64))
+
+
+def _pack_branches(model: Model) -> None:
+    """Which degrees of freedom are above a body, and which in its joint and below, as bits of blocks of LANES."""
+    below = np.eye(len(model.body_parent), dtype=bool)  # [i, b]: b is i, or below it
+    for i, parent in enumerate(model.body_parent):
+        if parent >= 0:
+            below[:, i] |= below[:, parent]
+    for d, body in enumerate(model.dof_body):
+        block, bit = divmod(d, LANES)
+        model.body_below[:, block] |= below[:, body].astype(np.int64) << bit
+        above = below[body] & (np.arange(len(below)) != body)
+        model.body_above[:, block] |= above.astype(np.int64) << bit
+    for i, row in enumerate(below):
+        own = model.dof_body == i
+        for rows, counts, chosen in (
+            (model.dofs_above, model.count_above, below[model.dof_body, i] & ~own),
+            (model.dofs_below, model.count_below, row[model.dof_body] & ~own),
+        ):
+            dofs = np.flatnonzero(chosen)
+            counts[i] = len(dofs)
+            rows[i, : len(dofs)] = dofs if rows is model.dofs_above else dofs[::-1]
 
 
 def _pack_joints(joints: Sequence[Joint], model: Model) -> None:

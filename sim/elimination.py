@@ -11,7 +11,10 @@ from __future__ import annotations
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
 from solvers.jit import inlined, kernel
-from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_rows
+from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
+from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_lanes
+
+Twist = tuple[float, float, float, float, float, float]
 
 
 @kernel
@@ -40,99 +43,81 @@ def dot_six(a: Vector, b: Vector) -> float:
 
 
 @kernel
+def numbers(s: Vector) -> Twist:
+    """Six numbers that are read once: the processor cannot know that what is written meanwhile leaves them alone."""
+    return s[0], s[1], s[2], s[3], s[4], s[5]
+
+
+@kernel
+def times_row(A: Vector, k: int, s: Twist) -> float:
+    """A[k : k + 6] . s"""
+    return (A[k] * s[0] + A[k + 1] * s[1]) + (A[k + 2] * s[2] + A[k + 3] * s[3]) + (A[k + 4] * s[4] + A[k + 5] * s[5])
+
+
+@kernel
 def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
     """out[d] = S[d] . subtree[body of d].  (nv,)"""
     for d in range(out.shape[0]):
         out[d] = dot_six(S[d], subtree[model.dof_body[d]])
 
 
-@kernel
-def column_and_row(A: Vector, s: Vector, t: Vector, U: Vector, L: Vector) -> None:
-    """U = A s, L = t^T A, in one pass over A."""
-    s0, s1, s2, s3, s4, s5 = s[0], s[1], s[2], s[3], s[4], s[5]
-    l0, l1, l2, l3, l4, l5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for r in range(6):
-        a0, a1, a2, a3, a4, a5 = A[6 * r], A[6 * r + 1], A[6 * r + 2], A[6 * r + 3], A[6 * r + 4], A[6 * r + 5]
-        f = t[r]
-        U[r] = a0 * s0 + a1 * s1 + a2 * s2 + a3 * s3 + a4 * s4 + a5 * s5
-        l0, l1, l2, l3, l4, l5 = l0 + f * a0, l1 + f * a1, l2 + f * a2, l3 + f * a3, l4 + f * a4, l5 + f * a5
-    L[0], L[1], L[2], L[3], L[4], L[5] = l0, l1, l2, l3, l4, l5
-
-
-@kernel
-def _add_rest(A: Vector, U: Vector, L: Vector, out: Vector) -> None:
-    """out += A - U L"""
-    l0, l1, l2, l3, l4, l5 = L[0], L[1], L[2], L[3], L[4], L[5]
-    for r in range(0, 36, 6):
-        f = U[r // 6]
-        out[r] += A[r] - f * l0
-        out[r + 1] += A[r + 1] - f * l1
-        out[r + 2] += A[r + 2] - f * l2
-        out[r + 3] += A[r + 3] - f * l3
-        out[r + 4] += A[r + 4] - f * l4
-        out[r + 5] += A[r + 5] - f * l5
-
-
-@kernel
-def _pass_matrix(work: Work, first: int, end: int, A: Vector, out: Vector) -> None:
-    """out += A - U L, U and L of the dofs from first to end; A is used up."""
-    for d in range(first, end - 1):
-        for r in range(6):
-            f = work.U[d, r]
-            for k in range(6):
-                A[6 * r + k] -= f * work.L[d, k]
-    if end > first:
-        _add_rest(A, work.U[end - 1], work.L[end - 1], out)
-    else:
-        for k in range(36):
-            out[k] += A[k]
-
-
 @inlined
-def joint_products(model: Model, work: Work, i: int) -> None:
-    """U = A S3nu,  L = S2^T A,  D = S2^T U + joint block of joint i, at the articulated matrix of its body.
+def _joint_products(model: Model, work: Work, i: int, a: Six) -> None:
+    """U = A S3nu,  L = S2^T A,  D = S2^T U + joint block of joint i, at the articulated matrix A of its body.
 
-    L of a root is not computed: nothing is above it.
+    a: the rows of A, which are in work.articulated, too. L of a root is not computed: nothing is above it.
     """
     d0 = model.body_vadr[i]
     n = model.body_vadr[i + 1] - d0
-    A = work.A[i]
     for d in range(d0, d0 + n):
+        s = numbers(work.S3nu[d])
+        for r in range(6):
+            work.U[d, r] = times_row(work.articulated[6 * i + r], 0, s)
         if model.body_parent[i] >= 0:
-            column_and_row(A, work.S3nu[d], work.S2[d], work.U[d], work.L[d])
-        else:
-            for r in range(6):
-                work.U[d, r] = dot_six(A[6 * r : 6 * r + 6], work.S3nu[d])
+            store(work.L, d, 0, dot_lanes(work.S2, d, 0, a))
     D = work.D[i]
     B = work.joint_block[i]
-    for a in range(n):
-        for b in range(n):
-            D[a * n + b] = B[a * n + b] + dot_six(work.S2[d0 + a], work.U[d0 + b])
+    for j in range(n):
+        for k in range(n):
+            D[j * n + k] = B[j * n + k] + dot_six(work.S2[d0 + j], work.U[d0 + k])
 
 
 @kernel
 def factor(model: Model, work: Work) -> int:
-    """Eliminate the joints from the leaves to the root; work.A is used up.
+    """`factor_of` the matrices in work.A."""
+    return factor_of(model, work, work.A)
+
+
+@kernel
+def factor_of(model: Model, work: Work, A: Matrix) -> int:
+    """Eliminate the joints from the leaves to the root.   A: (nbody, 36), matrices of the bodies alone.
 
         U = A S3nu,   D = S2^T U + joint block,   L = D^-1 S2^T A,      A_parent += A - U L
 
     Returns the sign of det H, 0 when a joint block is singular.
     """
     sign = 1
+    P = work.articulated
+    for i in range(model.body_parent.shape[0]):
+        if model.body_leaf[i] == 0:
+            put(P, 6 * i, 0, zeros())
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         p = model.body_parent[i]
         D = work.D[i]
-        joint_products(model, work, i)
+        a = load(A, i, 0), load(A, i, 6), load(A, i, 12), load(A, i, 18), load(A, i, 24), load(A, i, 30)
+        if model.body_leaf[i] == 0:
+            a = plus(a, six(P, 6 * i, 0))
+        put(P, 6 * i, 0, a)
+        _joint_products(model, work, i, a)
         if n == 1:
             if not abs(D[0]) > 1e-300:
                 return 0
             if D[0] < 0.0:
                 sign = -sign
             D[0] = 1.0 / D[0]
-            for k in range(6):
-                work.L[d0, k] *= D[0]
+            store(work.L, d0, 0, D[0] * load(work.L, d0, 0))
         elif n > 1:
             swaps = lu_factor(D, n)
             if swaps < 0:
@@ -140,9 +125,11 @@ def factor(model: Model, work: Work) -> int:
             sign *= lu_sign(D, n, swaps)
             D[36] = float(swaps)
             if p >= 0:
-                lu_solve_rows(D, n, swaps, work.L, d0)
+                lu_solve_lanes(D, n, swaps, work.L, d0, 0)
         if p >= 0:
-            _pass_matrix(work, d0, d0 + n, work.A[i], work.A[p])
+            for d in range(d0, d0 + n):
+                a = minus_outer(a, work.U[d], load(work.L, d, 0))
+            put(P, 6 * p, 0, plus(six(P, 6 * p, 0), a))
     return sign
 
 

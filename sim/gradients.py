@@ -7,7 +7,7 @@ central path the condensed contact matrices W are the exact derivatives of the i
 from __future__ import annotations
 
 from sim import late
-from sim.elimination import factor
+from sim.elimination import factor_of
 from sim.elimination_panel import solve_panel
 from sim.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
@@ -26,9 +26,10 @@ from sim.model import InputKind, Matrix, Model, Vector
 from sim.outer import input_wrench
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
-from sim.rotation import left_jacobian, quat_exp, quat_matrix
+from sim.rotation import Vec3, left_jacobian, quat_exp, quat_matrix
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.lanes import LANES, load, spread, store
 
 _JOINT = int(InputKind.JOINT)
 
@@ -46,10 +47,7 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
     add_bounce_composites(model, work)
-    for i in range(work.A.shape[0]):
-        for k in range(36):
-            work.A[i, k] = work.A3[i, k]
-    if not factor(model, work):
+    if not factor_of(model, work, work.A3):
         return False
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
@@ -70,13 +68,17 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
 
 @kernel
 def _joint_columns(model: Model, work: Work, h: float, v: Vector) -> None:
-    """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T)."""
+    """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T).
+
+    What the lanes of dR_dq and dR_dv write behind their columns are the places of dR_dv, and of the inputs.
+    """
     nv = v.shape[0]
     add_limit_derivatives(model, work, h)
     for d in range(nv):
-        for k in range(nv):
-            work.columns[d, k] = -work.dR_dq[d, k]
-            work.columns[d, nv + k] = h * work.dR_dv[d, k]
+        for k in range(0, nv, LANES):
+            store(work.columns, d, k, -1.0 * load(work.dR_dq, d, k))
+        for k in range(0, nv, LANES):
+            store(work.columns, d, nv + k, h * load(work.dR_dv, d, k))
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
             e = model.body_vadr[i + 1] - 3
@@ -92,10 +94,12 @@ def _joint_columns(model: Model, work: Work, h: float, v: Vector) -> None:
 def _input_columns(model: Model, work: Work, h: float) -> None:
     """columns[:, 2 nv:] = -dR/du: h at the dof of a joint input, h S2^T wrench above the body of the others."""
     nv = work.columns.shape[0]
-    for j in range(model.input_kind.shape[0]):
+    nu = model.input_kind.shape[0]
+    for d in range(nv):
+        for k in range(0, nu, LANES):
+            store(work.columns, d, 2 * nv + k, spread(0.0))
+    for j in range(nu):
         col = 2 * nv + j
-        for d in range(nv):
-            work.columns[d, col] = 0.0
         if model.input_kind[j] == _JOINT:
             work.columns[model.input_index[j], col] = h
             continue
@@ -115,16 +119,13 @@ def _input_columns(model: Model, work: Work, h: float) -> None:
 def _next_state(model: Model, work: Work, h: float, A: Matrix, B: Matrix) -> None:
     """A, B from dv25 = columns:  dq3 = dq2 + h dv25, and R(h w)^T dphi2 + h J(h w)^T dw for quaternion joints."""
     nv = work.columns.shape[0]
-    nu = B.shape[1]
     for d in range(nv):
-        X = work.columns[d]
-        for k in range(2 * nv):
-            A[nv + d, k] = X[k]
-            A[d, k] = h * X[k]
-        for k in range(nu):
-            B[nv + d, k] = X[2 * nv + k]
-            B[d, k] = h * X[2 * nv + k]
+        _scaled_row(work.columns, d, 0, h, A, d)
+        _scaled_row(work.columns, d, 2 * nv, h, B, d)
         A[d, d] += 1.0
+    for d in range(nv):
+        _scaled_row(work.columns, d, 0, 1.0, A, nv + d)
+        _scaled_row(work.columns, d, 2 * nv, 1.0, B, nv + d)
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] != 3:
             continue
@@ -133,13 +134,37 @@ def _next_state(model: Model, work: Work, h: float, A: Matrix, B: Matrix) -> Non
         J = left_jacobian(x, y, z)
         e = quat_exp(x, y, z)
         R = quat_matrix(e[0], e[1], e[2], e[3])
-        X = work.columns
         for r in range(3):
-            j0, j1, j2 = h * J[r], h * J[3 + r], h * J[6 + r]
-            for k in range(2 * nv):
-                A[d + r, k] = j0 * X[d, k] + j1 * X[d + 1, k] + j2 * X[d + 2, k]
-            for k in range(nu):
-                m = 2 * nv + k
-                B[d + r, k] = j0 * X[d, m] + j1 * X[d + 1, m] + j2 * X[d + 2, m]
+            f = (h * J[r], h * J[3 + r], h * J[6 + r])
+            _turned_row(work.columns, d, 0, f, A, d + r)
+            _turned_row(work.columns, d, 2 * nv, f, B, d + r)
             for k in range(3):
                 A[d + r, d + k] += R[3 * k + r]
+
+
+@kernel
+def _scaled_row(X: Matrix, d: int, first: int, f: float, out: Matrix, row: int) -> None:
+    """out[row] = f X[d], columns from `first` on. The last lanes may repeat some of those before."""
+    n = out.shape[1]
+    for c in range(0, n, LANES):
+        if n < LANES:
+            for k in range(n):
+                out[row, k] = f * X[d, first + k]
+        else:
+            k = min(c, n - LANES)
+            store(out, row, k, f * load(X, d, first + k))
+
+
+@kernel
+def _turned_row(X: Matrix, d: int, first: int, f: Vec3, out: Matrix, row: int) -> None:
+    """out[row] = f . X[d : d + 3], likewise."""
+    n = out.shape[1]
+    for c in range(0, n, LANES):
+        if n < LANES:
+            for k in range(n):
+                m = first + k
+                out[row, k] = f[0] * X[d, m] + f[1] * X[d + 1, m] + f[2] * X[d + 2, m]
+        else:
+            k = min(c, n - LANES)
+            m = first + k
+            store(out, row, k, f[0] * load(X, d, m) + f[1] * load(X, d + 1, m) + f[2] * load(X, d + 2, m))

@@ -16,6 +16,9 @@ solve = interior_point = _late("sim.solve.interior_point:interior_point")  # the
 newton = _late("sim.solve.newton:newton", instead_of=solve)  # in scenes without contacts and limits
 gradient = _late("sim.gradients:gradient")
 
+# derivatives of deep trees
+solve_deep_panel = _late("sim.elimination_deep:solve_deep_panel")
+
 # contacts and limits
 report_contacts = _late("sim.contacts.report:report_contacts")
 worst_contact = _late("sim.contacts.report:worst_contact")

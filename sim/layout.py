@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sim import late
 from sim.model import Model
 from sim.work import Work
+from solvers.lanes import LANES, whole
 from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
@@ -29,6 +30,8 @@ def _shapes(text: str) -> dict[str, Shape]:
 MODEL_INTS = _shapes(
     """
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
+    body_above nbody nblock, body_below nbody nblock,
+    dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
     dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
     contact_terrain nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
@@ -64,7 +67,8 @@ WORK_FLOATS = _shapes(
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
     S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, body_impulse nbody 6,
     arm nbody 6, turn_matrix nbody 9, move_in nbody 3, move nbody 3, turn_in nbody 4, turn nbody 4,
-    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36, U nv 6, L nv 6, D nbody 37,
+    balance nbody 6, wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
+    articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
@@ -80,8 +84,10 @@ WORK_FLOATS = _shapes(
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
     loop_open nrow, gear_rate ngear 2,
-    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 18, G nv 18, dR_dq nv nv, dR_dv nv nv, columns nv 2nv+nu,
-    panel 6nbody 2nv+nu, step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
+    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
+    triangles nv nwide, triangle_across 12 nwide,
+    dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
+    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
     far nground 37, far_law 2,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """
@@ -112,6 +118,9 @@ class Sizes(NamedTuple):
 
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     """Rows and columns of one field."""
+    nv, nu = sizes.nv, sizes.nu
+    columns = max(2 * nv + whole(nu), nv + whole(nv))  # with what lanes write behind dR_dv and the inputs
+    columns = whole(-(-columns // 2)) * 2  # an even number of blocks
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,
@@ -124,6 +133,10 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
         "nlate": late.COUNT,
+        "nblock": whole(nv) // LANES,
+        "nwide": whole(nv),
+        "ncolumn": columns,
+        "npanel": columns if sizes.nrow else LANES,
         "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
     }
     rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
@@ -134,9 +147,12 @@ def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
     extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
     line = 128 // 8  # a pair of cache lines: what two threads write must not share one
-    buffer: NDArray[Any] = np.zeros(sum(rows * cols for rows, cols in extents.values()) + 2 * line, dtype=kind)
-    arrays, start = {}, -(buffer.ctypes.data // 8) % line
+    buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
+    first = -(buffer.ctypes.data // 8) % line
+    arrays, start = {}, first
     for name, (rows, cols) in extents.items():
+        if len(fields[name]) == 2 and cols % LANES == 0:  # rows of whole lanes begin where cache lines do
+            start = first + whole(start - first)
         flat = buffer[start : start + rows * cols]
         arrays[name] = flat if len(fields[name]) == 1 else flat.reshape(rows, cols)
         start += rows * cols

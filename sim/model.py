@@ -50,6 +50,12 @@ class Model(NamedTuple):
     body_leaf: Integers  # (nbody,) 1 where no body hangs on this one
     body_qadr: Integers  # (nbody + 1,) first coordinate of joint i in q
     body_vadr: Integers  # (nbody + 1,) first velocity of joint i in v: translations first, then rotations
+    body_above: IntegerMatrix  # (nbody, nblock) dofs above its joint, as bits of blocks of LANES (solvers/lanes.py)
+    body_below: IntegerMatrix  # (nbody, nblock) dofs of its joint and below
+    dofs_above: IntegerMatrix  # (nbody, nv) the dofs above the joint of a body, root first
+    dofs_below: IntegerMatrix  # (nbody, nv) those of the bodies below, in the order in which solutions are found
+    count_above: Integers  # (nbody,) how many
+    count_below: Integers  # (nbody,)
     joint_ntrans: Integers  # (nbody,) free translations, 0 to 3
     joint_nrot: Integers  # (nbody,) free rotations: 0, 1 (about joint_axis), 2 (swing, across it) or 3 (quaternion)
     dof_body: Integers  # (nv,) body of each degree of freedom

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from sim.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics import body_jacobian
-from sim.elimination import add_children
-from sim.model import Model, Vector
+from sim.model import Matrix, Model, Vector
 from sim.rotation import cross, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.lanes import load, store
 
 
 @kernel
@@ -124,8 +124,26 @@ def pose2_to_origin(work: Work) -> None:
 
 
 @kernel
+def _add_matrix(A: Matrix, i: int, p: int) -> None:
+    """A[p] += A[i], 36 numbers each: the last lanes begin before those in front of them end."""
+    a = load(A, p, 0) + load(A, i, 0)
+    b = load(A, p, 8) + load(A, i, 8)
+    c = load(A, p, 16) + load(A, i, 16)
+    d = load(A, p, 24) + load(A, i, 24)
+    e = load(A, p, 28) + load(A, i, 28)
+    store(A, p, 0, a)
+    store(A, p, 8, b)
+    store(A, p, 16, c)
+    store(A, p, 24, d)
+    store(A, p, 28, e)
+
+
+@kernel
 def sum_composites(model: Model, work: Work) -> None:
     """A1, A2, A3 of each body become the sums over its subtree."""
-    add_children(model, work.A1)
-    add_children(model, work.A2)
-    add_children(model, work.A3)
+    for i in range(model.body_parent.shape[0] - 1, -1, -1):
+        p = model.body_parent[i]
+        if p >= 0:
+            _add_matrix(work.A1, i, p)
+            _add_matrix(work.A2, i, p)
+            _add_matrix(work.A3, i, p)

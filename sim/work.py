@@ -46,9 +46,10 @@ class Work(NamedTuple):
     residual: Vector  # (nv,) generalized residual
     rhs: Vector  # (nv,)
     # elimination
-    A: Matrix  # (nbody, 36) articulated matrix of each subtree
+    A: Matrix  # (nbody, 36) Newton matrix of each body, contacts condensed
+    articulated: Matrix  # (6 nbody, 8) articulated matrix of each subtree, and scratch in the last two columns
     U: Matrix  # (nv, 6) columns A S3nu
-    L: Matrix  # (nv, 6) rows D^-1 S2^T A
+    L: Matrix  # (nv, 8) rows D^-1 S2^T A, six numbers, and scratch
     D: Matrix  # (nbody, 37) LU factors of the joint blocks S2^T A S3nu + joint_block, and their row exchanges
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)
@@ -144,12 +145,16 @@ class Work(NamedTuple):
     A1: Matrix  # (nbody, 36) d(balance)/d(pose 1), about O
     A2: Matrix  # (nbody, 36)
     A3: Matrix  # (nbody, 36)
-    F: Matrix  # (nv, 18) columns of the composites times unit columns
-    G: Matrix  # (nv, 18) rows of test directions times the composites
-    dR_dq: Matrix  # (nv, nv)
-    dR_dv: Matrix  # (nv, nv)
-    columns: Matrix  # (nv, 2 nv + nu) right-hand sides and solutions
-    panel: Matrix  # (6 nbody, 2 nv + nu) wrenches, then twists, of all columns
+    F: Matrix  # (nv, 24) scratch; from 12 on, six numbers, what turns of test directions make of the residual wrench
+    G: Matrix  # (nv, 24) rows of test directions times the composites, 18, and scratch
+    S_across: Matrix  # (18, nwide) S1, S2, S3, a dof per column
+    F_across: Matrix  # (12, nwide) composites times unit columns, likewise
+    dR_dq: Matrix  # (nv, nwide) nwide: nv, and zeros up to a multiple of LANES (solvers/lanes.py)
+    dR_dv: Matrix  # (nv, nwide)
+    columns: Matrix  # (nv, ncolumn) right-hand sides and solutions, 2 nv + nu and zeros
+    triangles: Matrix  # (nv, nwide) of the substitution with `columns`, see elimination_panel.py
+    triangle_across: Matrix  # (12, nwide) U, S3nu, a dof per column
+    panel: Matrix  # (6 nbody, npanel) twists of all columns where there are couplings, otherwise scratch of deep trees
     step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.jit import kernel
+from solvers.lanes import load, put, six, store
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -75,28 +76,73 @@ def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
 
 
 @kernel
-def lu_solve_rows(A: Vector, n: int, swaps: int, B: Matrix, first: int) -> None:
-    """B[first : first + n] := A^-1 B[first : first + n], all columns at once."""
-    m = B.shape[1]
+def lu_solve_lanes(A: Vector, n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
+    """B[first : first + n] := A^-1 B[first : first + n], of the LANES columns from c on."""
+    if n == 2:
+        second = swaps & 15  # 1 where the first pivot is in the second row
+        x = load(B, first + second, c)
+        y = A[3] * (load(B, first + 1 - second, c) - A[2] * x)
+        store(B, first + 1, c, y)
+        store(B, first, c, A[0] * (x - A[1] * y))
+    elif n == 3:
+        a = swaps & 15
+        b = (swaps >> 4) & 15  # 1 or 2, in the order that the first exchange leaves
+        x = load(B, first + a, c)
+        y = load(B, first + (0 if b == a else b), c)
+        z = load(B, first + (0 if 3 - b == a else 3 - b), c)
+        y = y - A[3] * x
+        z = A[8] * (z - A[6] * x - A[7] * y)
+        y = A[4] * (y - A[5] * z)
+        store(B, first + 2, c, z)
+        store(B, first + 1, c, y)
+        store(B, first, c, A[0] * (x - A[1] * y - A[2] * z))
+    else:
+        _exchange_rows(n, swaps, B, first, c)
+        if n == 6:
+            _solve_six(A, B, first, c)
+        else:
+            _solve_rows_of_lanes(A, n, B, first, c)
+
+
+@kernel
+def _exchange_rows(n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
+    """The row exchanges, on the LANES columns from c on."""
     for k in range(n):
         row = (swaps >> (4 * k)) & 15
         if row != k:
-            for c in range(m):
-                B[first + k, c], B[first + row, c] = B[first + row, c], B[first + k, c]
-    for k in range(n):
-        b = B[first + k]
-        for r in range(k + 1, n):
-            f = A[r * n + k]
-            x = B[first + r]
-            for c in range(m):
-                x[c] -= f * b[c]
+            x = load(B, first + k, c)
+            store(B, first + k, c, load(B, first + row, c))
+            store(B, first + row, c, x)
+
+
+@kernel
+def _solve_six(A: Vector, B: Matrix, first: int, c: int) -> None:
+    """`lu_solve_lanes` of six rows, a body that can move freely, after the exchanges."""
+    x0, x1, x2, x3, x4, x5 = six(B, first, c)
+    x1 = x1 - A[6] * x0
+    x2 = x2 - A[12] * x0 - A[13] * x1
+    x3 = x3 - A[18] * x0 - A[19] * x1 - A[20] * x2
+    x4 = x4 - A[24] * x0 - A[25] * x1 - A[26] * x2 - A[27] * x3
+    x5 = x5 - A[30] * x0 - A[31] * x1 - A[32] * x2 - A[33] * x3 - A[34] * x4
+    x5 = A[35] * x5
+    x4 = A[28] * (x4 - A[29] * x5)
+    x3 = A[21] * (x3 - A[23] * x5 - A[22] * x4)
+    x2 = A[14] * (x2 - A[17] * x5 - A[16] * x4 - A[15] * x3)
+    x1 = A[7] * (x1 - A[11] * x5 - A[10] * x4 - A[9] * x3 - A[8] * x2)
+    x0 = A[0] * (x0 - A[5] * x5 - A[4] * x4 - A[3] * x3 - A[2] * x2 - A[1] * x1)
+    put(B, first, c, (x0, x1, x2, x3, x4, x5))
+
+
+@kernel
+def _solve_rows_of_lanes(A: Vector, n: int, B: Matrix, first: int, c: int) -> None:
+    """`lu_solve_lanes` of any number of rows, after the exchanges."""
+    for k in range(1, n):
+        x = load(B, first + k, c)
+        for r in range(k):
+            x = x - A[k * n + r] * load(B, first + r, c)
+        store(B, first + k, c, x)
     for k in range(n - 1, -1, -1):
-        x = B[first + k]
+        x = load(B, first + k, c)
         for r in range(k + 1, n):
-            f = A[k * n + r]
-            b = B[first + r]
-            for c in range(m):
-                x[c] -= f * b[c]
-        f = A[k * n + k]
-        for c in range(m):
-            x[c] *= f
+            x = x - A[k * n + r] * load(B, first + r, c)
+        store(B, first + k, c, A[k * n + k] * x)

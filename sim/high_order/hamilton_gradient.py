@@ -179,7 +179,7 @@ def slopes_at(model: Model, work: Work, free: Integers, u: Vector, out: Slopes) 
 @kernel
 def velocity_slopes(model: Model, work: Work, free: Integers, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
     """work.columns = dv of every direction (dq, dp), p_v dv = dp - p_q dq.   dq: tangent; both (nv, n)."""
-    X, n = work.columns, work.columns.shape[1]
+    X, n = work.columns, dq.shape[1]
     for d in range(X.shape[0]):
         for k in range(n):
             X[d, k] = dp[d, k]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.elimination_panel import solve_panel
+from sim.elimination_panel import column_count, solve_panel
 from sim.late import add_height_gradient, solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
@@ -113,7 +113,7 @@ def _velocity_gradient(model: Model, work: Work, h: float, costate: Vector, w: V
 def _residual_gradient(model: Model, work: Work, w: Vector, y: Vector) -> None:
     """y = H^-T w: scalar products of w with the columns of H^-1, as many at once as fit."""
     nv = w.shape[0]
-    width = work.columns.shape[1]
+    width = column_count(model, work)
     first = 0
     while first < y.shape[0]:
         clear_columns(work)
@@ -142,7 +142,7 @@ def _add_parameters(model: Model, work: Work, at: At, line: Sweep, terms: Intege
     _residual_gradient(model, work, w, y)
     if line.heights.shape[1] > 0:
         add_height_gradient(model, work, at.h, y, line.places, line.heights)
-    width = work.columns.shape[1]
+    width = column_count(model, work)
     count = line.parameters.shape[0]
     first = 0
     start = 0

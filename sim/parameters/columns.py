@@ -6,6 +6,7 @@ weights   (n,) how much of the elementary change a unit of the parameter makes
 
 from __future__ import annotations
 
+from sim.elimination_panel import column_count
 from sim.late import add_surface_radius
 from sim.model import IntegerMatrix, Model, Vector
 from sim.moves import other_quaternions
@@ -121,7 +122,8 @@ def clear_columns(work: Work) -> None:
     for m in range(work.columns.shape[1]):
         for d in range(work.columns.shape[0]):
             work.columns[d, m] = 0.0
-        for row in range(work.couple_panel.shape[0]):
+    for row in range(work.couple_panel.shape[0]):
+        for m in range(work.couple_panel.shape[1]):
             work.couple_panel[row, m] = 0.0
 
 
@@ -132,7 +134,7 @@ def fill_columns(
     """columns = -dR/d(parameters from `first` on), as many as fit; returns the term after, `start` the term before."""
     clear_columns(work)
     other_quaternions(work)
-    end = first + work.columns.shape[1]
+    end = first + column_count(model, work)
     t = start
     while t < weights.shape[0] and terms[t, 3] < end:
         add_term(model, work, at, terms[t, 0], terms[t, 1], terms[t, 2], weights[t], terms[t, 3] - first)

@@ -11,7 +11,7 @@ By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv 
 
 from __future__ import annotations
 
-from sim.elimination_panel import solve_panel
+from sim.elimination_panel import column_count, solve_panel
 from sim.late import solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
@@ -66,7 +66,7 @@ def parameter_jacobian(
     model = model_view(model_at)
     work = work_view(work_at)
     nv = at.v.shape[0]
-    width = work.columns.shape[1]
+    width = column_count(model, work)
     first = 0
     start = 0
     while first < out.shape[1]:

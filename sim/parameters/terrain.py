@@ -14,7 +14,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim import late
-from sim.elimination_panel import solve_panel
+from sim.elimination_panel import column_count, solve_panel
 from sim.late import solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
@@ -89,7 +89,7 @@ def height_jacobian(model_at: Table, work_at: Table, at: At, places: Matrix, out
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    width = work.columns.shape[1]
+    width = column_count(model, work)
     first = 0
     while first < places.shape[1]:
         count = min(width, places.shape[1] - first)

@@ -1,0 +1,235 @@
+"""Lanes: eight neighbouring numbers of a row, in the vector registers of the processor.
+
+    x = load(A, i, j)        A[i, j : j + LANES]
+    store(A, i, j, a * x + load(A, k, j))
+
+Numba's loops over two rows or more check on every run whether the rows overlap, and end in single numbers; both cost as
+much as what a row of twenty to eighty numbers asks for. Lanes say what is meant. A row that they fill has LANES more
+numbers behind it than it needs, or a width that is a multiple of LANES (`whole`).
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numpy.typing import NDArray
+
+from solvers.jit import kernel
+
+__all__ = [
+    "LANES",
+    "Lanes",
+    "Six",
+    "dot_lanes",
+    "keep",
+    "load",
+    "minus_outer",
+    "plus",
+    "plus_outer",
+    "put",
+    "six",
+    "spread",
+    "store",
+    "whole",
+    "zeros",
+]
+
+LANES = 8
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Lanes = NDArray[np.float64]  # without compilation; (LANES,)
+Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]  # rows of a wrench, or of a twist
+
+_Vector = ir.VectorType(ir.DoubleType(), LANES)
+_Bits = ir.VectorType(ir.IntType(1), LANES)
+
+
+class LanesType(types.Type):
+    """Numba's type of lanes."""
+
+    def __init__(self) -> None:
+        super().__init__(name="lanes")
+
+
+_LANES = LanesType()
+
+
+@register_model(LanesType)
+class _Model(models.PrimitiveModel):
+    """In compiled code lanes are a vector."""
+
+    def __init__(self, manager: Any, kind: LanesType) -> None:
+        super().__init__(manager, kind, _Vector)
+
+
+def whole(count: int) -> int:
+    """The least multiple of LANES that is not below `count`."""
+    return -(-count // LANES) * LANES
+
+
+def _spread(builder: Any, number: Any) -> Any:
+    one = builder.insert_element(ir.Constant(_Vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(one, ir.Constant(_Vector, ir.Undefined), places)
+
+
+def _address(context: Any, builder: Any, kind: Any, matrix: Any, row: Any, column: Any) -> Any:
+    """Where the lanes of a matrix, C order, begin; without a look at the bounds."""
+    array = context.make_array(kind)(context, builder, matrix)
+    width = cgutils.unpack_tuple(builder, array.shape, 2)[1]
+    start = builder.gep(array.data, [builder.add(builder.mul(row, width), column)])
+    return builder.bitcast(start, _Vector.as_pointer())
+
+
+@intrinsic
+def _load(typing: Any, A: Any, i: Any, j: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_address(context, builder, sig.args[0], *args), align=8)
+
+    return _LANES(A, types.int64, types.int64), lower
+
+
+@intrinsic
+def _store(typing: Any, A: Any, i: Any, j: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[3], _address(context, builder, sig.args[0], *args[:3]), align=8)
+        return context.get_dummy_value()
+
+    return types.none(A, types.int64, types.int64, _LANES), lower
+
+
+@intrinsic
+def _keep(typing: Any, bits: Any, x: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        chosen = builder.bitcast(builder.trunc(args[0], ir.IntType(LANES)), _Bits)
+        return builder.select(chosen, args[1], ir.Constant(_Vector, None))
+
+    return _LANES(types.int64, _LANES), lower
+
+
+@intrinsic
+def _spread_number(typing: Any, number: Any) -> Any:
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _spread(builder, args[0])
+
+    return _LANES(types.float64), lower
+
+
+def load(A: Matrix, i: int, j: int) -> Lanes:
+    """A[i, j : j + LANES]; the matrix has to have that many columns left, or rows behind."""
+    found = A.reshape(-1)[i * A.shape[1] + j :][:LANES]
+    return np.pad(found, (0, LANES - len(found)))
+
+
+def store(A: Matrix, i: int, j: int, x: Lanes) -> None:
+    """A[i, j : j + LANES] = x, as `load`."""
+    A.reshape(-1)[i * A.shape[1] + j :][:LANES] = x
+
+
+def keep(bits: int, x: Lanes) -> Lanes:
+    """Lane k of x where bit k of `bits` is set, 0 elsewhere."""
+    return np.where([bits >> k & 1 for k in range(LANES)], x, 0.0)
+
+
+def spread(number: float) -> Lanes:
+    """The number in every lane."""
+    return np.full(LANES, number)
+
+
+@overload(load, strict=False)
+def _compiled_load(A: Any, i: Any, j: Any) -> Any:
+    return lambda A, i, j: _load(A, i, j)
+
+
+@overload(store, strict=False)
+def _compiled_store(A: Any, i: Any, j: Any, x: Any) -> Any:
+    return lambda A, i, j, x: _store(A, i, j, x)
+
+
+@overload(keep, strict=False)
+def _compiled_keep(bits: Any, x: Any) -> Any:
+    return lambda bits, x: _keep(bits, x)
+
+
+@overload(spread, strict=False)
+def _compiled_spread(number: Any) -> Any:
+    return lambda number: _spread_number(number)
+
+
+def _operator(function: Any, instruction: str) -> None:
+    """What an operator makes of lanes, and of a number and lanes."""
+    cases_ = [signature(_LANES, _LANES, _LANES), signature(_LANES, types.float64, _LANES)]
+
+    class Cases(ConcreteTemplate):
+        key = function
+        cases = cases_
+
+    infer_global(function)(Cases)
+
+    @lower_builtin(function, LanesType, LanesType)
+    def both(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(*args)
+
+    @lower_builtin(function, types.Float, LanesType)
+    def number_first(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return getattr(builder, instruction)(_spread(builder, args[0]), args[1])
+
+
+for _function, _instruction in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+    _operator(_function, _instruction)
+
+
+@kernel
+def six(P: Matrix, r: int, c: int) -> Six:
+    """P[r : r + 6] of the columns from c on."""
+    return load(P, r, c), load(P, r + 1, c), load(P, r + 2, c), load(P, r + 3, c), load(P, r + 4, c), load(P, r + 5, c)
+
+
+@kernel
+def put(P: Matrix, r: int, c: int, w: Six) -> None:
+    """P[r : r + 6] = w, of the columns from c on."""
+    store(P, r, c, w[0])
+    store(P, r + 1, c, w[1])
+    store(P, r + 2, c, w[2])
+    store(P, r + 3, c, w[3])
+    store(P, r + 4, c, w[4])
+    store(P, r + 5, c, w[5])
+
+
+@kernel
+def zeros() -> Six:
+    """Six rows of zeros."""
+    o = spread(0.0)
+    return o, o, o, o, o, o
+
+
+@kernel
+def plus(v: Six, w: Six) -> Six:
+    """v + w"""
+    return v[0] + w[0], v[1] + w[1], v[2] + w[2], v[3] + w[3], v[4] + w[4], v[5] + w[5]
+
+
+@kernel
+def plus_outer(w: Six, s: Vector, x: Lanes) -> Six:
+    """w + s x"""
+    return w[0] + s[0] * x, w[1] + s[1] * x, w[2] + s[2] * x, w[3] + s[3] * x, w[4] + s[4] * x, w[5] + s[5] * x
+
+
+@kernel
+def minus_outer(w: Six, s: Vector, x: Lanes) -> Six:
+    """w - s x"""
+    return w[0] - s[0] * x, w[1] - s[1] * x, w[2] - s[2] * x, w[3] - s[3] * x, w[4] - s[4] * x, w[5] - s[5] * x
+
+
+@kernel
+def dot_lanes(S: Matrix, d: int, first: int, w: Six) -> Lanes:
+    """S[d, first : first + 6] . w"""
+    s = S[d, first : first + 6]
+    return (s[0] * w[0] + s[1] * w[1]) + (s[2] * w[2] + s[3] * w[3]) + (s[4] * w[4] + s[5] * w[5])
