@@ -63,8 +63,9 @@ def relax_friction(columns: Matrix, j: int, bound: float, still: float, size: in
 @kernel
 def gauss_seidel(
     columns: Matrix, friction: Vector, h: float, kappa: float, points: int, size: int, w: Vector, l: Vector
-) -> None:
-    """Improve l, and w with it, until a sweep moves w by less than a hundredth of what the first one did.
+) -> bool:
+    """Improve l, and w with it, until a sweep moves w by less than a hundredth of what the first one did; whether it
+    has come to that.
 
     columns: (n, n) G transposed, of which size x size are used;  friction: (n,), of contact i in 3 i;
     h: the time in which a slip becomes a gap, for w_n are lengths and w_t speeds;  points: contacts;  w: (n,) of l.
@@ -81,4 +82,5 @@ def gauss_seidel(
         if sweep == 0:
             enough = _SMALL * moved
         if moved <= enough:
-            return
+            return True
+    return False

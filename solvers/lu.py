@@ -6,14 +6,17 @@ derivative of the step. Triangular solves keep the residual small, which is what
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.jit import kernel
-from solvers.lanes import load, put, six, store
+from solvers.lanes import Lanes, load, put, six, store
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Number = TypeVar("Number", float, Lanes)
 
 
 @kernel
@@ -58,8 +61,47 @@ def lu_sign(A: Vector, n: int, swaps: int) -> int:
 
 
 @kernel
+def pivots_of_two(swaps: int) -> tuple[int, int]:
+    """Rows of the first and the second pivot."""
+    first = swaps & 15
+    return first, 1 - first
+
+
+@kernel
+def pivots_of_three(swaps: int) -> tuple[int, int, int]:
+    """Rows of the first, the second and the third pivot."""
+    a = swaps & 15
+    b = (swaps >> 4) & 15  # 1 or 2, in the order that the first exchange leaves
+    return a, 0 if b == a else b, 0 if 3 - b == a else 3 - b
+
+
+@kernel
+def solve_two(A: Vector, x: Number, y: Number) -> tuple[Number, Number]:
+    """A^-1 (x, y), of 2 x 2 factors, in the order of the pivots."""
+    y = A[3] * (y - A[2] * x)
+    return A[0] * (x - A[1] * y), y
+
+
+@kernel
+def solve_three(A: Vector, x: Number, y: Number, z: Number) -> tuple[Number, Number, Number]:
+    """A^-1 (x, y, z), of 3 x 3 factors, in the order of the pivots."""
+    y = y - A[3] * x
+    z = A[8] * (z - A[6] * x - A[7] * y)
+    y = A[4] * (y - A[5] * z)
+    return A[0] * (x - A[1] * y - A[2] * z), y, z
+
+
+@kernel
 def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
     """b[first : first + n] := A^-1 b[first : first + n]."""
+    if n == 2:
+        i, j = pivots_of_two(swaps)
+        b[first], b[first + 1] = solve_two(A, b[first + i], b[first + j])
+        return
+    if n == 3:
+        i, j, k = pivots_of_three(swaps)
+        b[first], b[first + 1], b[first + 2] = solve_three(A, b[first + i], b[first + j], b[first + k])
+        return
     for k in range(n):
         row = (swaps >> (4 * k)) & 15
         if row != k:
@@ -79,23 +121,16 @@ def lu_solve(A: Vector, n: int, swaps: int, b: Vector, first: int) -> None:
 def lu_solve_lanes(A: Vector, n: int, swaps: int, B: Matrix, first: int, c: int) -> None:
     """B[first : first + n] := A^-1 B[first : first + n], of the LANES columns from c on."""
     if n == 2:
-        second = swaps & 15  # 1 where the first pivot is in the second row
-        x = load(B, first + second, c)
-        y = A[3] * (load(B, first + 1 - second, c) - A[2] * x)
+        i, j = pivots_of_two(swaps)
+        x, y = solve_two(A, load(B, first + i, c), load(B, first + j, c))
+        store(B, first, c, x)
         store(B, first + 1, c, y)
-        store(B, first, c, A[0] * (x - A[1] * y))
     elif n == 3:
-        a = swaps & 15
-        b = (swaps >> 4) & 15  # 1 or 2, in the order that the first exchange leaves
-        x = load(B, first + a, c)
-        y = load(B, first + (0 if b == a else b), c)
-        z = load(B, first + (0 if 3 - b == a else 3 - b), c)
-        y = y - A[3] * x
-        z = A[8] * (z - A[6] * x - A[7] * y)
-        y = A[4] * (y - A[5] * z)
-        store(B, first + 2, c, z)
+        i, j, k = pivots_of_three(swaps)
+        x, y, z = solve_three(A, load(B, first + i, c), load(B, first + j, c), load(B, first + k, c))
+        store(B, first, c, x)
         store(B, first + 1, c, y)
-        store(B, first, c, A[0] * (x - A[1] * y - A[2] * z))
+        store(B, first + 2, c, z)
     else:
         _exchange_rows(n, swaps, B, first, c)
         if n == 6:

@@ -109,15 +109,16 @@ def rates(model: Model, work: Work, h: float, points: int, size: int) -> None:
 
 
 @kernel
-def impulses(model: Model, work: Work, h: float, kappa: float, points: int, size: int) -> None:
-    """Impulses of the contacts and limits chosen, into cone and bound."""
+def impulses(model: Model, work: Work, h: float, kappa: float, points: int, size: int) -> bool:
+    """Impulses of the contacts and limits chosen, into cone and bound; whether they have settled."""
     l = work.reach_impulse
-    gauss_seidel(work.delassus, work.reach_friction, h, kappa, points, size, work.reach_rate, l)
+    settled = gauss_seidel(work.delassus, work.reach_friction, h, kappa, points, size, work.reach_rate, l)
     for j in range(0, 3 * points, 3):
         z = work.cone[work.reach_of[j]]
         z[1], z[2], z[3] = l[j], l[j + 1], l[j + 2]
     for j in range(3 * points, size):
         work.bound[work.reach_of[j], 1] = l[j]
+    return settled
 
 
 @kernel
@@ -147,6 +148,7 @@ def predict(
     if factor(model, work) == 0:
         return balance
     points, size = 0, 0
+    settled = True
     last = 1e300
     for k in range(_STEPS):
         descend(model, work)
@@ -161,7 +163,7 @@ def predict(
             rates(model, work, h, points, size)
             if k == 0:
                 delassus(model, work, h, points, size)
-            impulses(model, work, h, kappa, points, size)
+            settled = impulses(model, work, h, kappa, points, size)
             residuals(model, work, h, q, v, u)
             descend(model, work)
         for d in range(v.shape[0]):
@@ -171,7 +173,7 @@ def predict(
         touch_inequalities(model, work, h, kappa)
         balance = residuals(model, work, h, q, v, u)
         error = max(balance[0] / scale, balance[1])
-        if not (_CLOSE < error < _SLOW * last):
+        if not (settled and _CLOSE < error < _SLOW * last):
             break
         last = error
     return balance
