@@ -6,7 +6,7 @@
 
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
 to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
-alone carries it.
+alone carries it. Taut strings pull along where they lay at configuration 2: string.py.
 
 Derivatives: jacobian.py.
 """
@@ -23,6 +23,7 @@ from sim.options import AT_EVERY_POSE
 from sim.pairs.choice import choose_shapes
 from sim.pairs.cylinders import on_cylinder
 from sim.pairs.pose import place_shapes
+from sim.pairs.string import end_before, is_taut, pull_from_before
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
@@ -123,6 +124,8 @@ def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
     kin[3] = F[9] - work.pos3[a, 0]
     kin[4] = F[10] - work.pos3[a, 1]
     kin[5] = F[11] - work.pos3[a, 2]
+    if is_taut(model, work, j):
+        pull_from_before(model, work, j)
 
 
 @kernel
@@ -149,6 +152,9 @@ def shares(model: Model, j: int) -> tuple[float, float]:
 @kernel
 def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O."""
+    if is_taut(model, work, j):
+        e = end_before(model, work, j, 0)
+        return e[0] - work.origin[0], e[1] - work.origin[1], e[2] - work.origin[2]
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)

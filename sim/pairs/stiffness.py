@@ -14,6 +14,7 @@ from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.pairs.far import add_far_pairs
 from sim.pairs.jacobian import pair_jacobian
+from sim.pairs.string import end_before, is_taut, string_turn
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
@@ -66,6 +67,9 @@ def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
 @kernel
 def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
     """coupling_K += pair j, condensed; share: of the turning of its impulse."""
+    if is_taut(model, work, j):
+        add_string_stiffness(model, work, j)
+        return
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
@@ -100,6 +104,20 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
         add_wrench_column(Kb, k, f, df, P, dP)
+
+
+@kernel
+def add_string_stiffness(model: Model, work: Work, j: int) -> None:
+    """coupling_K += taut string j, condensed: its direction and its point are those of configuration 2."""
+    c = model.contact_height.shape[0] + j
+    zero = (0.0, 0.0, 0.0)
+    P = pair_arm(model, work, j)
+    for side in range(2):
+        K = work.coupling_K[2 * model.pair_coupling[j] + side]
+        C = work.pair_Ca[j] if side == 0 else work.pair_Cb[j]
+        for k in range(6):
+            df = pair_force(work, j, work.contact_W[c, 0] * C[k], 0.0, 0.0)
+            add_wrench_column(K, k, zero, df, P, zero)
 
 
 @late.condense_pairs.defined()
@@ -152,6 +170,9 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
 
     slip    -t/h on dx2,  (-c y + s x y)/h on dphi2,  y = r x t        P follows the centres of mass at 2
     """
+    if is_taut(model, work, j):
+        add_string_turn(model, work, j, K2)
+        return
     c = model.contact_height.shape[0] + j
     weight = shares(model, j)
     n, t1, t2 = contact_impulse(model, work, c)
@@ -174,6 +195,23 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
             df = pair_force(work, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
             q = weight[0] if side == 0 else weight[1]
             add_wrench_column(K2[side], k, f, df, P, (q * x[0], q * x[1], q * x[2]))
+
+
+@kernel
+def add_string_turn(model: Model, work: Work, j: int, K2: Matrix) -> None:
+    """K2 (2, 36) += dF by the twists of a and b at configuration 2, of taut string j: df = gamma dn2, dP = de_a."""
+    fn, _, _ = contact_impulse(model, work, model.contact_height.shape[0] + j)
+    f = pair_force(work, j, fn, 0.0, 0.0)
+    P = pair_arm(model, work, j)
+    o = work.origin
+    for side in range(2):
+        e = end_before(model, work, j, side)
+        g = -fn if side == 0 else fn
+        for k in range(6):
+            u = point_shift(k, e[0] - o[0], e[1] - o[1], e[2] - o[2])
+            n = string_turn(model, work, j, u)
+            dP = u if side == 0 else (0.0, 0.0, 0.0)
+            add_wrench_column(K2[side], k, f, (g * n[0], g * n[1], g * n[2]), P, dP)
 
 
 @kernel

@@ -7,6 +7,7 @@ from sim.contacts.friction import contact_impulse
 from sim.model import Model, Vector
 from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import unit_vector
+from sim.pairs.string import is_taut, string_turn
 from sim.parameters.contacts import add_pair, floor_change, impulse_change, is_near, turning
 from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
@@ -60,6 +61,22 @@ def add_moved_shape(
 
 
 @kernel
+def add_moved_end(
+    model: Model, work: Work, j: int, side: int, e2: Vec3, e3: Vec3, floor: float, w: float, col: int
+) -> None:
+    """The end of taut string j on a (side 0) or b moves by e2 at configuration 2, by e3 at 3: dn2, de_a, gap n3.e3."""
+    c = model.contact_height.shape[0] + j
+    F = work.pair_frame[j]
+    sign = 1.0 if side == 0 else -1.0
+    fn, _, _ = contact_impulse(model, work, c)
+    p, _, _ = impulse_change(work, c, sign * dot(row(F, 3), e3) - floor, 0.0, 0.0)
+    n = string_turn(model, work, j, e2)
+    g = -sign * fn
+    df = (p * F[0] + g * n[0], p * F[1] + g * n[1], p * F[2] + g * n[2])
+    add_pair(model, work, j, df, e2 if side == 0 else (0.0, 0.0, 0.0), w, col)
+
+
+@kernel
 def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
     """Velocity over the interval of the point p of a relative to that of b."""
     x3, x2 = work.pos3[a], work.pos2[a]
@@ -93,6 +110,8 @@ def add_pairs_mass(model: Model, work: Work, i: int, w: float, col: int) -> None
         b = model.coupling_body[model.pair_coupling[j], 1]
         if b < 0 or (i != a and i != b) or not is_felt(model, work, j):
             continue
+        if is_taut(model, work, j):
+            continue
         m = model.body_mass[a] + model.body_mass[b]
         r = (model.body_mass[b] if i == a else -model.body_mass[a]) / (m * m)
         x3, x2, y3, y2 = work.pos3[a], work.pos2[a], work.pos3[b], work.pos2[b]
@@ -114,5 +133,8 @@ def add_shapes_shift(model: Model, work: Work, h: float, first: int, k: int, w: 
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         if is_felt(model, work, j):
             floor = pair_floor(work, model.contact_height.shape[0] + j, side, e1, e2)
-            add_moved_shape(model, work, h, j, side, e3, floor, w, col)
+            if is_taut(model, work, j):
+                add_moved_end(model, work, j, side, e2, e3, floor, w, col)
+            else:
+                add_moved_shape(model, work, h, j, side, e3, floor, w, col)
         j += 1

@@ -1,0 +1,87 @@
+"""Taut strings: one that is taut where a step begins pulls along where it lies there, at configuration 2.
+
+    f = n2 gamma,   n2 = (e_b - e_a)/|e_b - e_a|,   P = e_a,   e_a, e_b its ends at 2;   the gap is that at 3
+
+So do the forces of joints (sim/coupling/loops.py): a motion that stays taut is that of a rod between two ball joints,
+and keeps its energy to second order in the time step. A string that is slack there pulls along where it lies at the end
+of the step, as contacts do, which always has a solution, and loses the energy of the jerk.
+
+Rows of the pair's frame: n2, and in place of a tangent, which strings have no use for, the normal n3 of the gap.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.collision.kinds import SWAPPED, Pair
+from sim.model import Model
+from sim.rotation import Vec3, rotate
+from sim.work import Work
+from solvers.jit import kernel
+
+_STRING = int(Pair.STRING)
+_TAUT = 1e-3  # of the length: less slack than this
+
+
+@kernel
+def is_string(model: Model, j: int) -> bool:
+    """Whether pair j is a string."""
+    return model.pair_kind[j] % SWAPPED == _STRING
+
+
+@kernel
+def end_before(model: Model, work: Work, j: int, side: int) -> Vec3:
+    """The end of string j on body a (side 0) or b at configuration 2, world axes."""
+    i = model.coupling_body[model.pair_coupling[j], side]
+    c = model.pair_place[2 * j + side]
+    if i < 0:
+        return c[0], c[1], c[2]
+    x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
+    o = work.pos2[i]
+    return o[0] + x, o[1] + y, o[2] + z
+
+
+@kernel
+def string_before(model: Model, work: Work, j: int) -> tuple[float, Vec3]:
+    """Distance of the ends of string j at configuration 2, and the direction from a to b there."""
+    a, b = end_before(model, work, j, 0), end_before(model, work, j, 1)
+    x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    d = sqrt(x * x + y * y + z * z)
+    if d == 0.0:
+        return 0.0, (0.0, 0.0, 0.0)
+    return d, (x / d, y / d, z / d)
+
+
+@kernel
+def is_taut(model: Model, work: Work, j: int) -> bool:
+    """Whether pair j is a string that is taut at configuration 2."""
+    if not is_string(model, j):
+        return False
+    d, _ = string_before(model, work, j)
+    length = model.pair_sizes[j, 0]
+    return length - d < _TAUT * length
+
+
+@kernel
+def pull_from_before(model: Model, work: Work, j: int) -> None:
+    """The rows of the frame of a taut string, from that of its gap."""
+    F = work.pair_frame[j]
+    _, n = string_before(model, work, j)
+    for k in range(3):
+        F[3 + k] = F[k]
+        F[k] = n[k]
+
+
+@kernel
+def gap_normal(model: Model, work: Work, j: int) -> Vec3:
+    """Normal of the gap of pair j, a string or not: its derivative by a displacement of a."""
+    F = work.pair_frame[j]
+    return (F[3], F[4], F[5]) if is_taut(model, work, j) else (F[0], F[1], F[2])
+
+
+@kernel
+def string_turn(model: Model, work: Work, j: int, u: Vec3) -> Vec3:
+    """dn2 where the end on b moves by u at configuration 2, that on a by none: (u - n2 (n2.u))/|e_b - e_a|."""
+    d, n = string_before(model, work, j)
+    s = n[0] * u[0] + n[1] * u[1] + n[2] * u[2]
+    return (u[0] - s * n[0]) / d, (u[1] - s * n[1]) / d, (u[2] - s * n[2]) / d
