@@ -40,8 +40,7 @@ from sim.contacts.friction import contact_impulse
 from sim.late import pair_kinematics
 from sim.model import Model
 from sim.options import AT_EVERY_POSE, AT_START
-from sim.pairs.contact import is_absent, pair_arm, pair_force
-from sim.pairs.string import gap_normal
+from sim.pairs.contact import gap_normal, is_absent, pair_arm, pair_force
 from sim.rotation import Vec3, cross, transposed_times
 from sim.work import Work
 from solvers.jit import kernel

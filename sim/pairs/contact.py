@@ -17,13 +17,12 @@ from math import cos, sin
 
 from sim import late
 from sim.collision.collide import collide_chosen
-from sim.late import collide_cylinders
+from sim.late import collide_cylinders, is_taut, pull_from_before, string_arm
 from sim.model import Matrix, Model
 from sim.options import AT_EVERY_POSE
 from sim.pairs.choice import choose_shapes
 from sim.pairs.cylinders import on_cylinder
 from sim.pairs.pose import place_shapes
-from sim.pairs.string import end_before, is_taut, pull_from_before
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
@@ -153,8 +152,7 @@ def shares(model: Model, j: int) -> tuple[float, float]:
 def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O."""
     if is_taut(model, work, j):
-        e = end_before(model, work, j, 0)
-        return e[0] - work.origin[0], e[1] - work.origin[1], e[2] - work.origin[2]
+        return string_arm(model, work, j)
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)
@@ -167,6 +165,13 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
         y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])
         z -= wb * (work.pos3[b, 2] - work.pos2[b, 2])
     return x, y, z
+
+
+@kernel
+def gap_normal(model: Model, work: Work, j: int) -> Vec3:
+    """Derivative of the gap of pair j by a displacement of a; where a string pulls along is another direction."""
+    F = work.pair_frame[j]
+    return (F[3], F[4], F[5]) if is_taut(model, work, j) else (F[0], F[1], F[2])
 
 
 @kernel

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from sim import late
 from sim.model import Model, Vector
-from sim.pairs.contact import POLE, point_velocity, shape_b
-from sim.pairs.string import gap_normal
+from sim.pairs.contact import POLE, gap_normal, point_velocity, shape_b
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from sim import late
 from sim.contacts.friction import condense_contact, contact_constant, contact_error, contact_impulse
+from sim.late import add_string_stiffness, add_string_turn, is_taut
 from sim.model import Matrix, Model, Vector
 from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.pairs.far import add_far_pairs
 from sim.pairs.jacobian import pair_jacobian
-from sim.pairs.string import end_before, is_taut, string_turn
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
@@ -106,20 +106,6 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         add_wrench_column(Kb, k, f, df, P, dP)
 
 
-@kernel
-def add_string_stiffness(model: Model, work: Work, j: int) -> None:
-    """coupling_K += taut string j, condensed: its direction and its point are those of configuration 2."""
-    c = model.contact_height.shape[0] + j
-    zero = (0.0, 0.0, 0.0)
-    P = pair_arm(model, work, j)
-    for side in range(2):
-        K = work.coupling_K[2 * model.pair_coupling[j] + side]
-        C = work.pair_Ca[j] if side == 0 else work.pair_Cb[j]
-        for k in range(6):
-            df = pair_force(work, j, work.contact_W[c, 0] * C[k], 0.0, 0.0)
-            add_wrench_column(K, k, zero, df, P, zero)
-
-
 @late.condense_pairs.defined()
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, near: bool) -> None:
     """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  share, near: see `condense_into`."""
@@ -195,23 +181,6 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
             df = pair_force(work, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
             q = weight[0] if side == 0 else weight[1]
             add_wrench_column(K2[side], k, f, df, P, (q * x[0], q * x[1], q * x[2]))
-
-
-@kernel
-def add_string_turn(model: Model, work: Work, j: int, K2: Matrix) -> None:
-    """K2 (2, 36) += dF by the twists of a and b at configuration 2, of taut string j: df = gamma dn2, dP = de_a."""
-    fn, _, _ = contact_impulse(model, work, model.contact_height.shape[0] + j)
-    f = pair_force(work, j, fn, 0.0, 0.0)
-    P = pair_arm(model, work, j)
-    o = work.origin
-    for side in range(2):
-        e = end_before(model, work, j, side)
-        g = -fn if side == 0 else fn
-        for k in range(6):
-            u = point_shift(k, e[0] - o[0], e[1] - o[1], e[2] - o[2])
-            n = string_turn(model, work, j, u)
-            dP = u if side == 0 else (0.0, 0.0, 0.0)
-            add_wrench_column(K2[side], k, f, (g * n[0], g * n[1], g * n[2]), P, dP)
 
 
 @kernel

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sim.collision.witness import dot
 from sim.contacts.friction import contact_impulse
+from sim.late import add_moved_end, is_taut
 from sim.model import Model, Vector
 from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import unit_vector
-from sim.pairs.string import is_taut, string_turn
 from sim.parameters.contacts import add_pair, floor_change, impulse_change, is_near, turning
 from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
@@ -58,22 +58,6 @@ def add_moved_shape(
     f = pair_force(work, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
     add_pair(model, work, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
-
-
-@kernel
-def add_moved_end(
-    model: Model, work: Work, j: int, side: int, e2: Vec3, e3: Vec3, floor: float, w: float, col: int
-) -> None:
-    """The end of taut string j on a (side 0) or b moves by e2 at configuration 2, by e3 at 3: dn2, de_a, gap n3.e3."""
-    c = model.contact_height.shape[0] + j
-    F = work.pair_frame[j]
-    sign = 1.0 if side == 0 else -1.0
-    fn, _, _ = contact_impulse(model, work, c)
-    p, _, _ = impulse_change(work, c, sign * dot(row(F, 3), e3) - floor, 0.0, 0.0)
-    n = string_turn(model, work, j, e2)
-    g = -sign * fn
-    df = (p * F[0] + g * n[0], p * F[1] + g * n[1], p * F[2] + g * n[2])
-    add_pair(model, work, j, df, e2 if side == 0 else (0.0, 0.0, 0.0), w, col)
 
 
 @kernel
