@@ -4,7 +4,8 @@
 
 So do the forces of joints (sim/coupling/loops.py): a motion that stays taut is that of a rod between two ball joints,
 and keeps its energy to second order in the time step. A string that is slack there pulls along where it lies at the end
-of the step, as contacts do, which always has a solution, and loses the energy of the jerk.
+of the step, as contacts do, which always has a solution, and loses the energy of the jerk. So does one that turns, or
+whose bodies turn, by more than 0.2 rad in the step before: steps of the other kind have no solution then, or gain.
 
 Rows of the pair's frame: n2, and in place of a tangent, which strings have no use for, the normal n3 of the gap.
 """
@@ -19,12 +20,13 @@ from sim.contacts.friction import contact_impulse
 from sim.model import Matrix, Model
 from sim.pairs.contact import pair_force
 from sim.pairs.stiffness import add_wrench_column, point_shift
-from sim.rotation import Vec3, rotate
+from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
 from solvers.jit import kernel
 
 _STRING = int(Pair.STRING)
 _TAUT = 1e-3  # of the length: less slack than this
+_TURN = 0.2  # [rad] of the string and of its bodies in the step before: more is too fast to follow
 
 
 @kernel
@@ -52,12 +54,26 @@ def string_before(model: Model, work: Work, j: int) -> tuple[float, Vec3]:
 
 @late.is_taut.defined(otherwise=False)
 def is_taut(model: Model, work: Work, j: int) -> bool:
-    """Whether pair j is a string that is taut at configuration 2."""
+    """Whether pair j is a string that is taut at configuration 2, and turns slowly enough to pull as joints do."""
     if model.pair_kind[j] % SWAPPED != _STRING:
         return False
     d, _ = string_before(model, work, j)
     length = model.pair_sizes[j, 0]
-    return length - d < _TAUT * length
+    if not length - d < _TAUT * length:
+        return False
+    x, y, z = 0.0, 0.0, 0.0
+    for side in range(2):
+        i = model.coupling_body[model.pair_coupling[j], side]
+        if i < 0:
+            continue
+        turn, o, m = work.turn_in[i], work.pos2[i], work.move_in[i]
+        if turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3] > 0.25 * _TURN * _TURN:
+            return False
+        e = end_before(model, work, j, side)
+        u, v, w = cross(2.0 * turn[1], 2.0 * turn[2], 2.0 * turn[3], e[0] - o[0], e[1] - o[1], e[2] - o[2])
+        sign = 1.0 if side == 0 else -1.0
+        x, y, z = x + sign * (m[0] + u), y + sign * (m[1] + v), z + sign * (m[2] + w)
+    return x * x + y * y + z * z < _TURN * _TURN * d * d
 
 
 @late.pull_from_before.defined()
