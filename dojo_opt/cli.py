@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import ast
 import json
+import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -170,21 +171,23 @@ def _report(args: argparse.Namespace) -> int:
         mechanism = dojo.load_urdf(args.robot, floating=not args.fixed, contacts=_contacts(args.contacts))
     names = list(STUDIES) if args.name == "all" else [args.name]
     reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True)
+    for name, report in reports.items():
+        report.command = _report_command(args, name)
     if args.json:
         print(json.dumps({name: json.loads(report.as_json()) for name, report in reports.items()}, indent=1))
     else:
         print("\n\n".join(report.as_text() for report in reports.values()))
     if args.out:
-        arguments = [
-            args.name,
-            *([str(args.robot)] if args.robot else []),
-            *(["--fixed"] if args.fixed else []),
-            *(["--contacts", *args.contacts] if args.contacts else []),
-            *(["--quick"] if args.quick else []),
-        ]
-        write_page(reports, args.out, "dojo-opt report " + " ".join(arguments))
+        write_page(reports, args.out, _report_command(args, args.name))
     missed = args.strict and not all(report.met() for report in reports.values())
     return 1 if missed or any("error" in report.details for report in reports.values()) else 0
+
+
+def _report_command(args: argparse.Namespace, name: str) -> str:
+    """The command that measures a study again, with all that decides what is measured."""
+    robot, fixed = [str(args.robot)] if args.robot else [], ["--fixed"] * args.fixed
+    contacts = ["--contacts", *args.contacts] if args.contacts else []
+    return shlex.join(["dojo-opt", "report", name, *robot, *fixed, *contacts, *["--quick"] * args.quick])
 
 
 def _models(args: argparse.Namespace) -> int:

@@ -142,7 +142,7 @@ class Continuation:
                 self._fresh = True
             promise = self._descent.gains(self.now)
             if promise.status != Status.SOLVED:
-                return Status.MAX_REGULARIZATION
+                return self._descent.fault(promise, self.now)
             small = stage.decrease * (abs(self.now.merit) + _SMALL)
             promised = -(promise.d0 + 0.5 * promise.d1)
             if self.now.gaps is None and self._descent.mu <= _LIGHT and promised <= small:

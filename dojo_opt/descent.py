@@ -14,8 +14,8 @@ from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
 from sim.horizon import Horizon
-from solvers.riccati import Promise, Quadratic, Regularization, backward, work_size
-from solvers.status import Status
+from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
+from solvers.status import MESSAGES, Status
 
 Matrix = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ class Descent:
         self.K = np.zeros((T, sim.nu, sim.ndx))
         self.k = np.zeros((T, sim.nu))
         self.mu = 0.0
+        self.detail = ""  # what failed, and where: more than a status says
         self._growth = 1.0
         self._problem = problem
         self._horizon = horizon
@@ -53,6 +54,7 @@ class Descent:
     def reset(self) -> None:
         """Forget regularisation and gains of an earlier solve."""
         self.reset_regularization()
+        self.detail = ""
         self.K.fill(0.0)
         self.k.fill(0.0)
 
@@ -77,7 +79,7 @@ class Descent:
 
         kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
         """
-        status = Status.SOLVED
+        status, self.detail = Status.SOLVED, ""
         for level in (kappa, 10.0 * kappa, kappa_eval):
             apart = level != kappa_eval
             linear = self._horizon.linearize(now.x, now.u, level, self._guess(now, level) if apart else None)
@@ -86,8 +88,10 @@ class Descent:
                 if apart:
                     self._apart = level, linear.x_next - now.x[1:]
                 self.use(linear, now)
+                self.detail = ""
                 return Status.SOLVED
             status = Status(int(linear.status[failed[0]]))
+            self.detail = f" Derivatives at knot {failed[0]}, {status.name}: {MESSAGES[status]}"
         return status
 
     def _guess(self, now: Iterate, kappa: float) -> Any:
@@ -107,6 +111,24 @@ class Descent:
             if promise.status == Status.SOLVED or self.mu >= self._options.regularization_max:
                 return promise
             self.raise_regularization()
+
+    def fault(self, promise: Promise, now: Iterate) -> Status:
+        """Why the backward pass at `now` failed with that promise; `detail` says where."""
+        model, knot = self._model(now), promise.knot
+        if promise.status == Status.MAX_ITERATIONS:
+            self.detail = f" That of the quadratic program of the control limits, at knot {knot}."
+            return promise.status
+        for name, parts in (("dynamics", (model.A, model.B, model.gaps[1:])), ("costs", (model.g, model.H))):
+            knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
+            if knots:
+                self.detail = f" In the derivatives of the {name}, at knot {min(knots)}."
+                return Status.NOT_FINITE
+        value = value_hessian(self._buffer, self._problem.sim.ndx)
+        if promise.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):
+            self.detail = f" The cost to go grows beyond all numbers, at knot {knot}."
+            return Status.NOT_FINITE
+        self.detail = f" At knot {knot}."
+        return Status.MAX_REGULARIZATION
 
     def final_gains(self, now: Iterate) -> Promise:
         """K and k for use around `now`: with no regularisation, or the least that every Q_uu needs.

@@ -107,6 +107,7 @@ class Solver:
         status, detail = self._guess(controls, states)
         if status == Status.SOLVED:
             status = self._run()
+            detail = "" if status == Status.SOLVED else self.descent.detail
         return self._plan(status, detail)
 
     def _guess(self, controls: ArrayLike | None, states: ArrayLike | None) -> tuple[Status, str]:

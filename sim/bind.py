@@ -50,6 +50,7 @@ _CYLINDERS = (
     late.choose_cylinders,
     late.cylinder_before,
 )
+_STRINGS = (late.is_taut, late.pull_from_before, late.string_arm, late.add_string_stiffness)
 _PYRAMIDS = (
     late.start_pyramid,
     late.pyramid_error,
@@ -87,6 +88,10 @@ def _bind(model: Model, kernels: tuple[LateKernel, ...]) -> None:
 def _has_ball_springs(model: Model) -> bool:
     first = model.body_vadr[:-1] + model.joint_ntrans
     return bool(np.any(model.dof_spring[first[model.joint_nrot == 3]] > 0.0))
+
+
+def _has_strings(model: Model) -> bool:
+    return bool(np.any(model.pair_kind % SWAPPED == int(Pair.STRING)))
 
 
 def bind_poses(model: Model) -> None:
@@ -135,6 +140,8 @@ def bind_step(model: Model) -> None:
         _bind(model, _PAIRS)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         _bind(model, _CYLINDERS)
+    if _has_strings(model):
+        _bind(model, _STRINGS)
     if np.any(model.contact_terrain):
         _bind(model, _TERRAIN)
     if np.any(model.contact_restitution):
@@ -160,6 +167,8 @@ def bind_gradient(model: Model) -> None:
         _bind(model, _COUPLING_GRADIENT)
     if len(model.pair_kind):
         _bind(model, (late.all_near,))
+    if _has_strings(model):
+        _bind(model, (late.add_string_turn,))
     if np.any(model.contact_restitution):
         _bind(model, (late.add_bounce_composites,))
         if len(model.pair_kind):
@@ -170,6 +179,8 @@ def bind_parameters(model: Model) -> None:
     """What derivatives by parameters need beyond that."""
     if np.any(model.contact_terrain):
         _bind(model, (late.add_surface_radius,))
+    if _has_strings(model):
+        _bind(model, (late.add_moved_end,))
 
 
 def bind_heights(model: Model) -> None:

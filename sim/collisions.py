@@ -26,7 +26,8 @@ class Collision:
 
     shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Polytope, HalfSpace; left out, that of the body. With String on
                        both sides the bodies are tied together instead: their points keep within its length, and
-                       there is no friction. A HalfSpace on a body moves with it.
+                       there is no friction; taut, it moves as a rod does (sim/pairs/string.py), and jerked taut it
+                       takes the energy of the jerk. A HalfSpace on a body moves with it.
     b                  the world when left out; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law, restitution     as in Contact
 

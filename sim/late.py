@@ -105,6 +105,14 @@ lead_again = _late("sim.coupling.loop_motion:lead_again")
 meet_ahead = _late("sim.coupling.loop_motion:meet_ahead")
 is_farther = _late("sim.coupling.loop_motion:is_farther")
 
+# taut strings
+is_taut = _late("sim.pairs.string:is_taut")
+pull_from_before = _late("sim.pairs.string:pull_from_before")
+string_arm = _late("sim.pairs.string:string_arm")
+add_string_stiffness = _late("sim.pairs.string:add_string_stiffness")
+add_string_turn = _late("sim.pairs.string:add_string_turn")
+add_moved_end = _late("sim.parameters.strings:add_moved_end")
+
 # cylinders against polytopes and cylinders
 cylinder_distance = _late("sim.pairs.cylinders:cylinder_distance")
 collide_cylinders = _late("sim.pairs.cylinders:collide_cylinders")

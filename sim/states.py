@@ -11,7 +11,8 @@ from sim import checks
 from sim.border import Border, shaped
 from sim.build import mechanism_sizes, pack
 from sim.calls import Calls
-from sim.coupling.closure import Closure, LoopRank
+from sim.coupling.closure import Closure
+from sim.coupling.loop_rank import LoopRank
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.settings import Settings
@@ -52,14 +53,17 @@ class States:
         super().__setattr__(name, value)
 
     def neutral(self) -> Floats:
-        """The standing or hanging state of the mechanism, at rest, its loops closed."""
+        """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`."""
         x = np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
         return self.close(x) if self._closes else x
 
     def close(self, x: ArrayLike) -> Floats:
         """The state near x that closes the loops of the mechanism, at both ends of its interval.
 
-        Trees: x itself. ValueError: no such state is near.
+        Where Newton's method finds none, as for a linkage in one line, the nearest one of those that are found from
+        some starts around it, the same every time (sim/coupling/nearest.py).
+
+        Trees: x itself. ValueError: no such state is found; which loop joint or gear stays open, and by how much.
         """
         state = self._border.state("close", x)
         return Closure(self.mechanism, self._calls).close(state) if self._closes else state

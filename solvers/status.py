@@ -42,7 +42,7 @@ MESSAGES: dict[Status, str] = {
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",
-    Status.SIMULATION_FAILED: "The simulator could not step along the first trajectory.",
+    Status.SIMULATION_FAILED: "The simulator could not step along the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
 }

@@ -117,8 +117,9 @@ def test_links_that_touch_the_ground_are_named(
     assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot", "base=0.2", "--out", str(tmp_path)]) == 0
     assert [c.body for c in measured[0].contacts].count("foot") == 8
     assert [c.radius for c in measured[0].contacts if c.body == "base"] == [0.2]
-    command = json.loads((tmp_path / "report.json").read_text())["command"]
-    assert command.endswith("leg.urdf --contacts foot base=0.2")
+    page = json.loads((tmp_path / "report.json").read_text())
+    for command in (page["command"], page["studies"]["accuracy"]["command"]):
+        assert command == f"dojo-opt report accuracy {robot} --contacts foot base=0.2"
     assert cli.main(["report", "accuracy", str(robot), "--contacts", "foot=wide"]) == 2
     assert "--contacts foot=wide: expected LINK or LINK=RADIUS in metres" in capsys.readouterr().err
 

@@ -40,7 +40,7 @@ from sim.contacts.friction import contact_impulse
 from sim.late import pair_kinematics
 from sim.model import Model
 from sim.options import AT_EVERY_POSE, AT_START
-from sim.pairs.contact import is_absent, pair_arm, pair_force
+from sim.pairs.contact import gap_normal, is_absent, pair_arm, pair_force
 from sim.rotation import Vec3, cross, transposed_times
 from sim.work import Work
 from solvers.jit import kernel
@@ -79,8 +79,9 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
                 continue
             F = work.pair_frame[c - model.contact_height.shape[0]]
             o = work.origin
-            row[0], row[1], row[2] = F[0], F[1], F[2]
-            row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], F[0], F[1], F[2])
+            n = gap_normal(model, work, c - model.contact_height.shape[0])
+            row[0], row[1], row[2] = n
+            row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], n[0], n[1], n[2])
             for r in range(3):
                 b[16 + r if first else 19 + r] = F[9 + r]
             if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there

@@ -11,57 +11,32 @@ from numpy.typing import NDArray
 from sim.build import contact_frame, fixed_axes
 from sim.calls import Calls
 from sim.coupling.closing import is_weld
+from sim.coupling.loop_rank import LoopRank
+from sim.coupling.nearest import jacobian, nearest, newton
 from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
 from sim.shapes import rotation_matrix
 
 Floats = NDArray[np.float64]
 
-_STEP = 1e-6  # of central differences [m, rad]
-_CLOSED = 1e-11  # [m], and as much of an angle
 _APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
 _ASIDE = 0.03  # [m, rad]
-_NEAR = 0.1  # `weakest` of configurations close to a singular one, over that next to them
 _STARTS = 30  # repetitions, each of which halves the error at least
 _DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
-
-
-class LoopRank(NamedTuple):
-    """How many constraints the loops of a mechanism have, and how many of them say something new."""
-
-    constraints: dict[str, int]  # by loop joint
-    redundant: dict[str, int]  # by loop joint: what those before it, and its own, say already
-    mobility: int  # degrees of freedom that the loops leave
-    weakest: float  # least singular value of the independent constraints, over the largest
-    leftover: float  # largest one of the redundant constraints, over the largest
-    singular: int = 0  # redundant ones that count next to this configuration: branches of the motion may meet here
-    nearby: float = 0.0  # `weakest` next to this configuration
-
-    def __str__(self) -> str:
-        total, idle = sum(self.constraints.values()), sum(self.redundant.values())
-        which = ", ".join(f"{name} {n} of {self.constraints[name]}" for name, n in self.redundant.items() if n)
-        return (
-            f"{self.mobility} degrees of freedom left by {total} constraints, {idle} redundant"
-            + (f" ({which}) to {self.leftover:.0e}" if idle else "")
-            + f"; the weakest has {self.weakest:.1e} of the strongest"
-            + self._place()
-        )
-
-    def _place(self) -> str:
-        """How the configuration differs from those next to it."""
-        if self.singular:
-            return (
-                f"; singular: {self.singular} of the redundant ones count nearby, branches of the motion may meet here"
-            )
-        if self.weakest < _NEAR * self.nearby:
-            return f", nearby {self.nearby:.1e}: close to a singular configuration"
-        return ""
 
 
 def _angle(sine: Floats, cosine: float) -> Floats:
     """The rotation vector along sin(angle) direction."""
     size = float(np.linalg.norm(sine))
     return sine * (np.arctan2(size, cosine) / size) if size > 0.0 else sine
+
+
+class _Frame(NamedTuple):
+    """What of a loop joint does not move."""
+
+    turn: Floats  # (3, 3) joint to parent
+    held: Floats  # (n, 3) directions along which it does not slide
+    axes: Floats  # (3, 3) its axis, and two across
 
 
 class Closure:
@@ -71,6 +46,10 @@ class Closure:
         self._mechanism, self._calls = mechanism, calls
         self._nq = mechanism.nq
         self._h = calls.settings.time_step
+        self._frames = {
+            j.name: _Frame(rotation_matrix(j.orientation), fixed_axes(j), contact_frame(j.axis))
+            for j in mechanism.loops
+        }
 
     def gaps(self, x: Floats) -> dict[str, Floats]:
         """By loop joint and gear, what its constraints miss at x: distances [m], then angles [rad].
@@ -86,49 +65,51 @@ class Closure:
         return out
 
     def _gap(self, joint: Joint, z: Floats) -> Floats:
-        names = self._mechanism.body_names
+        names, fixed = self._mechanism.body_names, self._frames[joint.name]
         a = names.index(joint.child)
         Ra, xa = rotation_matrix(z[a, 6:10]), z[a, :3]
         Rb, xb = np.eye(3), np.zeros(3)
         if joint.parent != WORLD:
             b = names.index(joint.parent or "")
             Rb, xb = rotation_matrix(z[b, 6:10]), z[b, :3]
-        Q = Rb @ rotation_matrix(joint.orientation)
+        Q = Rb @ fixed.turn
         apart = Q.T @ (xa + Ra @ np.asarray(joint.child_point) - xb - Rb @ np.asarray(joint.parent_point))
         E = Q.T @ Ra
         if joint.nrot == 1:
-            frame = contact_frame(joint.axis)
-            turned = _angle(frame[1:] @ (E @ frame[0]), float(frame[0] @ E @ frame[0]))
+            axis, across = fixed.axes[0], fixed.axes[1:]
+            turned = _angle(across @ (E @ axis), float(axis @ E @ axis))
         else:
             sine = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
             turned = _angle(sine, 0.5 * (float(np.trace(E)) - 1.0))
-        return np.concatenate([fixed_axes(joint) @ apart, turned if joint.nrot < 3 else turned[:0]])
+        return np.concatenate([fixed.held @ apart, turned if joint.nrot < 3 else turned[:0]])
 
-    def close(self, x: Floats) -> Floats:
+    def close(self, x: Floats, *, search: bool = True) -> Floats:
         """The state near x whose loops are closed at both ends of its interval.
 
+        search: whether to look further away where Newton's method finds none, as from a linkage in one line.
         ValueError: there is none near, with the loop that stays open and by how much.
         """
         nv = self._mechanism.nv
-        x = self._with_shares(x)
-
-        def moved(dq: Floats) -> Floats:
-            return self._calls.integrate(x[None], np.concatenate([dq, np.zeros(nv)])[None])[0]
-
-        x = moved(self._solve(lambda dq: moved(dq), nv))
+        x = self._placed(x, search)
 
         def before(dv: Floats) -> Floats:
             back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros(nv)])
             return self._calls.integrate(x[None], back[None])[0]
 
-        x[self._nq :] += self._solve(before, nv)
+        x[self._nq :] += self._solve(before)
         return x
+
+    def _placed(self, x: Floats, search: bool) -> Floats:
+        """The state near x whose loops are closed at its end."""
+        place = self._around(self._with_shares(x))
+        return place(self._solve(place, search))
 
     def start(self, q: Floats, v: Floats) -> Floats:
         """The closed state near q whose velocity at the node is the part of v along the loops.
 
         Closing the interval before the node changes the velocity by O(h), which is made up for by repetition.
         """
+        q = self._reachable(q)
         wanted = self._calls.node_velocities(self._calls.started(q, v)[None])[0]
         given, best, x = wanted.copy(), np.inf, q
         for _ in range(_STARTS):
@@ -139,6 +120,15 @@ class Closure:
             x, best = state, np.abs(off).max()
             given = given + off
         return x
+
+    def _reachable(self, q: Floats) -> Floats:
+        """q, or the closed configuration near it where Newton's method finds none from there."""
+        x = np.concatenate([q, np.zeros(self._mechanism.nv)])
+        try:
+            self._placed(x, search=False)
+        except ValueError:
+            return self._placed(x, search=True)[: self._nq]
+        return q
 
     def _with_shares(self, x: Floats) -> Floats:
         """A copy of x where shares of bodies (closing.py) that are far from the rest of it are brought there."""
@@ -175,11 +165,10 @@ class Closure:
         states = []
         for _ in range(2 if len(free) else 0):
             d = rng.normal(size=len(free)) @ free
-            d *= _ASIDE / np.abs(d).max()
-            moved = self._calls.integrate(x[None], np.concatenate([d, np.zeros(len(d))])[None])[0]
+            moved = self._around(x)(d * (_ASIDE / np.abs(d).max()))
             moved[self._nq :] = 0.0
             try:
-                states.append(self.close(moved))
+                states.append(self.close(moved, search=False))
             except ValueError:  # an isolated configuration
                 continue
         return states
@@ -187,43 +176,56 @@ class Closure:
     def _rank_at(self, x: Floats) -> tuple[LoopRank, Floats]:
         """The rank at one configuration, and the directions (n, nv) that its constraints leave."""
         nv = self._mechanism.nv
-
-        def gaps(d: Floats) -> dict[str, Floats]:
-            return self.gaps(self._calls.integrate(x[None], np.concatenate([d, np.zeros(nv)])[None])[0])
-
-        columns = [(gaps(e), gaps(-e)) for e in _STEP * np.eye(nv)]
-        rows, found, redundant = np.zeros((0, nv)), 0, {}
-        size = {name: len(gap) for name, gap in gaps(np.zeros(nv)).items()}
-        for name in size:
-            own = np.array([ahead[name] - back[name] for ahead, back in columns]).T / (2.0 * _STEP)
-            rows = np.concatenate([rows, own])
-            values = np.linalg.svd(rows, compute_uv=False)
+        rows = jacobian(self._error(self._around(x)), np.zeros(nv))
+        size = {name: len(gap) for name, gap in self.gaps(x).items()}
+        end, found, redundant = 0, 0, {}
+        for name, own in size.items():
+            end += own
+            values = np.linalg.svd(rows[:end], compute_uv=False)
             independent = int(np.sum(values > _DEPENDENT * values[0]))
-            redundant[name] = size[name] - (independent - found)
+            redundant[name] = own - (independent - found)
             found = independent
         rest = values[found:].max() if found < len(values) else 0.0
         rank = LoopRank(size, redundant, nv - found, float(values[found - 1] / values[0]), float(rest / values[0]))
         return rank, np.linalg.svd(rows)[2][found:]
 
-    def _solve(self, place: Callable[[Floats], Floats], nv: int) -> Floats:
-        """The small d with closed loops at the state place(d): Newton's method, least norm."""
-        d = np.zeros(nv)
+    def _solve(self, place: Callable[[Floats], Floats], search: bool = False) -> Floats:
+        """The small d (nv,) with closed loops at the state place(d).
+
+        search: whether to look further away where Newton's method finds none.
+        """
+        nv = self._mechanism.nv
+        error = self._error(place)
+        zero = nearest(error, nv) if search else newton(error, np.zeros(nv))
+        if not zero.found:
+            raise ValueError(self._refusal(place, zero.d, search))
+        return zero.d
+
+    def _around(self, x: Floats) -> Callable[[Floats], Floats]:
+        """The state whose configuration is d (nv,) away from that of x."""
+        return lambda d: self._calls.integrate(x[None], np.concatenate([d, np.zeros(len(d))])[None])[0]
+
+    def _error(self, place: Callable[[Floats], Floats], name: str = "") -> Callable[[Floats], Floats]:
+        """The gaps at the state place(d), of all loops and gears or of one."""
 
         def error(d: Floats) -> Floats:
-            return np.concatenate(list(self.gaps(place(d)).values()))
+            gaps = self.gaps(place(d))
+            return gaps[name] if name else np.concatenate(list(gaps.values()))
 
-        for _ in range(50):
-            g = error(d)
-            if np.abs(g).max() < _CLOSED:
-                return d
-            J = np.array([error(d + e) - error(d - e) for e in _STEP * np.eye(nv)]).T / (2.0 * _STEP)
-            step = np.linalg.lstsq(J, -g, rcond=1e-9)[0]
-            d += step * min(1.0, 0.5 / max(np.abs(step).max(), 1e-300))
+        return error
+
+    def _refusal(self, place: Callable[[Floats], Floats], d: Floats, search: bool) -> str:
+        """What to say when the state place(d) is the best that was found."""
         gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d)).items()}
-        worst = max(gaps, key=lambda name: gaps[name])
-        call = f"Mechanism({self._mechanism.name!r})"
-        what = worst if worst.startswith("gear ") else f"loop joint {worst!r}"
-        raise ValueError(
-            f"{call}: {what} cannot be closed near this state, it is off by {gaps[worst]:.2g}; give "
-            "neutral=... a configuration near one that closes, or see whether two loops contradict each other"
+        names = [*gaps] if search and len(gaps) > 1 else []
+        alone = [name for name in names if not nearest(self._error(place, name), len(d)).found]
+        worst = max(alone or gaps, key=lambda name: gaps[name])
+        welds = {j.name: j.name.removeprefix(f"{j.parent}.") for j in self._mechanism.loops if is_weld(j)}
+        what = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"
+        why = "two loops contradict each other"
+        if alone or len(gaps) == 1:
+            why = "links are too short, or its frames contradict the joints of the tree"
+        return (
+            f"Mechanism({self._mechanism.name!r}): {what} cannot be closed near this state, it is off by "
+            f"{gaps[worst]:.2g} at best; give neutral=... a configuration near one that closes, or see whether {why}"
         )

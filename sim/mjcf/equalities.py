@@ -4,7 +4,8 @@
     weld      the pose of body 2 in body 1 stays: a fixed joint
     joint     a coordinate is a linear function of another one
 
-MuJoCo's are soft, those of the mechanism are not.
+Others (of tendons and flexes, curved functions, a coordinate that is held) are left out, with a warning that names
+them. MuJoCo's are soft, those of the mechanism are not.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from sim.urdf.report import Notes
 Floats = NDArray[np.float64]
 
 CONNECT, WELD, JOINT = 0, 1, 2  # mjtEq
+_OTHERS = {3: "tendon", 4: "flex", 5: "flexvert", 6: "flexstrain"}
 _SITE = 6  # mjtObj
 
 
@@ -33,11 +35,13 @@ def find_loops(model: Any, where: Where, notes: Notes) -> list[Joint]:
         name, kind = name_of(model, "equality", k), int(model.eq_type[k])
         if kind == JOINT:
             continue
-        if kind not in (CONNECT, WELD):
-            notes.add("equality constraints other than connect, weld and joint are left out", [name], warn=True)
-            continue
         if not model.eq_active0[k]:
             notes.add("equality constraints that the file switches off are left out", [name])
+            continue
+        if kind not in (CONNECT, WELD):
+            what = _OTHERS.get(kind, f"type {kind}")
+            text = "equality constraints other than connect, weld and joint are left out"
+            notes.add(text, [f"{name} ({what})"], warn=True)
             continue
         first, second = _ends(model, k, kind, where)
         if first[0] is second[0]:

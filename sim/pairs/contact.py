@@ -6,7 +6,7 @@
 
 Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
 to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
-alone carries it.
+alone carries it. Taut strings pull along where they lay at configuration 2: string.py.
 
 Derivatives: jacobian.py.
 """
@@ -17,7 +17,7 @@ from math import cos, sin
 
 from sim import late
 from sim.collision.collide import collide_chosen
-from sim.late import collide_cylinders
+from sim.late import collide_cylinders, is_taut, pull_from_before, string_arm
 from sim.model import Matrix, Model
 from sim.options import AT_EVERY_POSE
 from sim.pairs.choice import choose_shapes
@@ -123,6 +123,8 @@ def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
     kin[3] = F[9] - work.pos3[a, 0]
     kin[4] = F[10] - work.pos3[a, 1]
     kin[5] = F[11] - work.pos3[a, 2]
+    if is_taut(model, work, j):
+        pull_from_before(model, work, j)
 
 
 @kernel
@@ -149,6 +151,8 @@ def shares(model: Model, j: int) -> tuple[float, float]:
 @kernel
 def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O."""
+    if is_taut(model, work, j):
+        return string_arm(model, work, j)
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)
@@ -161,6 +165,13 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
         y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])
         z -= wb * (work.pos3[b, 2] - work.pos2[b, 2])
     return x, y, z
+
+
+@kernel
+def gap_normal(model: Model, work: Work, j: int) -> Vec3:
+    """Derivative of the gap of pair j by a displacement of a; where a string pulls along is another direction."""
+    F = work.pair_frame[j]
+    return (F[3], F[4], F[5]) if is_taut(model, work, j) else (F[0], F[1], F[2])
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim import late
 from sim.model import Model, Vector
-from sim.pairs.contact import POLE, point_velocity, shape_b
+from sim.pairs.contact import POLE, gap_normal, point_velocity, shape_b
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
@@ -96,11 +96,12 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
     px, py, pz = F[9] - o[0], F[10] - o[1], F[11] - o[2]
     Ca = work.pair_Ca[j]
     Cb = work.pair_Cb[j]
-    m = cross(px, py, pz, F[0], F[1], F[2])
+    n = gap_normal(model, work, j)
+    m = cross(px, py, pz, n[0], n[1], n[2])
     for k in range(3):
-        Ca[k] = F[k]
+        Ca[k] = n[k]
         Ca[3 + k] = m[k]
-        Cb[k] = -F[k]
+        Cb[k] = -n[k]
         Cb[3 + k] = -m[k]
     va = point_velocity(work, h, a, F[9], F[10], F[11])
     vb = point_velocity(work, h, b, F[9], F[10], F[11])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from sim import late
 from sim.contacts.friction import condense_contact, contact_constant, contact_error, contact_impulse
+from sim.late import add_string_stiffness, add_string_turn, is_taut
 from sim.model import Matrix, Model, Vector
 from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
@@ -66,6 +67,9 @@ def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
 @kernel
 def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
     """coupling_K += pair j, condensed; share: of the turning of its impulse."""
+    if is_taut(model, work, j):
+        add_string_stiffness(model, work, j)
+        return
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
@@ -152,6 +156,9 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
 
     slip    -t/h on dx2,  (-c y + s x y)/h on dphi2,  y = r x t        P follows the centres of mass at 2
     """
+    if is_taut(model, work, j):
+        add_string_turn(model, work, j, K2)
+        return
     c = model.contact_height.shape[0] + j
     weight = shares(model, j)
     n, t1, t2 = contact_impulse(model, work, c)

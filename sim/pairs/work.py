@@ -8,6 +8,7 @@ that they never had. So no solution is accepted whose impulses do both, over all
 
 Of the two the first is the kinetic energy that the impulses add. The second leaves out what other forces do: they may
 press bodies together that were moving apart. Impacts with restitution are looked at by contacts/restitution.py.
+Taut strings pass through nothing.
 
     allowed = share (T + T') + sum of (2 kappa + f_n (overlap where the step began + what may be left at its end))/h
 """
@@ -18,6 +19,7 @@ from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.contacts.restitution import impulse_work
 from sim.energy import twice_kinetic
+from sim.late import is_taut
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.pairs.contact import is_absent, pair_arm, pair_force
@@ -68,7 +70,7 @@ def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
             overlap = max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
             slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
             counts = work.pair_apart[j] == 0.0 and overlap < _THROWN * size
-        if not counts or is_absent(work, j) or work.bounce[ground + j, 1] > 0.0:
+        if not counts or is_absent(work, j) or is_taut(model, work, j) or work.bounce[ground + j, 1] > 0.0:
             continue
         gain += impulse_work(model, work, h, ground + j)
         power += power_after(model, work, h, j)

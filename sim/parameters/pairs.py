@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.collision.witness import dot
 from sim.contacts.friction import contact_impulse
+from sim.late import add_moved_end, is_taut
 from sim.model import Model, Vector
 from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import unit_vector
@@ -93,6 +94,8 @@ def add_pairs_mass(model: Model, work: Work, i: int, w: float, col: int) -> None
         b = model.coupling_body[model.pair_coupling[j], 1]
         if b < 0 or (i != a and i != b) or not is_felt(model, work, j):
             continue
+        if is_taut(model, work, j):
+            continue
         m = model.body_mass[a] + model.body_mass[b]
         r = (model.body_mass[b] if i == a else -model.body_mass[a]) / (m * m)
         x3, x2, y3, y2 = work.pos3[a], work.pos2[a], work.pos3[b], work.pos2[b]
@@ -114,5 +117,8 @@ def add_shapes_shift(model: Model, work: Work, h: float, first: int, k: int, w: 
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         if is_felt(model, work, j):
             floor = pair_floor(work, model.contact_height.shape[0] + j, side, e1, e2)
-            add_moved_shape(model, work, h, j, side, e3, floor, w, col)
+            if is_taut(model, work, j):
+                add_moved_end(model, work, j, side, e2, e3, floor, w, col)
+            else:
+                add_moved_shape(model, work, h, j, side, e3, floor, w, col)
         j += 1

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.witness import dot
+from sim.late import add_moved_end, is_taut
 from sim.model import Model, Vector
+from sim.pairs.contact import gap_normal
 from sim.pairs.pose import place_shape
 from sim.parameters.effects import SIDE, Size
 from sim.parameters.pairs import add_moved_shape, is_felt, pair_floor, row
@@ -94,7 +96,10 @@ def add_shapes_size(model: Model, work: Work, h: float, first: int, which: int, 
             if b[1] > 0.0:
                 e1, e2 = earlier_shift(model, work, j, which, b, 1), earlier_shift(model, work, j, which, b, 2)
                 floor = pair_floor(work, c, which // SIDE, e1, e2)
-            F = work.pair_frame[j]
-            e = element_shift(model, work, j, which, work.pair_out[j, 0], row(F, 0), row(F, 9), 3)
-            add_moved_shape(model, work, h, j, which // SIDE, e, floor, w, col)
+            p = row(work.pair_frame[j], 9)
+            e = element_shift(model, work, j, which, work.pair_out[j, 0], gap_normal(model, work, j), p, 3)
+            if is_taut(model, work, j):  # where it pulls along stays
+                add_moved_end(model, work, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
+            else:
+                add_moved_shape(model, work, h, j, which // SIDE, e, floor, w, col)
         j += 1

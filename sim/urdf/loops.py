@@ -7,6 +7,8 @@
       <dynamics damping="0.1"/> <limit lower="-1" upper="1"/>
     </loop_joint>
 
+Every type of a <joint> (sim/urdf/robot.py) can close a loop; a floating one needs damping, as of a bushing.
+
 At coordinate zero the two frames coincide. Without an rpy in <link2>, they have the same axes where all joints of the
 tree are at zero.
 """
@@ -46,8 +48,8 @@ def read_loop(element: Element, notes: Notes) -> UrdfLoop:
     joint = read_joint(element, ("link1", "link2"), poses[0], notes)
     if joint.parent == joint.child:
         raise element.error(f"expected two different links, got {joint.parent!r} twice")
-    if joint.kind == "floating":
-        raise element.error("a floating joint closes nothing")
+    if joint.kind == "floating" and not joint.damping:
+        raise element.error("a floating joint without damping closes nothing")
     return UrdfLoop(joint, poses[1], "rpy" in ends[1].attributes)
 
 

@@ -66,7 +66,8 @@ class UrdfMechanism(Mechanism):
     """A Mechanism that `load_urdf` made; `report` says what became of the file.
 
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
-    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in Dojo), and
+    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in Dojo; and every kind
+    of Joint by its own name, but for "planar", which turns in URDF and whose kind without is "planarfixed"), and
     <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (sim/urdf/loops.py). A body's frame has the
     axes of its first link and its origin at the centre of mass; `report.links` has the pose of every link in its body,
     `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented (dry friction,

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import parts
 from sim.urdf.pose import HERE, Pose, roll_pitch_yaw
 from sim.urdf.report import Notes
 from sim.urdf.xml import Element
@@ -17,7 +18,8 @@ from sim.urdf.xml import Element
 Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
 
-# URDF's joint types, and the further ones that PyBullet (spherical) and Dojo (the others) read, as kinds of Joint
+# URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
+# of Joint that nobody else has a word for. A kind's own name is read, too, except for "planar", which may turn in URDF.
 KINDS = {
     "fixed": "fixed",
     "revolute": "revolute",
@@ -33,7 +35,13 @@ KINDS = {
     "cylindricalfree": "cylindrical_free",
     "fixedorientation": "fixed_orientation",
     "orbital": "orbital",
+    "planarfixed": "planar",
+    "freerevolute": "free_revolute",
+    "prismaticorbital": "prismatic_orbital",
+    "planarorbital": "planar_orbital",
+    "freeorbital": "free_orbital",
 }
+KINDS |= {kind: kind for kind in parts.KINDS if kind not in KINDS}
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 # elements that say nothing about the motion of bodies, or nothing that a step could use
 READ = {"link", "joint", "loop_joint"}

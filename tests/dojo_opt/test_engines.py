@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
+from killing import Killing
 
 import dojo_opt as dojo
+from dojo_opt.report import Progress, stability
 from dojo_opt.report.engines import Engine, Ours, Run, installed
 from dojo_opt.report.engines.run import ended, nodes
+from dojo_opt.report.stability import Stability, joints
 
 ENGINES = [Ours(rounds=1), *installed()]
 SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]
@@ -101,6 +106,24 @@ def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
     np.testing.assert_allclose(run.position, swing(ENGINES[0]).position[:1], atol=1e-12)
     with pytest.raises(ValueError, match="no springs"):
         swing(Breaking(ValueError("no springs")))
+
+
+def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The calls before it share a process, which is not this one, and those after it share another one."""
+    first, second = (swing(Killing(deadly=0.3)) for _ in range(2))
+    assert first.message == second.message != f"in process {os.getpid()}"
+    run = swing(Killing(deadly=0.3), duration=0.3)
+    assert run.message == "ended by signal 11 (Segmentation fault)" and run.steps == 0
+    np.testing.assert_allclose(run.position, first.position[:1], atol=1e-12)
+    third = swing(Killing(deadly=0.3))
+    assert third.message.startswith("in process") and third.message != first.message
+    np.testing.assert_array_equal(third.energy, first.energy)
+    trial = replace(joints.spring(1e2, 1e-2), duration=0.3)
+    monkeypatch.setattr(stability.study, "installed", lambda: [Ours(), Killing(deadly=0.3)])
+    monkeypatch.setattr(Stability, "trials", lambda _: [trial, replace(trial, name="after it", duration=0.5)])
+    report = Stability(quick=True).run(Progress())
+    assert [row[3][:9] for row in report.tables[0].rows] == ["ended by ", "failed at"]
+    assert report.tables[0].rows[0][3] == "ended by signal 11 (Segmentation fault)"
 
 
 def test_nothing_is_written_where_the_user_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.options import Options
 from dojo_opt.planner import Solver, ilqr
 from dojo_opt.problem import Problem
+from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
 
 
@@ -93,6 +94,51 @@ def test_no_positive_definite_hessian():
     problem.costs[1].weight[:] = -1e3  # cannot be built through the public interface
     plan = ilqr(problem, regularization_max=1e2)
     assert plan.status == Status.MAX_REGULARIZATION and not plan.success
+    assert plan.message.startswith("No positive definite control Hessian") and "At knot " in plan.message
+
+
+class Broken(DoubleIntegrator):
+    """Its derivatives at one knot are scaled by something."""
+
+    knot, factor, status = 4, np.nan, Status.SOLVED
+
+    def linearize_trajectory(self, xs, us, substeps=1, kappa=None):
+        lin = super().linearize_trajectory(xs, us, substeps, kappa)
+        lin.A[self.knot] *= self.factor
+        lin.status[self.knot] = self.status
+        return lin
+
+
+def broken(**given):
+    sim = Broken()
+    for name, value in given.items():
+        setattr(sim, name, value)
+    return Problem(sim, [1.0, 0.0], 10, cost=[Tracking(np.zeros(2), 1.0), Effort(1e-3)])
+
+
+def test_a_number_that_is_not_finite_is_no_matter_of_regularization():
+    """And it is said where it is; control Hessians that are not positive definite either are what comes of it."""
+    plan = ilqr(broken())
+    assert plan.status == Status.NOT_FINITE and not plan.success
+    assert plan.message.startswith(MESSAGES[Status.NOT_FINITE] + " In the derivatives of the dynamics, at knot 4.")
+    problem = lqr()
+    problem.costs[0].weight[3] = np.nan
+    assert "In the derivatives of the costs, at knot 3." in ilqr(problem).message
+    plan = ilqr(broken(knot=5, factor=1e200))
+    assert plan.status == Status.NOT_FINITE and "The cost to go grows beyond all numbers, at knot 4." in plan.message
+
+
+def test_derivatives_that_cannot_be_had_are_said():
+    plan = ilqr(broken(factor=1.0, status=Status.NO_PROGRESS))
+    assert plan.status == Status.SIMULATION_FAILED
+    assert "Derivatives at knot 4, NO_PROGRESS: " + MESSAGES[Status.NO_PROGRESS] in plan.message
+
+
+def test_a_box_qp_that_does_not_end():
+    solver = Solver(lqr(), Options())
+    solver.solve()
+    assert solver.descent.fault(Promise(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0), solver.continuation.now) == 1
+    assert "quadratic program of the control limits, at knot 3" in solver.descent.detail
 
 
 def test_gains_of_a_plan_have_no_more_regularization_than_they_need():

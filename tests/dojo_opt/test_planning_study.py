@@ -111,3 +111,5 @@ def test_the_quick_study_runs_and_plans_everything():
     assert len(report.figure.axes) == 12
     numbers = json.loads(report.as_json())
     assert set(numbers["details"]["settings"]) == set(cases.NAMES)
+    if find_spec("mujoco"):
+        assert {name.rpartition(",")[0] for name in numbers["details"]["peers"]} == set(cases.NAMES)

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from linkage import fourbar
-from urdf_files import inertial, joint, link, write
+from urdf_files import SKEWED, inertial, joint, link, write
 
 import dojo_opt as dojo
+from sim.parts import KINDS
+from sim.urdf.pose import roll_pitch_yaw
 
 BAR = "<axis xyz='0 1 0'/>"
 
@@ -78,7 +80,7 @@ def test_a_motor_on_a_loop_joint(tmp_path: Path) -> None:
         (('link="rocker"', 'link="coupler"'), "expected two different links, got 'coupler' twice"),
         (('name="pin"', 'name="crank"'), "the name is taken by the <joint> of line 6"),
         (("continuous", "welded"), "type 'welded' is not one of"),
-        (("continuous", "floating"), "a floating joint closes nothing"),
+        (("continuous", "floating"), "a floating joint without damping closes nothing"),
         (("<link2", "<link3"), "expected a <link2> inside"),
         (('link="rocker"', 'link="ground"'), "'ground' is part of the world; exchange link1 and link2"),
     ],
@@ -87,6 +89,57 @@ def test_what_is_wrong_with_a_loop_joint_is_said(tmp_path: Path, change: tuple[s
     path = write(tmp_path, *PARTS, PIN.format("").replace("\n", "").replace(*change), "")
     with pytest.raises(ValueError, match=message.replace("(", r"\(")):
         dojo.load_urdf(path, floating=False)
+
+
+ARM = (  # three bodies on ball joints, from the origin along x, y, then down
+    link("base"),
+    *(link(name, inertial(1.0, xyz)) for name, xyz in (("a", ".25 0 0"), ("b", "0 .25 0"), ("c", "0 0 -.25"))),
+    *(
+        joint(name, parent, name, "ball", "", at=f"xyz='{xyz}'")
+        for name, parent, xyz in (("a", "base", "0 0 0"), ("b", "a", ".5 0 0"), ("c", "b", "0 .5 0"))
+    ),
+)
+END = (
+    '<loop_joint name="end" type="{}"><link1 link="base" xyz=".5 .5 -.5" rpy="0.3 -0.4 0.5"/>'
+    '<link2 link="c" xyz="0 0 -.5"/><axis xyz=".6 0 .8"/><dynamics damping="{}"/></loop_joint>'
+)
+DAMPED = ("cylindrical", "floating")
+
+
+def arm_by_hand(kind: str, damper: float) -> dojo.Mechanism:
+    """The same arm, its end on a joint of the given kind."""
+    xx, yy, zz, xy, xz, yz = SKEWED
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    x, y, z = 0.25 * np.eye(3)
+    joints = [
+        dojo.Joint("spherical", None, "a", child_point=-x),
+        dojo.Joint("spherical", "a", "b", parent_point=x, child_point=-y),
+        dojo.Joint("spherical", "b", "c", parent_point=y, child_point=z),
+        dojo.Joint(
+            kind, None, "c", "end", (0.5, 0.5, -0.5), -z, roll_pitch_yaw((0.3, -0.4, 0.5)) @ (0.6, 0, 0.8),
+            damper=damper, close=True,
+        ),
+    ]  # fmt: skip
+    return dojo.Mechanism([dojo.Body(name, 1.0, inertia) for name in "abc"], joints, inputs=[])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_closes_a_loop(tmp_path: Path, kind: str) -> None:
+    damper = 0.3 if kind in DAMPED else 0.0
+    given = END.format("planarfixed" if kind == "planar" else kind, damper)
+    mech = dojo.load_urdf(write(tmp_path, *ARM, given), floating=False, ground=False, actuated=[])
+    by_hand = arm_by_hand(kind, damper)
+    assert [joint.kind for joint in mech.loops] == [joint.kind for joint in by_hand.loops]
+    found = []
+    for m in (mech, by_hand):
+        sim = dojo.Simulator(m, time_step=0.01, tolerance=1e-11)
+        x = sim.neutral()
+        x[sim.nq : sim.nq + 9] = np.random.default_rng(3).normal(size=9)
+        t = sim.rollout(sim.close(x), np.zeros((30, 0)), throw=True)
+        assert max(np.abs(gap).max() for gap in sim.loop_gaps(t.x[-1]).values()) < 1e-10
+        found.append(sim.maximal(t.x)[:, :3])
+    np.testing.assert_allclose(found[0], found[1], atol=1e-8)
+    assert np.ptp(found[0][:, :, 3:6], axis=0).max() > 0.1  # they move
 
 
 MJCF = """

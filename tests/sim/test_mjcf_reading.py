@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,37 @@ def test_what_is_left_out_is_said() -> None:
     for words in ("that hold one joint, or are not linear, are left out: w", "dry friction of joints is left out: j", "drag of a fluid",
                   "bodies do not collide"):  # fmt: skip
         assert words in str(report), words
+
+
+HELD = """
+<mujoco>
+  <worldbody>
+    <body name="a"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="1 0 0"/></body>
+    <body name="b" pos="0 0 2"><joint name="k" axis="0 1 0"/><geom size="0.1" pos="1 0 0"/></body>
+  </worldbody>
+  <tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
+  <equality>{}</equality>
+</mujoco>
+"""
+EQUALITIES = {
+    '<connect name="e" body1="a" body2="b" anchor="1 0 0"/>': "equality constraints are rigid here: e",
+    '<weld name="e" body1="a" body2="b"/>': "equality constraints are rigid here: e",
+    '<joint name="e" joint1="j" joint2="k" polycoef="0 2 0 0 0"/>': "equality constraints are rigid here: e",
+    '<joint name="e" joint1="j"/>': "that hold one joint, or are not linear, are left out: e",
+    '<joint name="e" joint1="j" joint2="k" polycoef="0 1 2 0 0"/>': "or are not linear, are left out: e",
+    '<tendon name="e" tendon1="t"/>': "other than connect, weld and joint are left out: e (tendon)",
+    '<tendon name="e" tendon1="t" active="false"/>': "that the file switches off are left out: e",
+}
+
+
+@pytest.mark.parametrize("given", EQUALITIES)
+def test_every_equality_is_read_or_named(given: str) -> None:
+    words = EQUALITIES[given]
+    warns = "left out" in words and "switches" not in words
+    with pytest.warns(MjcfWarning, match="equality") if warns else nullcontext():
+        mech = load_mjcf(HELD.format(given))
+    assert mech.report is not None and words in str(mech.report)
+    assert len(mech.loops) + len(mech.gears) == ("rigid" in words)
 
 
 @pytest.mark.parametrize(

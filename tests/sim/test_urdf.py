@@ -11,6 +11,7 @@ import pytest
 from urdf_files import AXIS, BALL, SKEWED, arm, inertial, joint, link, write
 
 import dojo_opt as dojo
+from sim import parts
 from sim.shapes import rotation_matrix
 from sim.urdf.pose import Pose, quaternion, roll_pitch_yaw, turn
 from sim.urdf.stance import poses
@@ -29,7 +30,16 @@ KINDS = {  # type in the file: (kind, nq, nv)
     "cylindricalfree": ("cylindrical_free", 5, 4),
     "fixedorientation": ("fixed_orientation", 3, 3),
     "orbital": ("orbital", 2, 2),
+    "planarfixed": ("planar", 2, 2),
+    "freerevolute": ("free_revolute", 4, 4),
+    "prismatic_orbital": ("prismatic_orbital", 3, 3),
+    "planarorbital": ("planar_orbital", 4, 4),
+    "free_orbital": ("free_orbital", 5, 5),
 }
+
+
+def test_no_kind_of_joint_is_without_a_type() -> None:
+    assert {"fixed"} | {kind for kind, *_ in KINDS.values()} == set(parts.KINDS)
 
 
 # -- poses -------------------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines import bullet_scene
+from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.bullet_scene import World
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_scene import is_free
@@ -38,6 +39,7 @@ class Bullet:
     name: str = "PyBullet"
 
     @ended
+    @apart
     def simulate(
         self,
         mechanism: Mechanism,

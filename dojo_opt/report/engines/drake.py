@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines import drake_scene
+from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.drake_scene import Plant
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from sim.mechanism import Mechanism
@@ -37,6 +38,7 @@ class Drake:
         return f"Drake {self.approximation.lower() or 'RK3'}"
 
     @ended
+    @apart
     def simulate(
         self,
         mechanism: Mechanism,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report import mujoco_scene
+from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_warnings import quiet
 from sim.mechanism import Mechanism
@@ -40,6 +41,7 @@ class MuJoCo:
         return f"MuJoCo {self.integrator}" + (f", {self.label}" if self.label else "")
 
     @ended
+    @apart
     def simulate(
         self,
         mechanism: Mechanism,

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.report.engines.apart import ProcessEnded
 from sim import bodies
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
@@ -70,6 +71,8 @@ class Engine(Protocol):
 def ended(simulate: Simulate) -> Simulate:
     """A `simulate` whose exceptions are runs that end at their start: a cell of a table, not the end of a report.
 
+    So are runs that took the process of the engine with them (apart.py).
+
     ValueErrors pass: they say that a mechanism cannot be represented.
     """
 
@@ -83,7 +86,8 @@ def ended(simulate: Simulate) -> Simulate:
             sim = Simulator(mechanism, time_step=given["time_step"])
             q, v = (np.atleast_2d(np.asarray(given[name], dtype=np.float64)) for name in ("q", "v"))
             reason = str(error).partition("\n")[0].partition(". ")[0][:200]
-            return observe(sim, np.zeros(1), q, v, 0.0, 0, f"{type(error).__name__}: {reason}")
+            message = reason if isinstance(error, ProcessEnded) else f"{type(error).__name__}: {reason}"
+            return observe(sim, np.zeros(1), q, v, 0.0, 0, message)
 
     return run  # type: ignore[return-value]
 

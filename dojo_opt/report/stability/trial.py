@@ -78,7 +78,8 @@ class Trial:
             refused = self.refusal in run.message
             return Verdict(0.0 if refused else nan, refused, "refused" if refused else "not refused")
         if not complete(run):
-            return Verdict(nan, False, f"failed at {run.time[-1]:.2g} s")
+            ended = run.message.startswith("ended ")  # the process of the engine
+            return Verdict(nan, False, run.message if ended else f"failed at {run.time[-1]:.2g} s")
         value = self.measure(self.mechanism, run)
         passed = bool(value <= self.bar)
         return Verdict(value, passed, f"{value:.2g}" + ("" if passed else " x"))

@@ -1,0 +1,39 @@
+"""LoopRank: how many constraints closed loops have, which of them are redundant, and whether the pose is singular."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+_NEAR = 0.1  # `weakest` of configurations close to a singular one, over that next to them
+
+
+class LoopRank(NamedTuple):
+    """How many constraints the loops of a mechanism have, and how many of them say something new."""
+
+    constraints: dict[str, int]  # by loop joint
+    redundant: dict[str, int]  # by loop joint: what those before it, and its own, say already
+    mobility: int  # degrees of freedom that the loops leave
+    weakest: float  # least singular value of the independent constraints, over the largest
+    leftover: float  # largest one of the redundant constraints, over the largest
+    singular: int = 0  # redundant ones that count next to this configuration: branches of the motion may meet here
+    nearby: float = 0.0  # `weakest` next to this configuration
+
+    def __str__(self) -> str:
+        total, idle = sum(self.constraints.values()), sum(self.redundant.values())
+        which = ", ".join(f"{name} {n} of {self.constraints[name]}" for name, n in self.redundant.items() if n)
+        return (
+            f"{self.mobility} degrees of freedom left by {total} constraints, {idle} redundant"
+            + (f" ({which}) to {self.leftover:.0e}" if idle else "")
+            + f"; the weakest has {self.weakest:.1e} of the strongest"
+            + self._place()
+        )
+
+    def _place(self) -> str:
+        """How the configuration differs from those next to it."""
+        if self.singular:
+            return (
+                f"; singular: {self.singular} of the redundant ones count nearby, branches of the motion may meet here"
+            )
+        if self.weakest < _NEAR * self.nearby:
+            return f", nearby {self.nearby:.1e}: close to a singular configuration"
+        return ""
