@@ -107,8 +107,8 @@ def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float
 def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
-    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where the law may have it, no
-    faster than -kappa beta/c and not along beta, and otherwise -kappa beta/c: then the matrix is definite.
+    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where the law may have it,
+    no faster than -kappa beta/c and not along beta, and otherwise -kappa beta/c: then the matrix is definite.
     """
     x, y, b1, b2 = k[1], k[2], z[2], z[3]
     n = b1 * b1 + b2 * b2

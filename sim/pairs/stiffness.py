@@ -108,7 +108,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 @late.condense_pairs.defined()
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool) -> None:
-    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  share, linear: see `condense_into`."""
+    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
         if work.coupling_live[k] == 1:

@@ -8,12 +8,14 @@ from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
-from sim.options import Goal
+from sim.options import Goal, Options
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
+from sim.solve.merit import Merit, is_near
 from sim.work import Work
 from solvers.jit import inlined
 
+_CUT = 0.9  # of the Newton step: where the boundary is closer, something slides that should have stuck
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
 
@@ -27,9 +29,9 @@ def linearize_step(
     Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
     growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
     without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
-    Newton's direction where no share of them helps, and where `whole`, near a solution: its determinant may be negative, too. Four
-    corners on curved ground hold a box in more directions than a plane does, one of them hardly, and friction that
-    grows with the impulses outweighs that hold. All other directions lead away from such a solution.
+    Newton's direction where no share of them helps, and where `whole`: near a solution, whose determinant may be
+    negative, too. Four corners on curved ground hold a box in more directions than a plane does, one of them hardly,
+    and friction that grows with the impulses outweighs that hold. All other directions lead away from such a solution.
     """
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     sign = 0
@@ -80,3 +82,31 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
                 break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3
     return alpha
+
+
+@inlined
+def newton_direction(
+    model: Model,
+    work: Work,
+    options: Options,
+    inputs: tuple[Vector, Vector, Vector],
+    smoothing: float,
+    merit: Merit,
+    beyond: bool,
+    known: bool,
+) -> tuple[float, bool]:
+    """`direction` at the present iterate: the step to the boundary, below 0 where the matrix is singular; and `known`.
+
+    beyond: whether folds are none of its business;  known: whether what sticks and what slides is. Where it is,
+    contacts that stick take the law that is linear in the slip, as near a solution; a step that the boundary cuts short
+    says that it was not, and is taken anew.
+    """
+    q, v, _ = inputs
+    near = is_near(merit, options.kappa)
+    while True:
+        if not linearize_step(model, work, options.h, q, v, smoothing, near or beyond, near or known):
+            return -1.0, known
+        boundary = direction(model, work, options.h, options.kappa, merit.mean)
+        if near or not known or boundary > _CUT:
+            return boundary, known
+        known = False

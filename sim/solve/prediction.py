@@ -130,9 +130,7 @@ def descend(model: Model, work: Work) -> None:
 
 
 @kernel
-def predict(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]
-) -> tuple[float, float]:
+def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
     """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, infinite where that
     fails.
 

@@ -94,3 +94,12 @@ def test_a_walker_lands_at_a_stop_of_its_knee(kappa):
     x = sim.neutral()
     x[sim.nq :] += np.random.default_rng(1).normal(size=sim.nv)
     sim.rollout(x, np.zeros((50, sim.nu)), throw=True)
+
+
+@pytest.mark.parametrize("time_step, pitches", [(0.005, (0.1, 0.12, 0.2)), (0.01, (0.11, 0.14)), (0.02, (0.16, 0.21))])
+def test_legs_that_jam_between_a_joint_limit_and_the_ground(time_step, pitches):
+    sim = dojo.Simulator(dojo.models.walker(), time_step=time_step)
+    for pitch in pitches:
+        x = sim.neutral()
+        x[2] += pitch
+        sim.rollout(x, np.zeros((round(0.7 / time_step), sim.nu)), throw=True)
