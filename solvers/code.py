@@ -8,7 +8,10 @@ the optimiser may drop arguments nobody reads and copies nobody calls.
 
 from __future__ import annotations
 
+import gc
 import operator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -18,6 +21,7 @@ from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
+from solvers.lowering import KernelLowering
 from solvers.notice import compiling
 
 __all__ = ["EntryCompiler", "InnerCompiler"]
@@ -98,6 +102,22 @@ _IDLE = (  # passes for what kernels do not do: closures, array expressions, lit
 )
 
 
+_SELDOM = (50_000, 20, 100)  # thresholds of the garbage collector
+
+
+@contextmanager
+def _seldom_collected() -> Iterator[None]:
+    """Collect garbage seldom: a compilation makes millions of objects of which most stay while it goes on, and going
+    through them again and again was an eighth of a cold start.
+    """
+    before = gc.get_threshold()
+    gc.set_threshold(*_SELDOM)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
 class _Compiler(Compiler):
     """Numba's compiler, into a library of our own, without the passes that are idle."""
 
@@ -107,7 +127,12 @@ class _Compiler(Compiler):
         """Which passes, in which order."""
         (default,) = super().define_pipelines()
         chosen = PassManager(default.pipeline_name)
-        chosen.passes = [entry for entry in default.passes if entry[0] not in _IDLE]
+        lowering = typed_passes.NativeLowering
+        chosen.passes = [
+            (KernelLowering, said) if kind is lowering else (kind, said)
+            for kind, said in default.passes
+            if kind not in _IDLE
+        ]
         chosen.finalize()
         return [chosen]
 
@@ -116,7 +141,7 @@ class _Compiler(Compiler):
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        with compiling():
+        with compiling(), _seldom_collected():
             return super().compile_extra(func)
 
 

@@ -24,8 +24,9 @@ from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
-from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
+
+from solvers.lowering import array_value
 
 Table = NDArray[np.int64]
 R = TypeVar("R")
@@ -73,9 +74,7 @@ def _field(context: Any, builder: Any, record: RecordType, value: Any, name: str
     """The array of one field, from its three words of the table."""
     k, field = record.fields[name]
     kind = record.array(name)
-    array = context.make_array(kind)(context, builder)
-    item = context.get_data_type(kind.dtype).as_pointer()
-    data = load_word(builder, value, item, 3 * k)
+    data = load_word(builder, value, context.get_data_type(kind.dtype).as_pointer(), 3 * k)
     shape = [load_word(builder, value, cgutils.intp_t, 3 * k + 1)]
     strides = [cgutils.intp_t(8)]
     if field.columns is not None:
@@ -84,8 +83,7 @@ def _field(context: Any, builder: Any, record: RecordType, value: Any, name: str
         )
         shape.append(columns)
         strides = [builder.mul(columns, strides[0]), strides[0]]
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=cgutils.intp_t(8), meminfo=None)
-    return array._getvalue()
+    return array_value(context, builder, kind, data, shape, strides)
 
 
 def load_word(builder: Any, table: Any, kind: Any, k: int) -> Any:
