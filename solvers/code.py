@@ -30,7 +30,18 @@ _ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every funct
 
 
 class InnerLibrary(JITCodeLibrary):
-    """Code of a kernel for its callers: not optimised beyond single functions, never translated."""
+    """Code of a kernel for its callers: made smaller, not optimised, never translated."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Numba runs all of its optimisations here; each entry does so again, on what these three leave."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = llvm.create_new_function_pass_manager(), self._codegen._pass_builder()
+        passes.add_sroa_pass()
+        passes.add_instruction_combine_pass()
+        passes.add_simplify_cfg_pass()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         """Left to the entries."""
