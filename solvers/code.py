@@ -100,7 +100,7 @@ for _operator in _COMPARED:
     _number_of(_operator, dict.fromkeys(_NUMBERS, types.boolean))
 _number_of(operator.truediv, {types.float64: types.float64})
 
-_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions
+_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
     untyped_passes.RewriteDynamicRaises,
@@ -110,6 +110,8 @@ _IDLE = (  # passes for what kernels do not do: closures, array expressions, lit
     untyped_passes.LiteralPropagationSubPipelinePass,
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
+    typed_passes.AnnotateTypes,
+    typed_passes.IRLegalization,  # where variables end, of which _Lower takes no notice
 )
 
 

@@ -101,12 +101,6 @@ class _Lower(Lower):
         else:
             self.builder.store(self._as_value(value, kind), self.getvar(name))
 
-    def delvar(self, name: str) -> None:
-        """The end of a variable."""
-        if name not in self._blk_local_varmap:
-            self._singly_assigned_vars.discard(name)
-        self._alloca_var(name, self.typeof(name))
-
     def lower_inst(self, inst: Any) -> None:
         """One statement."""
         if isinstance(inst, ir.Assign):
