@@ -10,7 +10,7 @@ from llvmlite.ir import Constant, IntType
 __all__ = ["DATA", "SHAPE", "STRIDES", "WORD", "ArrayWords"]
 
 WORD = IntType(64)
-_NOBODY = Constant(IntType(8).as_pointer(), None)
+_NOBODY = (Constant(IntType(8).as_pointer(), None),) * 2
 DATA, SHAPE, STRIDES = 4, 5, 6  # where they are in the value; before them meminfo, parent, nitems, itemsize
 
 
@@ -22,7 +22,7 @@ class ArrayWords:
 
     @classmethod
     def of(
-        cls, builder: Any, data: Any, shape: Sequence[Any], strides: Sequence[Any], owner: Sequence[Any] = (_NOBODY,) * 2
+        cls, builder: Any, data: Any, shape: Sequence[Any], strides: Sequence[Any], owner: Sequence[Any] = _NOBODY
     ) -> ArrayWords:
         """An array of this data; owner: meminfo and parent."""
         count = shape[0]

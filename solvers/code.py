@@ -29,6 +29,17 @@ __all__ = ["EntryCompiler", "InnerCompiler"]
 _ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every function
 
 
+def _shell(library: Any, module: Any, functions: tuple[str, ...] = ()) -> Any:
+    """A module with the names of another: variables that Numba looks for, and these functions, without their code."""
+    text = str(library._codegen._create_empty_module(library.name))
+    for variable in module.global_variables:
+        if variable.name.startswith(_ENVIRONMENT):
+            text += f'\n@"{variable.name}" = common global i8* null'
+    for name in functions:
+        text += f'\ndefine void @"{name}"() {{\n  ret void\n}}'
+    return llvm.parse_assembly(text)
+
+
 class InnerLibrary(JITCodeLibrary):
     """Code of a kernel for its callers: made smaller, not optimised, never translated."""
 
@@ -53,11 +64,7 @@ class InnerLibrary(JITCodeLibrary):
         for function in code.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.external:
                 function.linkage = "linkonce_odr"
-        shell = str(self._codegen._create_empty_module(self.name))
-        for variable in code.global_variables:
-            if variable.name.startswith(_ENVIRONMENT):
-                shell += f'\n@"{variable.name}" = common global i8* null'
-        self._final_module = llvm.parse_assembly(shell)
+        self._final_module = _shell(self, code)
         self._final_module.name = self.name
         super()._finalize_final_module()
         self._shared_module = code
@@ -71,6 +78,13 @@ class EntryLibrary(JITCodeLibrary):
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
                 function.linkage = "internal"
         super()._optimize_final_module()
+
+    def _get_module_for_linking(self) -> Any:
+        """What is cached beside the machine code: nothing links an entry, and Numba wants to know its names only."""
+        self._ensure_finalized()
+        code: Any = self._final_module
+        external = [f for f in code.functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
+        return _shell(self, code, tuple(f.name for f in external))
 
 
 _NUMBERS = (types.float64, types.int64)

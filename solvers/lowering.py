@@ -8,43 +8,24 @@ is every index when bounds are checked.
 
 from __future__ import annotations
 
-import operator
 from collections import Counter
-from collections.abc import Callable
 from typing import Any
 
 from llvmlite.ir import Constant, IntType
-from numba.core import cgutils, ir, types
+from numba import types
+from numba.core import cgutils, ir
 from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs, must_use_alloca
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
+from solvers.arithmetic import ARITHMETIC
 from solvers.arrays import DATA, SHAPE, STRIDES, WORD, ArrayWords
 from solvers.record import RecordType, field_words
 
 __all__ = ["KernelLowering"]
 
 _NUMBERS = (types.float64, types.int64)
-
-
-def _arithmetic() -> dict[Any, Callable[..., Any]]:
-    """What writes an operator of two numbers of one type, by both."""
-    table: dict[Any, Callable[..., Any]] = {}
-    for name in ("add", "sub", "mul"):
-        for op in (getattr(operator, name), getattr(operator, f"i{name}")):
-            table[op, types.float64] = lambda b, x, y, f=f"f{name}": getattr(b, f)(x, y)
-            table[op, types.int64] = lambda b, x, y, f=name: getattr(b, f)(x, y, flags=["nsw"])
-    table[operator.truediv, types.float64] = lambda b, x, y: b.fdiv(x, y)
-    for op, sign in zip((operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne),
-                        ("<", "<=", ">", ">=", "==", "!="), strict=True):  # fmt: skip
-        real = "fcmp_unordered" if sign == "!=" else "fcmp_ordered"  # NaN differs from everything
-        table[op, types.float64] = lambda b, x, y, f=real, s=sign: getattr(b, f)(s, x, y)
-        table[op, types.int64] = lambda b, x, y, s=sign: b.icmp_signed(s, x, y)
-    return table
-
-
-_ARITHMETIC = _arithmetic()
 
 
 class _Lower(Lower):
@@ -66,7 +47,7 @@ class _Lower(Lower):
         for label, names in found.usemap.items():
             several |= {n for n in names if n in home and not (home[n] < label and home[n] in above[label])}
         self._singly_assigned_vars = set(home) - several - set(must_use_alloca(blocks))
-        self._blk_local_varmap = {}
+        self._blk_local_varmap: dict[str, Any] = {}
 
     def extract_function_arguments(self) -> list[Any]:
         """The arguments, arrays among them as words."""
@@ -170,7 +151,7 @@ class _Lower(Lower):
     def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
         """An operator of two numbers."""
         kinds = self.fndesc.calltypes[expr].args
-        write = _ARITHMETIC.get((op, kinds[0])) if kinds[0] == kinds[1] else None
+        write = ARITHMETIC.get((op, kinds[0])) if kinds[0] == kinds[1] else None
         if write is None:
             return super().lower_binop(resty, expr, op)
         x, y = (
@@ -241,25 +222,13 @@ class _Lower(Lower):
 
     def _write(self, inst: Any) -> bool:
         """array[index] = value, of an entry; False: not for us."""
-        index = inst.index if isinstance(inst, ir.SetItem) else inst.index_var
         name, kind = inst.target.name, self.typeof(inst.target.name)
-        if not isinstance(kind, types.Array) or isinstance(self.typeof(inst.value.name), types.Array):
+        place = self._place(name, inst.index if isinstance(inst, ir.SetItem) else inst.index_var)
+        if place is None or place[1]:
             return False
-        if self._many(index) != kind.ndim:
-            return False
-        place = self._place(name, index)
-        if place is None:
-            return False
-        value = self.context.cast(
-            self.builder, self.loadvar(inst.value.name), self.typeof(inst.value.name), kind.dtype
-        )
+        value = self.context.cast(self.builder, self.loadvar(inst.value.name), self.typeof(inst.value.name), kind.dtype)
         self.builder.store(value, place[0])
         return True
-
-    def _many(self, index: Any) -> int:
-        """How many numbers an index has."""
-        kind = self.typeof(index.name)
-        return len(kind.types) if isinstance(kind, types.BaseTuple) else 1
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
