@@ -8,7 +8,10 @@ the optimiser may drop arguments nobody reads and copies nobody calls.
 
 from __future__ import annotations
 
+import gc
 import operator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -18,6 +21,7 @@ from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
+from solvers.lowering import KernelLowering
 from solvers.notice import compiling
 
 __all__ = ["EntryCompiler", "InnerCompiler"]
@@ -25,8 +29,30 @@ __all__ = ["EntryCompiler", "InnerCompiler"]
 _ENVIRONMENT = "_ZN08NumbaEnv"  # Numba looks for such a variable of every function
 
 
+def _shell(library: Any, module: Any, functions: tuple[str, ...] = ()) -> Any:
+    """A module with the names of another: variables that Numba looks for, and these functions, without their code."""
+    text = str(library._codegen._create_empty_module(library.name))
+    for variable in module.global_variables:
+        if variable.name.startswith(_ENVIRONMENT):
+            text += f'\n@"{variable.name}" = common global i8* null'
+    for name in functions:
+        text += f'\ndefine void @"{name}"() {{\n  ret void\n}}'
+    return llvm.parse_assembly(text)
+
+
 class InnerLibrary(JITCodeLibrary):
-    """Code of a kernel for its callers: not optimised beyond single functions, never translated."""
+    """Code of a kernel for its callers: made smaller, not optimised, never translated."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Numba runs all of its optimisations here; each entry does so again, on what these three leave."""
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = llvm.create_new_function_pass_manager(), self._codegen._pass_builder()
+        passes.add_sroa_pass()
+        passes.add_instruction_combine_pass()
+        passes.add_simplify_cfg_pass()
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def _optimize_final_module(self) -> None:
         """Left to the entries."""
@@ -38,11 +64,7 @@ class InnerLibrary(JITCodeLibrary):
         for function in code.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.external:
                 function.linkage = "linkonce_odr"
-        shell = str(self._codegen._create_empty_module(self.name))
-        for variable in code.global_variables:
-            if variable.name.startswith(_ENVIRONMENT):
-                shell += f'\n@"{variable.name}" = common global i8* null'
-        self._final_module = llvm.parse_assembly(shell)
+        self._final_module = _shell(self, code)
         self._final_module.name = self.name
         super()._finalize_final_module()
         self._shared_module = code
@@ -56,6 +78,13 @@ class EntryLibrary(JITCodeLibrary):
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
                 function.linkage = "internal"
         super()._optimize_final_module()
+
+    def _get_module_for_linking(self) -> Any:
+        """What is cached beside the machine code: nothing links an entry, and Numba wants to know its names only."""
+        self._ensure_finalized()
+        code: Any = self._final_module
+        external = [f for f in code.functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
+        return _shell(self, code, tuple(f.name for f in external))
 
 
 _NUMBERS = (types.float64, types.int64)
@@ -85,7 +114,7 @@ for _operator in _COMPARED:
     _number_of(_operator, dict.fromkeys(_NUMBERS, types.boolean))
 _number_of(operator.truediv, {types.float64: types.float64})
 
-_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions
+_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
     untyped_passes.RewriteDynamicRaises,
@@ -95,7 +124,25 @@ _IDLE = (  # passes for what kernels do not do: closures, array expressions, lit
     untyped_passes.LiteralPropagationSubPipelinePass,
     typed_passes.NopythonRewrites,
     typed_passes.DumpParforDiagnostics,
+    typed_passes.AnnotateTypes,
+    typed_passes.IRLegalization,  # where variables end, of which _Lower takes no notice
 )
+
+
+_SELDOM = (50_000, 20, 100)  # thresholds of the garbage collector
+
+
+@contextmanager
+def _seldom_collected() -> Iterator[None]:
+    """Collect garbage seldom: a compilation makes millions of objects of which most stay while it goes on, and going
+    through them again and again was an eighth of a cold start.
+    """
+    before = gc.get_threshold()
+    gc.set_threshold(*_SELDOM)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 class _Compiler(Compiler):
@@ -107,7 +154,12 @@ class _Compiler(Compiler):
         """Which passes, in which order."""
         (default,) = super().define_pipelines()
         chosen = PassManager(default.pipeline_name)
-        chosen.passes = [entry for entry in default.passes if entry[0] not in _IDLE]
+        lowering = typed_passes.NativeLowering
+        chosen.passes = [
+            (KernelLowering, said) if kind is lowering else (kind, said)
+            for kind, said in default.passes
+            if kind not in _IDLE
+        ]
         chosen.finalize()
         return [chosen]
 
@@ -116,7 +168,7 @@ class _Compiler(Compiler):
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        with compiling():
+        with compiling(), _seldom_collected():
             return super().compile_extra(func)
 
 

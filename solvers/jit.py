@@ -1,5 +1,5 @@
-"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is imported here, in code.py, late.py,
-lanes.py and record.py only.)
+"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is imported here and in code.py,
+lowering.py, arithmetic.py, lanes.py, late.py and record.py only.)
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the cache folder is named by a digest of every source file that can reach a kernel, so any edit

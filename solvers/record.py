@@ -24,8 +24,9 @@ from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
-from numba.np.arrayobj import populate_array
 from numpy.typing import NDArray
+
+from solvers.arrays import WORD, ArrayWords
 
 Table = NDArray[np.int64]
 R = TypeVar("R")
@@ -70,22 +71,21 @@ class RecordAttribute(AttributeTemplate):
 
 @lower_getattr_generic(RecordType)
 def _field(context: Any, builder: Any, record: RecordType, value: Any, name: str) -> Any:
+    """The array of one field."""
+    return field_words(context, builder, record, value, name).value(builder, context.get_value_type(record.array(name)))
+
+
+def field_words(context: Any, builder: Any, record: RecordType, value: Any, name: str) -> ArrayWords:
     """The array of one field, from its three words of the table."""
     k, field = record.fields[name]
-    kind = record.array(name)
-    array = context.make_array(kind)(context, builder)
-    item = context.get_data_type(kind.dtype).as_pointer()
-    data = load_word(builder, value, item, 3 * k)
-    shape = [load_word(builder, value, cgutils.intp_t, 3 * k + 1)]
-    strides = [cgutils.intp_t(8)]
+    data = load_word(builder, value, context.get_data_type(record.array(name).dtype).as_pointer(), 3 * k)
+    shape = [load_word(builder, value, WORD, 3 * k + 1)]
+    strides = [WORD(8)]
     if field.columns is not None:
-        columns = (
-            cgutils.intp_t(field.columns) if field.columns else load_word(builder, value, cgutils.intp_t, 3 * k + 2)
-        )
+        columns = WORD(field.columns) if field.columns else load_word(builder, value, WORD, 3 * k + 2)
         shape.append(columns)
-        strides = [builder.mul(columns, strides[0]), strides[0]]
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=cgutils.intp_t(8), meminfo=None)
-    return array._getvalue()
+        strides = [WORD(8 * field.columns) if field.columns else builder.mul(columns, WORD(8)), WORD(8)]
+    return ArrayWords.of(builder, data, shape, strides)
 
 
 def load_word(builder: Any, table: Any, kind: Any, k: int) -> Any:

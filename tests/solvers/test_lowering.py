@@ -1,0 +1,115 @@
+"""Arrays and numbers in kernels mean what they mean in Python: solvers/lowering.py writes their instructions itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solvers.jit import kernel
+
+
+@kernel
+def _negative(a, i, out):
+    """Indices from the end, known and unknown ones, of an entry and of a row."""
+    row = a[-1]
+    out[0] = a[i, -2]
+    out[1] = row[i]
+    out[-1] = a[i][i]
+    out[2] = a[i - 1, i]
+
+
+@kernel
+def _variable_index(a, i, out):
+    """An index kept in a variable stays what it was when its parts change."""
+    at = (i, i + 1)
+    i += 1
+    out[0] = a[at]
+    out[1] = a[i, 0]
+    if out[0] > 0.0:
+        at = (0, 0)
+    out[2] = a[at]
+
+
+@kernel
+def _deep(c, t, out):
+    """Rows and entries of three dimensions, their shapes, strides and sizes."""
+    page = c[t]
+    row = c[t, 1]
+    out[0] = page[1, 2] + row[3] + c[t, 0, 1]
+    out[1] = page.shape[0] * 100 + row.shape[0] * 10 + page.size
+    out[2] = page.strides[0] + row.strides[0]
+    for k in range(row.shape[0]):
+        row[k] += k
+    tail = row[1:]
+    tail[0] = 7.0
+
+
+@kernel
+def _mixed(n, x, counts, out):
+    """Whole numbers among reals, and reals cut to whole numbers."""
+    counts[0] = 7.9
+    counts[1] += n
+    out[0] = n
+    out[1] = n / 2
+    out[2] = x * n - counts[1]
+    out[n] = 2 * counts[0] + (n > x)
+
+
+@kernel
+def _compared(x, y, out):
+    """Whatever is compared with NaN is false, but for `!=`."""
+    out[0] = 1.0 * (x < y) + 2.0 * (x <= y) + 4.0 * (x > y) + 8.0 * (x >= y)
+    out[1] = 1.0 * (x == y) + 2.0 * (x != y)
+    out[2] = x / y
+
+
+@kernel
+def _loop(a, out):
+    """Variables of several blocks, and one that a loop ends with."""
+    best = -1
+    for i in range(a.shape[0]):
+        row = a[i]
+        if row[0] > 0.0:
+            best = i
+            kept = row
+        if best >= 0:
+            out[0] += kept[1]
+    out[1] = best
+    out[2] = a[best, 1]
+
+
+def _matrix() -> np.ndarray:
+    return np.arange(12.0).reshape(3, 4) - 5.0
+
+
+def _cube() -> np.ndarray:
+    return np.arange(24.0).reshape(2, 3, 4)
+
+
+_CASES = [
+    (_negative, lambda: (_matrix(), -1)),
+    (_negative, lambda: (_matrix(), 1)),
+    (_variable_index, lambda: (_matrix(), 1)),
+    (_variable_index, lambda: (_matrix(), -2)),
+    (_deep, lambda: (_cube(), 1)),
+    (_deep, lambda: (_cube(), -2)),
+    (_mixed, lambda: (3, 2.5, np.arange(4))),
+    (_mixed, lambda: (-1, 2.5, np.arange(4))),
+    (_compared, lambda: (1.0, np.nan)),
+    (_compared, lambda: (np.float64(1.0), np.float64(-0.0))),
+    (_compared, lambda: (2.0, 2.0)),
+    (_loop, lambda: (_matrix(),)),
+    (_loop, lambda: (-_matrix(),)),
+]
+
+
+@pytest.mark.parametrize(("kernel_", "arguments"), _CASES)
+def test_the_same_as_in_python(kernel_, arguments):
+    ours, theirs = arguments(), arguments()
+    out, expected = np.zeros(4), np.zeros(4)
+    kernel_(*ours, out)
+    with np.errstate(divide="ignore"):
+        kernel_.py_func(*theirs, expected)
+    assert np.array_equal(out, expected, equal_nan=True)
+    for a, b in zip(ours, theirs, strict=True):
+        assert np.array_equal(a, b, equal_nan=True)
