@@ -15,8 +15,8 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
   overlap is none (pairs/choice.py).
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0. Some solutions lie beyond folds (legs that jam between a joint limit
-  and the ground), and without a part of the friction Newton's method only creeps towards them: two attempts of four
-  take its direction as it is.
+  and the ground), and without a part of the friction Newton's method only creeps towards them: late attempts, two of
+  four, take its direction as it is.
 """
 
 from __future__ import annotations
@@ -58,11 +58,12 @@ _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of pos
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
 _WORSE, _WORSE_LED = 10.0, 2.0  # times the residual before: what smaller violations may cost, before _LED and after
 _ATTEMPTS = 60
-_PATIENCE = 30  # iterations of an attempt
+_PATIENCE, _PATIENCE_AT_KAPPA = 30, 12  # iterations of an attempt; of attempt 0, which ends soon or not at all
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
 _FASTER = 0.1  # times the residual before: what Newton's method leaves of it where that is so
+_BEYOND = 8  # first attempt that folds do not stop
 _FEW = 4  # halvings; an attempt that needs more is given up
 
 
@@ -103,8 +104,8 @@ def try_from(
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
     known = smoothing <= kappa  # what sticks and what slides: from the start
-    beyond = attempt > 3 and attempt % 4 < 2
-    patience = iterations + _PATIENCE
+    beyond = attempt >= _BEYOND and attempt % 4 < 2
+    patience = iterations + (_PATIENCE if attempt != 0 else _PATIENCE_AT_KAPPA)
     halvings = 0
     merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)
     while smoothing > 0.0 and merit.residual < 1e300:
