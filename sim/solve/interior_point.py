@@ -58,7 +58,7 @@ _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of pos
 _LED = 2  # first attempt whose friction smoothing is led down step by step; before, it follows the normal impulses
 _WORSE, _WORSE_LED = 10.0, 2.0  # times the residual before: what smaller violations may cost, before _LED and after
 _ATTEMPTS = 60
-_PATIENCE, _PATIENCE_AT_KAPPA = 30, 12  # iterations of an attempt; of attempt 0, which ends soon or not at all
+_PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
@@ -105,7 +105,7 @@ def try_from(
     ratio = 1e-2
     known = smoothing <= kappa  # what sticks and what slides: from the start
     beyond = attempt >= _BEYOND and attempt % 4 < 2
-    patience = iterations + (_PATIENCE if attempt != 0 else _PATIENCE_AT_KAPPA)
+    patience = iterations + _PATIENCE
     halvings = 0
     merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)
     while smoothing > 0.0 and merit.residual < 1e300:
