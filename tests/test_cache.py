@@ -124,7 +124,7 @@ FEATURES = (  # what few scenes have: rooms and files with kernels of their own
 )  # fmt: skip
 NOUNS = (  # what users write and mechanisms ask their parts for
     "sim.collision.broad", "sim.collision.kinds", "sim.contacts.clusters", "sim.contacts.left_out",
-    "sim.coupling.closing", "sim.coupling.closure", "sim.pairs.touch",
+    "sim.coupling.closing", "sim.coupling.closure", "sim.coupling.loop_rank", "sim.coupling.nearest", "sim.pairs.touch",
     "sim.joints.swing_coordinates", "sim.terrain.ball_surface", "sim.terrain.spline", "sim.terrain.terrain",
 )  # fmt: skip
 

@@ -107,8 +107,8 @@ def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float
 def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
-    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where the law may have it,
-    no faster than -kappa beta/c and not along beta, and otherwise -kappa beta/c: then the matrix is definite.
+    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where that is near what the
+    law says, against beta and at most twice as fast, and otherwise what it says, -kappa beta/c: the matrix is definite.
     """
     x, y, b1, b2 = k[1], k[2], z[2], z[3]
     n = b1 * b1 + b2 * b2
@@ -116,7 +116,7 @@ def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: floa
     r1, r2 = c * x + kappa * b1, c * y + kappa * b2
     s1, s2 = x, y
     f = kappa / c
-    if x * b1 + y * b2 > 0.0 or x * x + y * y > f * f * n:
+    if x * b1 + y * b2 > 0.0 or x * x + y * y > 4.0 * f * f * n:
         s1, s2 = -f * b1, -f * b2
     e = 2.0 / (kappa - 2.0 * (s1 * b1 + s2 * b2))
     g = -c / kappa
