@@ -129,9 +129,11 @@ def descend(model: Model, work: Work) -> None:
 
 
 @kernel
-def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
+def predict(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]
+) -> tuple[tuple[float, float], bool]:
     """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, infinite where that
-    fails.
+    fails, and whether the impulses have settled.
 
     At nu with the impulses of the step before, whose residual is in work.residual.
     """
@@ -143,11 +145,11 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     momentum_balance_jacobian(model, work, h, work.A)
     joint_blocks(model, work, h, q, v)
     if factor(model, work) == 0:
-        return balance
+        return balance, False
     descend(model, work)
     points, size = choose(model, work, h, kappa)
     if size < 0:
-        return balance
+        return balance, False
     rates(model, work, h, points, size)
     delassus(model, work, h, points, size)
     settled = True
@@ -160,11 +162,11 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
         for d in range(v.shape[0]):
             work.dnu[d] += work.nu[d]
         if not place(model, work, h, q, work.dnu, 1.0):
-            return 1e301, 1e301
+            return (1e301, 1e301), False
         touch_inequalities(model, work, h, kappa)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
-            return balance
+            return balance, settled
         step += 1
         for j in range(0, 3 * points, 3):
             contact_jacobian(model, work, h, work.reach_of[j])
