@@ -38,7 +38,6 @@ class Beginning(NamedTuple):
     attempt: int
     kappa: float  # of the central path on which attempt 0 starts
     balance: tuple[float, float]  # residuals there
-    known: bool  # whether it is known what sticks and what slides
 
 
 @kernel
@@ -53,8 +52,8 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
     kappa = options.kappa
     if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         if place(model, work, h, q, guess.velocity, 1.0):
-            return Beginning(0, kappa, residuals(model, work, h, q, v, u), False)
-        return Beginning(1, kappa, _NOWHERE, False)
+            return Beginning(0, kappa, residuals(model, work, h, q, v, u))
+        return Beginning(1, kappa, _NOWHERE)
     keep_inequalities(model, work)
     if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
         if predictable(model, work):
@@ -63,17 +62,17 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
                 return beginning
         return resume(model, work, options, inputs, guess.velocity)
     if not place(model, work, h, q, v, 1.0):
-        return Beginning(1, kappa, _NOWHERE, False)
+        return Beginning(1, kappa, _NOWHERE)
     start_inequalities(model, work, h, kappa, 1.0)
     usual, _ = residuals(model, work, h, q, v, u)
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and guess.velocity[d] == v[d]
     if not placed and not place(model, work, h, q, guess.velocity, 1.0):
-        return Beginning(1, kappa, _NOWHERE, False)
+        return Beginning(1, kappa, _NOWHERE)
     start_inequalities(model, work, h, kappa, 0.0)
     hard = residuals(model, work, h, q, v, u)
-    return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard, False)
+    return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard)
 
 
 @inlined
@@ -86,13 +85,12 @@ def go_on(
     """
     q, v, u = inputs
     if not place(model, work, options.h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, _NOWHERE, False)
+        return Beginning(1, options.kappa, _NOWHERE)
     move_inequalities(model, work, 0.0)
     balance = residuals(model, work, options.h, q, v, u)
-    known = False
     if balance[0] > _GOES_ON * total_impulse(model, work):
-        balance, known = predict(model, work, options, inputs)
-    return Beginning(0 if balance[0] < 1e300 else 1, options.kappa, balance, known)
+        balance = predict(model, work, options, inputs)
+    return Beginning(0 if balance[0] < 1e300 else 1, options.kappa, balance)
 
 
 @inlined
@@ -106,16 +104,16 @@ def resume(
     q, v, u = inputs
     h = options.h
     if not place(model, work, h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, _NOWHERE, False)
+        return Beginning(1, options.kappa, _NOWHERE)
     kappa = max(options.kappa, _RESUMED)
     resume_inequalities(model, work, h, kappa)
     away, _ = residuals(model, work, h, q, v, u)
     move_inequalities(model, work, 0.0)
     last = residuals(model, work, h, q, v, u)
     if last[0] < _BALANCED * away:
-        return Beginning(0, options.kappa, last, False)
+        return Beginning(0, options.kappa, last)
     resume_inequalities(model, work, h, kappa)
-    return Beginning(0, kappa, residuals(model, work, h, q, v, u), False)
+    return Beginning(0, kappa, residuals(model, work, h, q, v, u))
 
 
 @inlined

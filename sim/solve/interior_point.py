@@ -103,7 +103,7 @@ def try_from(
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
-    known = attempt == 0 and beginning.known
+    known = smoothing <= kappa  # what sticks and what slides: from the start
     beyond = attempt >= _BEYOND and attempt % 4 < 2
     patience = iterations + _PATIENCE
     halvings = 0

@@ -129,11 +129,9 @@ def descend(model: Model, work: Work) -> None:
 
 
 @kernel
-def predict(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]
-) -> tuple[tuple[float, float], bool]:
+def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
     """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, infinite where that
-    fails, and whether the impulses have settled.
+    fails.
 
     At nu with the impulses of the step before, whose residual is in work.residual.
     """
@@ -145,11 +143,11 @@ def predict(
     momentum_balance_jacobian(model, work, h, work.A)
     joint_blocks(model, work, h, q, v)
     if factor(model, work) == 0:
-        return balance, False
+        return balance
     descend(model, work)
     points, size = choose(model, work, h, kappa)
     if size < 0:
-        return balance, False
+        return balance
     rates(model, work, h, points, size)
     delassus(model, work, h, points, size)
     settled = True
@@ -162,11 +160,11 @@ def predict(
         for d in range(v.shape[0]):
             work.dnu[d] += work.nu[d]
         if not place(model, work, h, q, work.dnu, 1.0):
-            return (1e301, 1e301), False
+            return 1e301, 1e301
         touch_inequalities(model, work, h, kappa)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
-            return balance, settled
+            return balance
         step += 1
         for j in range(0, 3 * points, 3):
             contact_jacobian(model, work, h, work.reach_of[j])
