@@ -8,39 +8,38 @@ from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
-from sim.options import Goal, Options
+from sim.options import Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
-from sim.solve.merit import Merit, is_near
 from sim.work import Work
 from solvers.jit import inlined
 
-_CUT = 0.9  # of the Newton step: where the boundary is closer, something slides that should have stuck
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
 
 
 @inlined
 def linearize_step(
-    model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float, whole: bool, linear: bool
+    model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float, near: bool, beyond: bool
 ) -> bool:
     """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular.
 
     Beyond a fold of the path, where the determinant is negative, Newton's direction leads back into the fold. There the
     growth of the friction with the normal impulse, and the turning of the arms of impulses, count by a half, then less:
     without them the matrix is that of a step whose friction bounds and arms are given, which has no folds of theirs.
-    Newton's direction where no share of them helps, and where `whole`: near a solution, whose determinant may be
-    negative, too. Four corners on curved ground hold a box in more directions than a plane does, one of them hardly,
-    and friction that grows with the impulses outweighs that hold. All other directions lead away from such a solution.
+    Newton's direction where no share of them helps, where folds are none of its business (`beyond`), and near a
+    solution, whose determinant may be negative, too. Four corners on curved ground hold a box in more directions than
+    a plane does, one of them hardly, and friction that grows with the impulses outweighs that hold. All other
+    directions lead away from such a solution.
     """
     velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     sign = 0
-    shares = 0 if whole else _SHARES
+    shares = 0 if near or beyond else _SHARES
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
         momentum_balance_jacobian(model, work, h, work.A)
         joint_blocks(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share, linear)
+        condense_inequalities(model, work, h, smoothing, share, near)
         sign = factor(model, work)
         if sign >= 0:
             break
@@ -82,31 +81,3 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
                 break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3
     return alpha
-
-
-@inlined
-def newton_direction(
-    model: Model,
-    work: Work,
-    options: Options,
-    inputs: tuple[Vector, Vector, Vector],
-    smoothing: float,
-    merit: Merit,
-    beyond: bool,
-    known: bool,
-) -> tuple[float, bool]:
-    """`direction` at the present iterate: the step to the boundary, below 0 where the matrix is singular; and `known`.
-
-    beyond: whether folds are none of its business;  known: whether what sticks and what slides is. Where it is,
-    contacts that stick take the law that is linear in the slip, as near a solution; a step that the boundary cuts short
-    says that it was not, and is taken anew.
-    """
-    q, v, _ = inputs
-    near = is_near(merit, options.kappa)
-    while True:
-        if not linearize_step(model, work, options.h, q, v, smoothing, near or beyond, near or known):
-            return -1.0, known
-        boundary = direction(model, work, options.h, options.kappa, merit.mean)
-        if near or not known or boundary > _CUT:
-            return boundary, known
-        known = False

@@ -40,9 +40,9 @@ from sim.options import (
 )
 from sim.solve.central_path import AGAIN, Beginning, begin, start
 from sim.solve.complementarity import products, slip_error
-from sim.solve.direction import newton_direction
+from sim.solve.direction import direction, linearize_step
 from sim.solve.line_search import search
-from sim.solve.merit import Merit, follow, judge, residuals
+from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
@@ -62,7 +62,6 @@ _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
-_FASTER = 0.1  # times the residual before: what Newton's method leaves of it where that is so
 _BEYOND = 8  # first attempt that folds do not stop
 _FEW = 4  # halvings; an attempt that needs more is given up
 
@@ -103,7 +102,6 @@ def try_from(
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
-    known = smoothing <= kappa  # what sticks and what slides: from the start
     beyond = attempt >= _BEYOND and attempt % 4 < 2
     patience = iterations + _PATIENCE
     halvings = 0
@@ -130,12 +128,10 @@ def try_from(
         if iterations >= patience or halvings > _FEW:
             break
         iterations += 1
-        boundary, known = newton_direction(model, work, options, inputs, smoothing, merit, beyond, known)
-        if boundary < 0.0:
+        if not linearize_step(model, work, h, q, v, smoothing, is_near(merit, kappa), beyond):
             return Outcome(_SINGULAR, iterations, merit.residual, merit.violation)
-        last = merit.residual
+        boundary = direction(model, work, h, kappa, merit.mean)
         merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)
-        known = known and halvings == 0 and merit.residual < _FASTER * last
     return Outcome(_NO_PROGRESS, iterations, merit.residual, merit.violation)
 
 
