@@ -39,6 +39,13 @@ CELLS = (
 )
 
 
+def thrown(sim, start):
+    """The neutral state with the random velocity of a fall of benchmarks/falls.py."""
+    x = sim.neutral()
+    x[sim.nq :] += np.random.default_rng(start).normal(size=sim.nv)
+    return x
+
+
 @pytest.fixture(scope="module")
 def robustness():
     yield from loaded("robustness")
@@ -91,9 +98,7 @@ def test_foot_between_sticking_and_sliding(kappa):
 def test_a_walker_lands_at_a_stop_of_its_knee(kappa):
     """The second-order term of the predictor cancelled the product of a joint limit: Newton's steps were zero."""
     sim = dojo.Simulator(dojo.models.walker(), time_step=0.02, kappa=kappa)
-    x = sim.neutral()
-    x[sim.nq :] += np.random.default_rng(1).normal(size=sim.nv)
-    sim.rollout(x, np.zeros((50, sim.nu)), throw=True)
+    sim.rollout(thrown(sim, 1), np.zeros((50, sim.nu)), throw=True)
 
 
 @pytest.mark.parametrize("time_step, pitches", [(0.005, (0.1, 0.12, 0.2)), (0.01, (0.11, 0.14)), (0.02, (0.16, 0.21))])
@@ -103,3 +108,10 @@ def test_legs_that_jam_between_a_joint_limit_and_the_ground(time_step, pitches):
         x = sim.neutral()
         x[2] += pitch
         sim.rollout(x, np.zeros((round(0.7 / time_step), sim.nu)), throw=True)
+
+
+@pytest.mark.parametrize("name, start, knot", [("walker", 5, 1), ("twister", 5, 50)])
+def test_friction_that_follows_the_impulses_from_a_large_kappa(name, start, knot):
+    """Falls that ended where the friction of all but the first attempts was led down step by step."""
+    sim = dojo.Simulator(getattr(dojo.models, name)(), time_step=0.02, kappa=1e-10 if name == "walker" else 1e-6)
+    sim.rollout(thrown(sim, start), np.zeros((knot, sim.nu)), throw=True)
