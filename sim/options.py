@@ -45,7 +45,8 @@ class Outcome(NamedTuple):
 # starts, with those that pressed kept beside them
 AT_START, AT_EVERY_POSE, BESIDE_KEPT = 0, 1, 2
 
-# what a solution says of them: they are those that touch; others overlap; a point has gone through the other shape
-PLACED, OVERLAPPING, ASTRAY = 0, 1, 2
+# what a solution says of them: they are those that touch; others overlap; a point has gone through the other shape; and
+# whatever touches, joints gave energy
+PLACED, OVERLAPPING, ASTRAY, WOUND_UP = 0, 1, 2, 3
 
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

@@ -1,6 +1,6 @@
 """The interior point of a step: Newton's method on the joint velocities, contacts and limits held on the central path.
 
-Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
+Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
   beta by Newton, at a `smoothing` that follows down to kappa (contacts/friction.py); only gaps and normal impulses have
@@ -13,6 +13,7 @@ Seven things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
 * Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
   overlap is none (pairs/choice.py).
+* Nor is one in which joints gave energy (joints/work.py): impulses and large turns can wind one another up.
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0. Some solutions lie beyond folds (legs that jam between a joint limit
   and the ground), and without a part of the friction Newton's method only creeps towards them: late attempts, two of
@@ -25,6 +26,7 @@ from __future__ import annotations
 from sim import late
 from sim.contacts.far import came_near, choose_far
 from sim.contacts.friction import slip_noise
+from sim.joints.work import joints_gained
 from sim.late import begin_pairs, find_impacts, gained_energy, overlapping, pairs_gained
 from sim.model import Model, Vector
 from sim.options import (
@@ -35,6 +37,7 @@ from sim.options import (
     FAILED,
     OVERLAPPING,
     PLACED,
+    WOUND_UP,
     Guess,
     Options,
     Outcome,
@@ -54,6 +57,7 @@ _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 _COLLISION_STEP = int(Status.COLLISION_STEP)
+_JOINT_STEP = int(Status.JOINT_STEP)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 # first attempt whose friction smoothing is led down step by step; before, and late in all from a share of the velocity,
@@ -67,6 +71,7 @@ _REPLACED = 2  # last attempt whose first repetition has the new elements only; 
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
 _BEYOND = 8  # first attempt that folds do not stop
 _FEW = 4  # halvings; an attempt that needs more is given up
+_EASY = 10  # iterations; the work of joints is looked at in steps that took more
 
 
 @inlined
@@ -140,12 +145,18 @@ def try_from(
 
 
 @inlined
-def misplacement(model: Model, work: Work, options: Options, v: Vector, status: int) -> int:
-    """What a solution says of the elements chosen, as `overlapping`; ASTRAY also where collisions gave energy."""
-    if status != _SOLVED:
+def misplacement(model: Model, work: Work, options: Options, v: Vector, out: Outcome) -> int:
+    """What a solution says of the elements chosen, as `overlapping`; ASTRAY also where collisions gave energy, WOUND_UP
+    where joints did.
+    """
+    if out.status != _SOLVED:
         return PLACED
     found = overlapping(model, work)
-    return ASTRAY if found == PLACED and pairs_gained(model, work, options, v) else found
+    if found == PLACED and pairs_gained(model, work, options, v):
+        return ASTRAY
+    if found == PLACED and out.iterations > _EASY and joints_gained(model, work, options.h, v):
+        return WOUND_UP
+    return found
 
 
 @late.interior_point.defined(otherwise=FAILED)
@@ -165,22 +176,28 @@ def interior_point(
         work.pair_free[0] = AT_START
         work.pair_free[1] = 0
         beginning = begin(model, work, options, (q, v, u), guess)
+        wound_up = False
         for attempt in range(beginning.attempt, _ATTEMPTS):
+            if wound_up and attempt % 2 == 1:  # beyond folds there are more such solutions
+                continue
             work.pair_free[1] = 1 if attempt >= _LENIENT else 0
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, beginning)
-            misplaced = misplacement(model, work, options, v, out.status)
+            misplaced = misplacement(model, work, options, v, out)
             for choice in range(_CHOICES):
                 if misplaced != OVERLAPPING or work.pair_free[0] == AT_EVERY_POSE:
                     break
                 if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = BESIDE_KEPT
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, beginning)
-                misplaced = misplacement(model, work, options, v, out.status)
+                misplaced = misplacement(model, work, options, v, out)
             if misplaced == PLACED and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
-            why = _NO_PROGRESS if misplaced == PLACED else _COLLISION_STEP
+            why = _COLLISION_STEP if misplaced == OVERLAPPING or misplaced == ASTRAY else _NO_PROGRESS
+            wound_up = wound_up or misplaced == WOUND_UP
             out = Outcome(why, out.iterations, out.residual, out.violation)
             work.pair_free[0] = AT_EVERY_POSE if (attempt + 1) // 2 % 2 == 1 else AT_START
+        if wound_up and out.status != _SOLVED:
+            out = Outcome(_JOINT_STEP, out.iterations, out.residual, out.violation)
         if came_near(model, work):
             continue
         if out.status != _SOLVED or not gained_energy(model, work, options.h):

@@ -115,3 +115,19 @@ def test_friction_that_follows_the_impulses_from_a_large_kappa(name, start, knot
     """Falls that ended where the friction of all but the first attempts was led down step by step."""
     sim = dojo.Simulator(getattr(dojo.models, name)(), time_step=0.02, kappa=1e-10 if name == "walker" else 1e-6)
     sim.rollout(thrown(sim, start), np.zeros((knot, sim.nu)), throw=True)
+
+
+@pytest.mark.parametrize("kappa", [None, 1e-6, 1e-10])
+@pytest.mark.parametrize("start, ends", [(1, dojo.Status.JOINT_STEP), (2, dojo.Status.SOLVED)])
+def test_joints_give_no_energy(start, ends, kappa):
+    """Atlas falls on its feet with 2 kJ. In one step, joints and friction wound one another up to 70 kJ and more.
+
+    The second start has a solution beside that. The first has none with 10 ms, and with half of it has.
+    """
+    sim = dojo.Simulator(dojo.models.atlas(), time_step=0.01, kappa=kappa)
+    fall = sim.rollout(thrown(sim, start), np.zeros((100, sim.nu)))
+    assert fall.status == ends, fall.message
+    assert np.diff([sim.energy(x) for x in fall.x]).max() < 1.0  # [J]
+    half = sim.replace(time_step=0.005)
+    then = half.rollout(fall.x[-1], np.zeros((2, sim.nu)), throw=True)
+    assert half.energy(then.x[-1]) < half.energy(fall.x[-1]) + 1.0
