@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from sim.dynamics import momentum_balance_jacobian
 from sim.elimination import factor, solve
-from sim.joints.terms import joint_blocks
-from sim.kinematics import velocity_columns
 from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
 from sim.options import Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
+from sim.solve.matrix import free_matrix
 from sim.work import Work
 from solvers.jit import inlined
 
@@ -32,13 +30,11 @@ def linearize_step(
     a plane does, one of them hardly, and friction that grows with the impulses outweighs that hold. All other
     directions lead away from such a solution.
     """
-    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
     sign = 0
     shares = 0 if near or beyond else _SHARES
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
-        momentum_balance_jacobian(model, work, h, work.A)
-        joint_blocks(model, work, h, q, v)
+        free_matrix(model, work, h, q, v)
         condense_inequalities(model, work, h, smoothing, share, near)
         sign = factor(model, work)
         if sign >= 0:

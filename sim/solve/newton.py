@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from sim import late
-from sim.dynamics import momentum_balance, momentum_balance_jacobian
-from sim.elimination import factor, solve
-from sim.joints.terms import joint_blocks
-from sim.kinematics import velocity_columns
+from sim.dynamics import momentum_balance
+from sim.elimination import solve
 from sim.late import apply_loops, factor_coupling, keep_loops, move_loops, solve_coupling
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import FAILED, Guess, Options, Outcome
+from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
@@ -44,10 +43,7 @@ def evaluate(
 @inlined
 def newton_step(model: Model, work: Work, h: float, q: Vector, v: Vector) -> bool:
     """H dnu = -R at nu, which becomes nu_trial; False when H is singular."""
-    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-    momentum_balance_jacobian(model, work, h, work.A)
-    joint_blocks(model, work, h, q, v)
-    if factor(model, work) == 0 or not factor_coupling(model, work):
+    if not factor_free(model, work, h, q, v) or not factor_coupling(model, work):
         return False
     for d in range(v.shape[0]):
         work.nu_trial[d] = work.nu[d]

@@ -12,14 +12,12 @@ from __future__ import annotations
 
 from sim.contacts.contact import contact_jacobian, contact_rate
 from sim.contacts.friction import law_of
-from sim.dynamics import momentum_balance_jacobian
-from sim.elimination import factor, solve
-from sim.joints.terms import joint_blocks
-from sim.kinematics import velocity_columns
+from sim.elimination import solve
 from sim.model import Law, Model, Vector
 from sim.options import Options
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import touch_inequalities
+from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.placing import place
 from sim.solve.residual import residual_scale
@@ -139,10 +137,7 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     h, kappa = options.h, options.kappa
     scale = residual_scale(work)
     balance = (1e301, 1e301)
-    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-    momentum_balance_jacobian(model, work, h, work.A)
-    joint_blocks(model, work, h, q, v)
-    if factor(model, work) == 0:
+    if not factor_free(model, work, h, q, v):
         return balance
     descend(model, work)
     points, size = choose(model, work, h, kappa)
