@@ -48,22 +48,18 @@ def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) 
 
 
 @kernel
-def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
-    """Variables of contact c on the central path of kappa, near its gap and the impulse that it had (in cone_trial)."""
-    z = work.cone[c]
-    z[0], z[1] = onto_path(work.contact_kin[c, 0], work.cone_trial[c, 1], h * _response(model, c), kappa)
-    _start_friction(model, work, c, kappa)
+def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float, predicted: bool) -> None:
+    """Variables of contact c on the central path of kappa, near its gap and the impulse that it had (in cone_trial).
 
-
-@kernel
-def touch_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
-    """Slack of contact c for its impulse, on the central path of kappa; where that hardly presses, both by its gap."""
+    predicted: near the impulse that it has now; where that presses, it stays, with its friction, and gives the slack.
+    """
     z = work.cone[c]
     weight = h * _response(model, c)
-    if weight * z[1] * z[1] > kappa:
-        z[0] = kappa / z[1]
+    impulse = z[1] if predicted else work.cone_trial[c, 1]
+    if predicted and weight * impulse * impulse > kappa:
+        z[0] = kappa / impulse
     else:
-        z[0], z[1] = onto_path(work.contact_kin[c, 0], z[1], weight, kappa)
+        z[0], z[1] = onto_path(work.contact_kin[c, 0], impulse, weight, kappa)
         _start_friction(model, work, c, kappa)
 
 

@@ -79,22 +79,18 @@ def limit_constants(model: Model, work: Work, goal: Goal) -> None:
 
 
 @kernel
-def resume_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
-    """All pairs on the central path of kappa, near their gaps and the impulses that they had (in bound_trial)."""
+def resume_limits(model: Model, work: Work, weight: float, kappa: float, predicted: bool) -> None:
+    """All pairs on the central path of kappa, near their gaps and the impulses that they had (in bound_trial).
+
+    predicted: near the impulses that they have now; those that press stay and give the slacks.
+    """
     for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
-        b[0], b[1] = onto_path(work.bound_gap[k], work.bound_trial[k, 1], weight, kappa)
-
-
-@kernel
-def touch_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
-    """Slacks for the impulses, on the central path of kappa; where those hardly press, both by the gap."""
-    for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        if weight * b[1] * b[1] > kappa:
-            b[0] = kappa / b[1]
+        impulse = b[1] if predicted else work.bound_trial[k, 1]
+        if predicted and weight * impulse * impulse > kappa:
+            b[0] = kappa / impulse
         else:
-            b[0], b[1] = onto_path(work.bound_gap[k], b[1], weight, kappa)
+            b[0], b[1] = onto_path(work.bound_gap[k], impulse, weight, kappa)
 
 
 @kernel

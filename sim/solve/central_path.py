@@ -106,13 +106,13 @@ def resume(
     if not place(model, work, h, q, velocity, 1.0):
         return Beginning(1, options.kappa, _NOWHERE)
     kappa = max(options.kappa, _RESUMED)
-    resume_inequalities(model, work, h, kappa)
+    resume_inequalities(model, work, h, kappa, False)
     away, _ = residuals(model, work, h, q, v, u)
     move_inequalities(model, work, 0.0)
     last = residuals(model, work, h, q, v, u)
     if last[0] < _BALANCED * away:
         return Beginning(0, options.kappa, last)
-    resume_inequalities(model, work, h, kappa)
+    resume_inequalities(model, work, h, kappa, False)
     return Beginning(0, kappa, residuals(model, work, h, q, v, u))
 
 

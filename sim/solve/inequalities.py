@@ -22,8 +22,8 @@ from sim.contacts.friction import (
     keep_in_cone,
     recover_contact,
     resume_contact,
+    return_contact,
     start_contact,
-    touch_contact,
 )
 from sim.elimination import dot_six, subtree_sums
 from sim.joints.limits import (
@@ -33,7 +33,7 @@ from sim.joints.limits import (
     limit_gaps,
     recover_limits,
     resume_limits,
-    touch_limits,
+    return_limits,
 )
 from sim.late import (
     add_frame_matrix,
@@ -53,7 +53,7 @@ from sim.work import Work
 from solvers.jit import kernel
 
 _KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
-LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
+_LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
 
 
 @kernel
@@ -87,7 +87,7 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
     for j in range(model.limit_dof.shape[0]):
         d = -work.bound_gap[j]
         if d > 0.0:
-            k0 = max(k0, growth * LIMIT_INERTIA * d * d / h)
+            k0 = max(k0, growth * _LIMIT_INERTIA * d * d / h)
             floor = max(floor, 0.5 * d)
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
@@ -100,21 +100,21 @@ def start_inequalities(model: Model, work: Work, h: float, kappa: float, growth:
 
 
 @kernel
-def resume_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
-    """All cone variables on the central path of kappa, near the present gaps and the impulses kept."""
+def resume_inequalities(model: Model, work: Work, h: float, kappa: float, predicted: bool) -> None:
+    """All cone variables on the central path of kappa, near the present gaps and the impulses kept, or predicted."""
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            resume_contact(model, work, h, c, kappa)
-    resume_limits(model, work, h / LIMIT_INERTIA, kappa)
+            resume_contact(model, work, h, c, kappa, predicted)
+    resume_limits(model, work, h / _LIMIT_INERTIA, kappa, predicted)
 
 
 @kernel
-def touch_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
-    """Slacks for the present impulses, on the central path of kappa."""
+def return_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
+    """Every pair that the last move took out of its cone put back onto the central path of kappa."""
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            touch_contact(model, work, h, c, kappa)
-    touch_limits(model, work, h / LIMIT_INERTIA, kappa)
+            return_contact(model, work, h, c, kappa)
+    return_limits(model, work, h / _LIMIT_INERTIA, kappa)
 
 
 @kernel

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from sim.contacts.friction import return_contact
 from sim.dynamics import momentum_balance
-from sim.joints.limits import return_limits
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import Options
-from sim.solve.inequalities import LIMIT_INERTIA, inequality_kinematics, keep_inequalities, move_inequalities
+from sim.solve.inequalities import (
+    inequality_kinematics,
+    keep_inequalities,
+    move_inequalities,
+    return_inequalities,
+)
 from sim.solve.merit import Merit, judge, residuals
 from sim.work import Work
 from solvers.jit import inlined, kernel
@@ -25,15 +28,6 @@ def largest_turn(work: Work) -> float:
     for i in range(work.twist.shape[0]):
         turn = max(turn, abs(work.twist[i, 3]), abs(work.twist[i, 4]), abs(work.twist[i, 5]))
     return turn
-
-
-@kernel
-def return_inequalities(model: Model, work: Work, h: float, kappa: float) -> None:
-    """Every pair that the last move took out of its cone put back onto the central path of kappa."""
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            return_contact(model, work, h, c, kappa)
-    return_limits(model, work, h / LIMIT_INERTIA, kappa)
 
 
 @inlined

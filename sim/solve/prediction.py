@@ -16,7 +16,7 @@ from sim.elimination import solve
 from sim.model import Law, Model, Vector
 from sim.options import Options
 from sim.solve.delassus import delassus
-from sim.solve.inequalities import touch_inequalities
+from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.placing import place
@@ -156,7 +156,7 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
             work.dnu[d] += work.nu[d]
         if not place(model, work, h, q, work.dnu, 1.0):
             return 1e301, 1e301
-        touch_inequalities(model, work, h, kappa)
+        resume_inequalities(model, work, h, kappa, True)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
             return balance
