@@ -37,12 +37,6 @@ def subtree_sums(model: Model, wrench: Matrix, out: Matrix) -> None:
 
 
 @kernel
-def dot_six(a: Vector, b: Vector) -> float:
-    """a . b of six numbers, as three sums of two: a long sum would wait for itself."""
-    return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]) + (a[4] * b[4] + a[5] * b[5])
-
-
-@kernel
 def numbers(s: Vector) -> Twist:
     """Six numbers that are read once: the processor cannot know that what is written meanwhile leaves them alone."""
     return s[0], s[1], s[2], s[3], s[4], s[5]
@@ -50,8 +44,14 @@ def numbers(s: Vector) -> Twist:
 
 @kernel
 def times_row(A: Vector, k: int, s: Twist) -> float:
-    """A[k : k + 6] . s"""
+    """A[k : k + 6] . s, as three sums of two: a long sum would wait for itself."""
     return (A[k] * s[0] + A[k + 1] * s[1]) + (A[k + 2] * s[2] + A[k + 3] * s[3]) + (A[k + 4] * s[4] + A[k + 5] * s[5])
+
+
+@kernel
+def dot_six(a: Vector, b: Vector) -> float:
+    """a . b of six numbers."""
+    return times_row(a, 0, numbers(b))
 
 
 @kernel
