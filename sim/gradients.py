@@ -120,12 +120,12 @@ def _next_state(model: Model, work: Work, h: float, A: Matrix, B: Matrix) -> Non
     """A, B from dv25 = columns:  dq3 = dq2 + h dv25, and R(h w)^T dphi2 + h J(h w)^T dw for quaternion joints."""
     nv = work.columns.shape[0]
     for d in range(nv):
-        _scaled_row(work.columns, d, 0, h, A, d)
-        _scaled_row(work.columns, d, 2 * nv, h, B, d)
+        _combine(work.columns, d, 0, (h, 0.0, 0.0), 1, A, d)
+        _combine(work.columns, d, 2 * nv, (h, 0.0, 0.0), 1, B, d)
         A[d, d] += 1.0
     for d in range(nv):
-        _scaled_row(work.columns, d, 0, 1.0, A, nv + d)
-        _scaled_row(work.columns, d, 2 * nv, 1.0, B, nv + d)
+        _combine(work.columns, d, 0, (1.0, 0.0, 0.0), 1, A, nv + d)
+        _combine(work.columns, d, 2 * nv, (1.0, 0.0, 0.0), 1, B, nv + d)
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] != 3:
             continue
@@ -136,35 +136,27 @@ def _next_state(model: Model, work: Work, h: float, A: Matrix, B: Matrix) -> Non
         R = quat_matrix(e[0], e[1], e[2], e[3])
         for r in range(3):
             f = (h * J[r], h * J[3 + r], h * J[6 + r])
-            _turned_row(work.columns, d, 0, f, A, d + r)
-            _turned_row(work.columns, d, 2 * nv, f, B, d + r)
+            _combine(work.columns, d, 0, f, 3, A, d + r)
+            _combine(work.columns, d, 2 * nv, f, 3, B, d + r)
             for k in range(3):
                 A[d + r, d + k] += R[3 * k + r]
 
 
 @kernel
-def _scaled_row(X: Matrix, d: int, first: int, f: float, out: Matrix, row: int) -> None:
-    """out[row] = f X[d], columns from `first` on. The last lanes may repeat some of those before."""
-    n = out.shape[1]
-    for c in range(0, n, LANES):
-        if n < LANES:
-            for k in range(n):
-                out[row, k] = f * X[d, first + k]
-        else:
-            k = min(c, n - LANES)
-            store(out, row, k, f * load(X, d, first + k))
-
-
-@kernel
-def _turned_row(X: Matrix, d: int, first: int, f: Vec3, out: Matrix, row: int) -> None:
-    """out[row] = f . X[d : d + 3], likewise."""
+def _combine(X: Matrix, d: int, first: int, f: Vec3, rows: int, out: Matrix, row: int) -> None:
+    """out[row] = f . X[d : d + rows], 1 row or 3, columns from `first` on. The last lanes may repeat some before."""
     n = out.shape[1]
     for c in range(0, n, LANES):
         if n < LANES:
             for k in range(n):
                 m = first + k
-                out[row, k] = f[0] * X[d, m] + f[1] * X[d + 1, m] + f[2] * X[d + 2, m]
+                out[row, k] = f[0] * X[d, m]
+                if rows == 3:
+                    out[row, k] += f[1] * X[d + 1, m] + f[2] * X[d + 2, m]
         else:
             k = min(c, n - LANES)
             m = first + k
-            store(out, row, k, f[0] * load(X, d, m) + f[1] * load(X, d + 1, m) + f[2] * load(X, d + 2, m))
+            x = f[0] * load(X, d, m)
+            if rows == 3:
+                x = x + f[1] * load(X, d + 1, m) + f[2] * load(X, d + 2, m)
+            store(out, row, k, x)
