@@ -15,7 +15,7 @@ from sim.solve.inequalities import (
 )
 from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
-from sim.solve.placing import place
+from sim.solve.placing import NOWHERE, place
 from sim.solve.prediction import predict, predictable
 from sim.work import Work
 from solvers.jit import inlined, kernel
@@ -29,7 +29,6 @@ _GROWTHS = 8  # attempts
 _GOLDEN = 0.6180339887498949
 AGAIN = -1  # instead of the number of an attempt
 _BEYOND = 2.0  # [rad] from a fold to a start on its other side
-_NOWHERE = (1e300, 1e300)
 
 
 class Beginning(NamedTuple):
@@ -53,7 +52,7 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
     if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         if place(model, work, h, q, guess.velocity, 1.0):
             return Beginning(0, kappa, residuals(model, work, h, q, v, u))
-        return Beginning(1, kappa, _NOWHERE)
+        return Beginning(1, kappa, NOWHERE)
     keep_inequalities(model, work)
     if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
         if predictable(model, work):
@@ -62,14 +61,14 @@ def begin(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vect
                 return beginning
         return resume(model, work, options, inputs, guess.velocity)
     if not place(model, work, h, q, v, 1.0):
-        return Beginning(1, kappa, _NOWHERE)
+        return Beginning(1, kappa, NOWHERE)
     start_inequalities(model, work, h, kappa, 1.0)
     usual, _ = residuals(model, work, h, q, v, u)
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and guess.velocity[d] == v[d]
     if not placed and not place(model, work, h, q, guess.velocity, 1.0):
-        return Beginning(1, kappa, _NOWHERE)
+        return Beginning(1, kappa, NOWHERE)
     start_inequalities(model, work, h, kappa, 0.0)
     hard = residuals(model, work, h, q, v, u)
     return Beginning(0 if hard[0] < _AT_REST * usual else 1, kappa, hard)
@@ -85,7 +84,7 @@ def go_on(
     """
     q, v, u = inputs
     if not place(model, work, options.h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, _NOWHERE)
+        return Beginning(1, options.kappa, NOWHERE)
     move_inequalities(model, work, 0.0)
     balance = residuals(model, work, options.h, q, v, u)
     if balance[0] > _GOES_ON * total_impulse(model, work):
@@ -104,7 +103,7 @@ def resume(
     q, v, u = inputs
     h = options.h
     if not place(model, work, h, q, velocity, 1.0):
-        return Beginning(1, options.kappa, _NOWHERE)
+        return Beginning(1, options.kappa, NOWHERE)
     kappa = max(options.kappa, _RESUMED)
     resume_inequalities(model, work, h, kappa, False)
     away, _ = residuals(model, work, h, q, v, u)

@@ -69,7 +69,7 @@ _PATIENCE = 30  # iterations of an attempt
 _CHOICES = 3  # repetitions of an attempt, with other elements of the shapes in contact
 _REPLACED = 2  # last attempt whose first repetition has the new elements only; later ones have those that pressed, too
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
-_BEYOND = 8  # first attempt that folds do not stop
+_AS_IT_IS = 8  # first attempt that takes Newton's direction as it is, at folds too
 _FEW = 4  # halvings; an attempt that needs more is given up
 _EASY = 10  # iterations; the work of joints is looked at in steps that took more
 
@@ -111,7 +111,7 @@ def try_from(
         smoothing = start(model, work, options, q, v, attempt)
         balance = residuals(model, work, h, q, v, u)
     ratio = 1e-2
-    beyond = attempt >= _BEYOND and attempt % 4 < 2
+    beyond = attempt >= _AS_IT_IS and attempt % 4 < 2
     patience = iterations + _PATIENCE
     halvings = 0
     merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)

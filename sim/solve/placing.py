@@ -10,6 +10,8 @@ from sim.solve.inequalities import inequality_kinematics
 from sim.work import Work
 from solvers.jit import kernel
 
+NOWHERE = (1e300, 1e300)  # residuals where nothing could be placed
+
 
 @kernel
 def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float) -> bool:

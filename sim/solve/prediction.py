@@ -19,7 +19,7 @@ from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
-from sim.solve.placing import place
+from sim.solve.placing import NOWHERE, place
 from sim.solve.residual import residual_scale
 from sim.work import Work
 from solvers.gauss_seidel import gauss_seidel
@@ -128,7 +128,7 @@ def descend(model: Model, work: Work) -> None:
 
 @kernel
 def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
-    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, infinite where that
+    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, NOWHERE where that
     fails.
 
     At nu with the impulses of the step before, whose residual is in work.residual.
@@ -136,13 +136,12 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     q, v, u = inputs
     h, kappa = options.h, options.kappa
     scale = residual_scale(work)
-    balance = (1e301, 1e301)
     if not factor_free(model, work, h, q, v):
-        return balance
+        return NOWHERE
     descend(model, work)
     points, size = choose(model, work, h, kappa)
     if size < 0:
-        return balance
+        return NOWHERE
     rates(model, work, h, points, size)
     delassus(model, work, h, points, size)
     settled = True
@@ -155,7 +154,7 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
         for d in range(v.shape[0]):
             work.dnu[d] += work.nu[d]
         if not place(model, work, h, q, work.dnu, 1.0):
-            return 1e301, 1e301
+            return NOWHERE
         resume_inequalities(model, work, h, kappa, True)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
