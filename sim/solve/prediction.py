@@ -15,6 +15,7 @@ from sim.contacts.friction import law_of
 from sim.elimination import solve
 from sim.model import Law, Model, Vector
 from sim.options import Options
+from sim.rotation import Vec3
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
@@ -51,9 +52,31 @@ def _may_touch(gap: float, rate: float, slack: float, impulse: float, kappa: flo
 
 
 @kernel
+def _take_contact(work: Work, j: int, c: int, rate: Vec3) -> None:
+    """w and l of contact c, in rows j, j + 1, j + 2.   rate: `contact_rate`."""
+    w, l = work.reach_rate, work.reach_impulse
+    k, z = work.contact_kin[c], work.cone[c]
+    w[j], w[j + 1], w[j + 2] = k[0] + rate[0], k[1] + rate[1], k[2] + rate[2]
+    l[j], l[j + 1], l[j + 2] = z[1], z[2], z[3]
+
+
+@kernel
+def _take_limit(work: Work, j: int, k: int, rate: float) -> None:
+    """w and l of limit k, in row j.   rate: `limit_rate`."""
+    work.reach_rate[j] = work.bound_gap[k] + rate
+    work.reach_impulse[j] = work.bound[k, 1]
+
+
+@kernel
+def limit_rate(model: Model, work: Work, h: float, k: int) -> float:
+    """d(gap) of limit k of one coordinate, by the last solve."""
+    return h * model.limit_sign[k] * work.dnu[model.limit_dof[k]]
+
+
+@kernel
 def choose(model: Model, work: Work, h: float, kappa: float) -> tuple[int, int]:
-    """Contacts and limits that may touch, into reach_of, and their number: (contacts, rows). The others get the
-    impulses of their gaps.
+    """Contacts and limits that may touch, into reach_of, with w and l; and their number: (contacts, rows). The others
+    get the impulses of their gaps.
 
     After a solve. (0, -1) when there are more of them than places.
     """
@@ -62,47 +85,42 @@ def choose(model: Model, work: Work, h: float, kappa: float) -> tuple[int, int]:
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
-            rate, _, _ = contact_rate(model, work, c)
+            rate = contact_rate(model, work, c)
             gap = work.contact_kin[c, 0]
             z = work.cone[c]
-            if _may_touch(gap, rate, z[0], z[1], kappa):
+            if _may_touch(gap, rate[0], z[0], z[1], kappa):
                 if n + 3 > most:
                     return 0, -1
                 work.reach_of[n] = c
                 work.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == _NONLINEAR else 0.0
+                _take_contact(work, n, c, rate)
                 n += 3
             else:
-                z[1], z[2], z[3] = kappa / (gap + rate), 0.0, 0.0
+                z[1], z[2], z[3] = kappa / (gap + rate[0]), 0.0, 0.0
     points = n // 3
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
             continue
-        rate = h * model.limit_sign[k] * work.dnu[model.limit_dof[k]]
+        change = limit_rate(model, work, h, k)
         gap = work.bound_gap[k]
-        if _may_touch(gap, rate, work.bound[k, 0], work.bound[k, 1], kappa):
+        if _may_touch(gap, change, work.bound[k, 0], work.bound[k, 1], kappa):
             if n + 1 > most:
                 return 0, -1
             work.reach_of[n] = k
+            _take_limit(work, n, k, change)
             n += 1
         else:
-            work.bound[k, 1] = kappa / (gap + rate)
+            work.bound[k, 1] = kappa / (gap + change)
     return points, n
 
 
 @kernel
 def rates(model: Model, work: Work, h: float, points: int, size: int) -> None:
     """w and l of the contacts and limits chosen, after the last solve."""
-    w, l = work.reach_rate, work.reach_impulse
     for j in range(0, 3 * points, 3):
-        c = work.reach_of[j]
-        a, x, y = contact_rate(model, work, c)
-        k, z = work.contact_kin[c], work.cone[c]
-        w[j], w[j + 1], w[j + 2] = k[0] + a, k[1] + x, k[2] + y
-        l[j], l[j + 1], l[j + 2] = z[1], z[2], z[3]
+        _take_contact(work, j, work.reach_of[j], contact_rate(model, work, work.reach_of[j]))
     for j in range(3 * points, size):
-        k = work.reach_of[j]
-        w[j] = work.bound_gap[k] + h * model.limit_sign[k] * work.dnu[model.limit_dof[k]]
-        l[j] = work.bound[k, 1]
+        _take_limit(work, j, work.reach_of[j], limit_rate(model, work, h, work.reach_of[j]))
 
 
 @kernel
@@ -142,7 +160,6 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     points, size = choose(model, work, h, kappa)
     if size < 0:
         return NOWHERE
-    rates(model, work, h, points, size)
     delassus(model, work, h, points, size)
     settled = True
     step = 1
