@@ -13,29 +13,31 @@ from __future__ import annotations
 
 from sim.contacts.contact import add_contact_wrench
 from sim.elimination import dot_six
-from sim.model import Model
+from sim.model import Model, Vector
 from sim.work import Work
 from solvers.jit import kernel
 from solvers.lu import lu_solve
 
 
 @kernel
+def _add_six(a: float, s: Vector, out: Vector) -> None:
+    """out += a s, of six numbers."""
+    for k in range(6):
+        out[k] += a * s[k]
+
+
+@kernel
 def _rates_above(model: Model, work: Work, i: int, a: int) -> None:
-    """Rates of row a by the joints from body i to the root; work.twist[i] holds r."""
+    """Rates of row a by the joints from body i to the root; work.twist[i] holds r, of all bodies in turn."""
+    r = work.twist[i]
     while i >= 0:
-        q = model.body_parent[i]
-        r = work.twist[i]
         d0, end = model.body_vadr[i], model.body_vadr[i + 1]
         for d in range(d0, end):
             work.reach[d, a] = dot_six(r, work.S3nu[d])
-        if q >= 0:
-            s = work.twist[q]
-            for k in range(6):
-                s[k] = r[k]
+        i = model.body_parent[i]
+        if i >= 0:  # a root has no L
             for d in range(d0, end):
-                for k in range(6):
-                    s[k] -= work.reach[d, a] * work.L[d, k]
-        i = q
+                _add_six(-work.reach[d, a], work.L[d], r)
 
 
 @kernel
@@ -65,12 +67,12 @@ def limit_rates(model: Model, work: Work, k: int, h: float, a: int) -> None:
 
 @kernel
 def _answer(model: Model, work: Work, i: int, b: int, size: int) -> None:
-    """Column b from the load p in work.subtree[i], and z of the joint of i before its block is solved."""
+    """Column b from the load p in work.subtree[i], which goes up, and z of the joint of i as it comes in."""
     g = work.delassus[b]
+    p = work.subtree[i]
     for k in range(size):
         g[k] = 0.0
     while i >= 0:
-        p = work.subtree[i]
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         for d in range(d0, d0 + n):
@@ -83,17 +85,9 @@ def _answer(model: Model, work: Work, i: int, b: int, size: int) -> None:
             z, rates = work.z[d], work.reach[d]
             for k in range(size):
                 g[k] += z * rates[k]
-        q = model.body_parent[i]
-        if q >= 0:
-            s = work.subtree[q]
-            for k in range(6):
-                s[k] = p[k]
-            for d in range(d0, d0 + n):
-                for k in range(6):
-                    s[k] += work.U[d, k] * work.z[d]
-        for d in range(d0, d0 + n):
+            _add_six(z, work.U[d], p)
             work.z[d] = 0.0
-        i = q
+        i = model.body_parent[i]
 
 
 @kernel
