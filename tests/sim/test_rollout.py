@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import block
 
 from dojo_opt import models
+from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
+from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 from solvers.status import Status
 
 PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)
+
+
+def above(mech: Mechanism, height: float) -> tuple[Simulator, np.ndarray, float]:
+    """A robot so high above where it stands."""
+    sim = Simulator(mech, time_step=0.01)
+    x = sim.neutral()
+    x[2] += height
+    return sim, x, height
 
 
 def test_step_and_rollout_agree() -> None:
@@ -53,6 +64,32 @@ def test_batch_equals_single_rollouts() -> None:
     assert np.all(batch.status == 0) and np.all(batch.knot == 5)
     for k in range(6):
         np.testing.assert_array_equal(batch.x[k], PENDULUM.rollout(x0s[k], us[k]).x)
+
+
+COLLISION = Simulator(two(SHAPES["box"], SHAPES["capsule"]), time_step=0.01)
+ALONE = {  # simulator, where a motion starts, and how far above the start of another one
+    "thrown": above(models.quadruped(contacts="all"), 0.0),
+    "dropped": above(models.quadruped(contacts="all"), 0.5),
+    "limited": above(models.raiberthopper(limits=(0.2, 0.8)), 0.1),
+    "pyramids": above(block(law="linear"), 0.5),
+    "collision": (COLLISION, approaching(COLLISION, 2, 1.0), 0.1),
+}
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_a_rollout_does_not_depend_on_the_one_before(name: str) -> None:
+    """To the last bit, iterations too: contacts that come near begin with impulses of this motion."""
+    sim, x, height = ALONE[name]
+    us, others = np.random.default_rng(3).uniform(-10.0, 10.0, (2, 60, sim.nu))
+    first = sim.rollout(x, us, throw=True)
+    lower = x.copy()
+    lower[2] -= height
+    sim.rollout(lower, others)
+    again, fresh = sim.rollout(x, us, throw=True), sim.replace().rollout(x, us, throw=True)
+    assert np.abs(first.contacts.impulse).max() > 1e-2
+    for t in (again, fresh):
+        np.testing.assert_array_equal(t.x, first.x)
+        np.testing.assert_array_equal(t.iterations, first.iterations)
 
 
 def test_linearize_against_differences() -> None:
