@@ -6,12 +6,7 @@ from sim.dynamics import momentum_balance
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import Options
-from sim.solve.inequalities import (
-    inequality_kinematics,
-    keep_inequalities,
-    move_inequalities,
-    return_inequalities,
-)
+from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, return_inequalities
 from sim.solve.merit import Merit, judge, residuals
 from sim.work import Work
 from solvers.jit import inlined, kernel
