@@ -103,7 +103,7 @@ def try_from(
     kappa = options.kappa
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
     scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
-    led = attempt >= _LED and (attempt < _BEYOND or attempt % 2 == 1)
+    led = attempt >= _LED and (attempt < _AS_IT_IS or attempt % 2 == 1)
     worse = _WORSE_LED if led else _WORSE
     smoothing = beginning.kappa
     balance = beginning.balance
