@@ -16,7 +16,7 @@ from sim.late import solve_deep_panel
 from sim.model import Model
 from sim.work import Work
 from solvers.jit import kernel
-from solvers.lanes import LANES, Lanes, dot_lanes, keep, load, six, spread, store
+from solvers.lanes import LANES, SIDE, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.lu import lu_solve_lanes
 
 
@@ -45,42 +45,48 @@ def _fill_triangles(model: Model, work: Work) -> None:
 
 @kernel
 def _up(model: Model, work: Work, c: int) -> None:
-    """2 LANES columns from c on, at which the processor works side by side, from the leaves to the root."""
+    """SIDE columns from c on, at whose lanes the processor works side by side, from the leaves to the root."""
     X, T = work.columns, work.triangles
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         below = model.dofs_below[i]
         for d in range(d0, d0 + n):
-            x, y = load(X, d, c), load(X, d, c + LANES)
+            x, y, z = load(X, d, c), load(X, d, c + LANES), load(X, d, c + 2 * LANES)
             for m in range(model.count_below[i]):
                 k = below[m]
-                x = x - T[d, k] * load(X, k, c)
-                y = y - T[d, k] * load(X, k, c + LANES)
+                t = T[d, k]
+                x = x - t * load(X, k, c)
+                y = y - t * load(X, k, c + LANES)
+                z = z - t * load(X, k, c + 2 * LANES)
             f = work.D[i, 0] if n == 1 else 1.0
             store(X, d, c, f * x)
             store(X, d, c + LANES, f * y)
+            store(X, d, c + 2 * LANES, f * z)
         if n > 1:
-            lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, c)
-            lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, c + LANES)
+            for e in range(c, c + SIDE, LANES):
+                lu_solve_lanes(work.D[i], n, int(work.D[i, 36]), X, d0, e)
 
 
 @kernel
 def _down(model: Model, work: Work, c: int) -> None:
-    """2 LANES columns from c on, at which the processor works side by side, from the root to the leaves."""
+    """The same columns, from the root to the leaves."""
     X, T = work.columns, work.triangles
     for i in range(model.body_parent.shape[0]):
         above = model.dofs_above[i]
         if model.count_above[i] == 0:
             continue
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            x, y = load(X, d, c), load(X, d, c + LANES)
+            x, y, z = load(X, d, c), load(X, d, c + LANES), load(X, d, c + 2 * LANES)
             for m in range(model.count_above[i]):
                 k = above[m]
-                x = x - T[d, k] * load(X, k, c)
-                y = y - T[d, k] * load(X, k, c + LANES)
+                t = T[d, k]
+                x = x - t * load(X, k, c)
+                y = y - t * load(X, k, c + LANES)
+                z = z - t * load(X, k, c + 2 * LANES)
             store(X, d, c, x)
             store(X, d, c + LANES, y)
+            store(X, d, c + 2 * LANES, z)
 
 
 @kernel
@@ -112,7 +118,7 @@ def solve_panel(model: Model, work: Work) -> None:
     count = column_count(model, work)
     if solve_deep_panel(model, work, count) == 0:
         _fill_triangles(model, work)
-        for c in range(0, count, 2 * LANES):
+        for c in range(0, count, SIDE):
             _up(model, work, c)
             _down(model, work, c)
     if work.couple_panel.shape[0] > 0:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim import late
 from sim.model import Model
 from sim.work import Work
-from solvers.lanes import LANES, whole
+from solvers.lanes import LANES, SIDE, whole
 from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
@@ -120,7 +120,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     """Rows and columns of one field."""
     nv, nu = sizes.nv, sizes.nu
     columns = max(2 * nv + whole(nu), nv + whole(nv))  # with what lanes write behind dR_dv and the inputs
-    columns = whole(-(-columns // 2)) * 2  # an even number of blocks
+    columns = -(-columns // SIDE) * SIDE
     named = {
         **sizes._asdict(),
         "nbody+1": sizes.nbody + 1,

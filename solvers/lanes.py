@@ -25,6 +25,7 @@ from solvers.jit import kernel
 
 __all__ = [
     "LANES",
+    "SIDE",
     "Lanes",
     "Six",
     "dot_lanes",
@@ -42,6 +43,7 @@ __all__ = [
 ]
 
 LANES = 8
+SIDE = 3 * LANES  # columns of a panel at a time: while one product is under way, others begin
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Lanes = NDArray[np.float64]  # without compilation; (LANES,)
@@ -84,7 +86,7 @@ def _address(context: Any, builder: Any, kind: Any, matrix: Any, row: Any, colum
     """Where the lanes of a matrix, C order, begin; without a look at the bounds."""
     array = context.make_array(kind)(context, builder, matrix)
     width = cgutils.unpack_tuple(builder, array.shape, 2)[1]
-    start = builder.gep(array.data, [builder.add(builder.mul(row, width), column)])
+    start = builder.gep(array.data, [builder.add(builder.mul(row, width), column)], inbounds=True)
     return builder.bitcast(start, _Vector.as_pointer())
 
 
