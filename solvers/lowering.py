@@ -4,6 +4,9 @@ For one entry of a matrix Numba 0.68 writes 45 instructions, most of which copy 
 every implementation of every operator for each `+`: reading, cleaning and optimising that was a third of a cold start.
 Here the same takes four to ten, which the optimiser turns into the same code. Everything else is left to Numba, and so
 is every index when bounds are checked.
+
+An index counts from the end where it is written as a number, a[-1]. Any other is not negative: to ask, at every access,
+whether it is took a tenth of the time of a step.
 """
 
 from __future__ import annotations
@@ -199,14 +202,14 @@ class _Lower(Lower):
             known = isinstance(i, Constant) and i.constant >= 0
             zero = [isinstance(n, Constant) and n.constant == 0 for n in (offset, i)]
             size = self._word(name, SHAPE, k) if not (known and zero[0]) else None
-            if not known:
-                i = b.select(b.icmp_signed("<", i, WORD(0)), b.add(i, size), i)
+            if isinstance(i, Constant) and not known:
+                i = b.add(i, size)
             if zero[0]:
                 offset = i
             else:
-                offset = b.mul(offset, size)
-                offset = offset if zero[1] else b.add(offset, i)
-        return b.gep(self._word(name, DATA), [offset]), list(range(len(indices), kind.ndim))
+                offset = b.mul(offset, size, flags=["nsw", "nuw"])
+                offset = offset if zero[1] else b.add(offset, i, flags=["nsw", "nuw"])
+        return b.gep(self._word(name, DATA), [offset], inbounds=True), list(range(len(indices), kind.ndim))
 
     def _read(self, resty: Any, name: str, index: Any) -> Any:
         """array[index], an entry or a row."""
