@@ -31,7 +31,7 @@ for case in cases:
     )
     assert loop.survived, loop.message
     assert loop.rms() < 0.08, loop.rms()
-    assert foot.max() > 0.1, "it does not hop"
+    assert foot.max() > 0.08, "it does not hop"
 
 finish(dojo.plots.closed_loop(loops[cases[0]]), __file__)
 dojo.viewer.save_html(loops[cases[0]], "hopper_mpc.html")
