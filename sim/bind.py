@@ -43,6 +43,7 @@ _PAIRS = (
     late.far_pair_impulses,
     late.pairs_came_near,
     late.pairs_gained,
+    late.pair_slack,
 )
 _CYLINDERS = (
     late.cylinder_distance,
@@ -69,7 +70,7 @@ _TERRAIN = (
     late.terrain_gap,
     late.evaluate_on_terrain,
 )
-_IMPACTS = (late.find_impacts, late.subtract_floors, late.gained_energy)
+_IMPACTS = (late.find_impacts, late.subtract_floors, late.impacts_gained)
 _COUPLING_GRADIENT = (
     late.add_coupling_composites,
     late.add_coupling_derivatives,

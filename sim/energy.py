@@ -46,7 +46,7 @@ def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) ->
 
 
 @kernel
-def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
+def add_spring_momentum(model: Model, h: float, q: Vector, v: Vector, out: Vector) -> None:
     """out += d(L_d - T_d)(1, 2)/d(q2): the half of the spring impulse at the node, and rotors (accumulated).
 
         scalar        -h k/2 ((q1 + q2)/2 - rest)^2 + I (q2 - q1)^2/(2 h)    -h k/2 ((q1 + q2)/2 - rest) + I v
@@ -54,16 +54,14 @@ def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
 
     s: vector part of the rotation from rest.   out: (nv,).
     """
-    nv = model.dof_body.shape[0]
-    nq = x.shape[0] - nv
     for i in range(model.body_parent.shape[0]):
         end = model.body_vadr[i + 1]
         if model.joint_nrot[i] == 3:
             end -= 3
             k = model.dof_spring[end]
             if k > 0.0:
-                w = x[nq + end : nq + end + 3]
-                r2 = relative_to_rest(model, i, x[:nq])
+                w = v[end : end + 3]
+                r2 = relative_to_rest(model, i, q)
                 e = quat_exp(-h * w[0], -h * w[1], -h * w[2])
                 r1 = quat_mul(r2[0], r2[1], r2[2], r2[3], e[0], e[1], e[2], e[3])
                 s0, s1, s2 = r1[1] + r2[1], r1[2] + r2[2], r1[3] + r2[3]
@@ -72,23 +70,22 @@ def add_spring_momentum(model: Model, h: float, x: Vector, out: Vector) -> None:
                 out[end + 1] -= 0.5 * h * k * (r2[0] * s1 - t[1])
                 out[end + 2] -= 0.5 * h * k * (r2[0] * s2 - t[2])
         for d in range(model.body_vadr[i], end):
-            middle = x[model.dof_qadr[d]] - 0.5 * h * x[nq + d] - model.dof_rest[d]
-            out[d] += model.dof_armature[d] * x[nq + d] - 0.5 * h * model.dof_spring[d] * middle
+            middle = q[model.dof_qadr[d]] - 0.5 * h * v[d] - model.dof_rest[d]
+            out[d] += model.dof_armature[d] * v[d] - 0.5 * h * model.dof_spring[d] * middle
 
 
 @kernel
-def spatial_inertia(model: Model, work: Work, out: Matrix) -> None:
-    """out[i] = inertia of body i about O, 6 x 6 row-major, at configuration 2:
+def spatial_inertia(model: Model, origin: Vector, pos: Matrix, inertia: Matrix, out: Matrix) -> None:
+    """out[i] = inertia of body i about O, 6 x 6 row-major, at positions pos (nbody, 3); inertia: (nbody, 9) world axes:
 
     [ m I       -m [d]           ]
     [ m [d]     J - m [d] [d]    ]       d: from O to the centre of mass
     """
     for i in range(model.body_parent.shape[0]):
         m = model.body_mass[i]
-        o = work.origin
-        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        x, y, z = pos[i, 0] - origin[0], pos[i, 1] - origin[1], pos[i, 2] - origin[2]
         s = x * x + y * y + z * z
-        J = work.inertia_world[i]
+        J = inertia[i]
         A = out[i]
         for k in range(36):
             A[k] = 0.0
@@ -116,7 +113,7 @@ def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
 @kernel
 def factor_mass_matrix(model: Model, work: Work) -> bool:
     """M = S2^T (inertia) S2 + armature at configuration 2 in `work`, factored for `solve`; False when singular."""
-    spatial_inertia(model, work, work.A)
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
     for d in range(work.S2.shape[0]):
         for k in range(6):
             work.S3nu[d, k] = work.S2[d, k]
@@ -142,9 +139,9 @@ def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)
-    add_spring_momentum(model, h, x, work.residual)
-    solved = solve_mass_matrix(model, work, work.residual, work.dnu)
     nq = work.theta1.shape[0]
+    add_spring_momentum(model, h, x[:nq], x[nq:], work.residual)
+    solved = solve_mass_matrix(model, work, work.residual, work.dnu)
     close_velocity(model, work, h, x[:nq], x[nq:], work.dnu)
     return solved
 
@@ -160,20 +157,28 @@ def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
 
 
 @kernel
-def potential_energy(model: Model, work: Work, x: Vector) -> float:
-    """Sum of -m g.x2, of k/2 (q - rest)^2 for scalar springs, and of 2 k |s|^2 for those of quaternion joints."""
+def gravity_energy(model: Model, pos: Matrix) -> float:
+    """Sum of -m g.x [J].   pos: (nbody, 3) positions of the bodies, or displacements."""
+    energy = 0.0
+    for i in range(pos.shape[0]):
+        for k in range(3):
+            energy -= model.body_mass[i] * model.gravity[k] * pos[i, k]
+    return energy
+
+
+@kernel
+def spring_energy(model: Model, q: Vector) -> float:
+    """Sum of k/2 (q - rest)^2 of scalar springs, and of 2 k |s|^2 of those of quaternion joints [J]."""
     energy = 0.0
     for i in range(model.body_parent.shape[0]):
-        for k in range(3):
-            energy -= model.body_mass[i] * model.gravity[k] * work.pos2[i, k]
         end = model.body_vadr[i + 1]
         if model.joint_nrot[i] == 3:
             end -= 3
             if model.dof_spring[end] > 0.0:
-                r = relative_to_rest(model, i, x)
+                r = relative_to_rest(model, i, q)
                 energy += 2.0 * model.dof_spring[end] * (r[1] * r[1] + r[2] * r[2] + r[3] * r[3])
         for d in range(model.body_vadr[i], end):
-            stretch = x[model.dof_qadr[d]] - model.dof_rest[d]
+            stretch = q[model.dof_qadr[d]] - model.dof_rest[d]
             energy += 0.5 * model.dof_spring[d] * stretch * stretch
     return energy
 
@@ -207,7 +212,7 @@ def energies(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix)
     work = work_view(work_at)
     for t in range(xs.shape[0]):
         out[t, 0] = kinetic_energy(model, work, h, xs[t])
-        out[t, 1] = potential_energy(model, work, xs[t])
+        out[t, 1] = gravity_energy(model, work.pos2) + spring_energy(model, xs[t])
 
 
 @kernel

@@ -75,7 +75,7 @@ evaluate_on_terrain = _late("sim.terrain.far:evaluate_on_terrain")
 # restitution
 find_impacts = _late("sim.contacts.restitution:find_impacts")
 subtract_floors = _late("sim.contacts.restitution:subtract_floors")
-gained_energy = _late("sim.contacts.restitution:gained_energy")
+impacts_gained = _late("sim.contacts.restitution:impacts_gained")
 add_bounce_composites = _late("sim.contacts.restitution_gradient:add_bounce_composites")
 add_bounce_derivatives = _late("sim.contacts.restitution_gradient:add_bounce_derivatives")
 
@@ -124,5 +124,6 @@ swing_turn = _late("sim.joints.swing:swing_turn")
 
 # energy from collisions
 pairs_gained = _late("sim.pairs.work:pairs_gained")
+pair_slack = _late("sim.pairs.work:pair_slack")
 
 COUNT = _late.count  # of addresses

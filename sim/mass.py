@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from sim.elimination import dot_six
 from sim.energy import spatial_inertia
-from sim.model import Model, Vector
+from sim.model import Matrix, Model, Vector
 from sim.work import Work
+from solvers.dense import clear
 from solvers.jit import kernel
 
 
@@ -24,51 +25,59 @@ def _add_rest(A: Vector, U: Vector, D: float, out: Vector) -> None:
 
 
 @kernel
-def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
-    """M out = p by elimination from the leaves to the root, one coordinate after the other: M is positive definite.
+def eliminate_mass(
+    model: Model, S: Matrix, A: Matrix, f: Matrix, U: Matrix, z: Vector, share: Vector, p: Vector
+) -> bool:
+    """M = S^T A S + armature from the leaves to the root, one coordinate after the other: M is positive definite.
 
-    up      U = A S,  D = S.U + armature,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's
-    down    out = z - U.V/D,  V += S out
+        U = A S,  D = S.U + armature,  z = (p - S.f)/D,      A -= U U^T/D,  f += U z;  both added to the parent's
 
-    False when M is singular.   Leaves the twists of the bodies in work.twist.
+    share: 1/D, so that p.M^-1 p = sum of z^2/share. False when M is singular.
+    S, U: (nv, 6); A: (nbody, 36), destroyed; f: (nbody, 6), zeros, destroyed; z, share, p: (nv,).
     """
-    n = model.body_parent.shape[0]
-    spatial_inertia(model, work, work.A)
-    for i in range(n):
-        for k in range(6):
-            work.wrench[i, k] = 0.0
-    for i in range(n - 1, -1, -1):
-        A, f = work.A[i], work.wrench[i]
+    for i in range(model.body_parent.shape[0] - 1, -1, -1):
+        a, g = A[i], f[i]
         q, first = model.body_parent[i], model.body_vadr[i]
         for d in range(model.body_vadr[i + 1] - 1, first - 1, -1):
-            S, U = work.S2[d], work.U[d]
-            s0, s1, s2, s3, s4, s5 = S[0], S[1], S[2], S[3], S[4], S[5]
+            u = U[d]
+            s0, s1, s2, s3, s4, s5 = S[d, 0], S[d, 1], S[d, 2], S[d, 3], S[d, 4], S[d, 5]
             for k in range(6):
-                U[k] = (
-                    (s0 * A[k] + s1 * A[6 + k]) + (s2 * A[12 + k] + s3 * A[18 + k]) + (s4 * A[24 + k] + s5 * A[30 + k])
+                u[k] = (
+                    (s0 * a[k] + s1 * a[6 + k]) + (s2 * a[12 + k] + s3 * a[18 + k]) + (s4 * a[24 + k] + s5 * a[30 + k])
                 )
-            D = model.dof_armature[d] + dot_six(S, U)
-            z = p[d] - dot_six(S, f)
+            D = model.dof_armature[d] + dot_six(S[d], u)
             if not D > 0.0:
                 return False
             D = 1.0 / D
-            z *= D
-            work.z[d], work.residual[d] = z, D
+            z[d], share[d] = (p[d] - dot_six(S[d], g)) * D, D
             for r in range(6):
-                f[r] += U[r] * z
+                g[r] += u[r] * z[d]
             if d == first and q >= 0:
-                _add_rest(A, U, D, work.A[q])
+                _add_rest(a, u, D, A[q])
             elif d > first:
                 for r in range(6):
                     for k in range(6):
-                        A[6 * r + k] -= D * U[r] * U[k]
+                        a[6 * r + k] -= D * u[r] * u[k]
         if q >= 0:
             for k in range(6):
-                work.wrench[q, k] += f[k]
+                f[q, k] += g[k]
             if first == model.body_vadr[i + 1]:
                 for k in range(36):
-                    work.A[q, k] += A[k]
-    for i in range(n):
+                    A[q, k] += a[k]
+    return True
+
+
+@kernel
+def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
+    """M out = p by `eliminate_mass`, and on the way down    out = z - U.V/D,  V += S out.
+
+    False when M is singular.   Leaves the twists of the bodies in work.twist.
+    """
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
+    clear(work.wrench)
+    if not eliminate_mass(model, work.S2, work.A, work.wrench, work.U, work.z, work.residual, p):
+        return False
+    for i in range(model.body_parent.shape[0]):
         V, q = work.twist[i], model.body_parent[i]
         for k in range(6):
             V[k] = work.twist[q, k] if q >= 0 else 0.0

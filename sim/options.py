@@ -46,7 +46,7 @@ class Outcome(NamedTuple):
 AT_START, AT_EVERY_POSE, BESIDE_KEPT = 0, 1, 2
 
 # what a solution says of them: they are those that touch; others overlap; a point has gone through the other shape; and
-# whatever touches, joints gave energy
+# whatever touches, the step gained energy
 PLACED, OVERLAPPING, ASTRAY, WOUND_UP = 0, 1, 2, 3
 
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

@@ -26,7 +26,7 @@ _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 @kernel
 def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> None:
     """out = M(q) v = S2^T (inertia (S2 v)) + I v, at the poses of configuration 2 in `work`.   out: (nv,)."""
-    spatial_inertia(model, work, work.A)
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
     joint_twists(model, work, v)
     for i in range(model.body_parent.shape[0]):
         for r in range(6):
@@ -46,7 +46,8 @@ def momentum_error(model: Model, work: Work, h: float, x: Vector, target: Vector
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, out)
-    add_spring_momentum(model, h, x, out)
+    nq = work.theta1.shape[0]
+    add_spring_momentum(model, h, x[:nq], x[nq:], out)
     error = 0.0
     for d in range(out.shape[0]):
         out[d] -= target[d]
@@ -100,7 +101,7 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
     momentum_of_velocity(model, work, velocity, work.nu)
     for d in range(nv):
         work.rhs[d] = 0.0
-    add_spring_momentum(model, h, x, work.rhs)
+    add_spring_momentum(model, h, x[:nq], v, work.rhs)
     scale = 1.0
     for d in range(nv):  # a stiff spring is rounded like its own half impulse
         scale = max(scale, abs(work.nu[d]), abs(work.rhs[d]))

@@ -41,6 +41,10 @@ class Work(NamedTuple):
     turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
     turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
     balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O
+    node_inertia: Matrix  # (nbody, 9) inertia at the node whose energy is asked for, world axes
+    node_momentum: Matrix  # (nbody, 6) momentum there, summed over the subtree, about O
+    node_p: Vector  # (nv,) the same in joint coordinates
+    node_share: Vector  # (nv,) scratch
     wrench: Matrix  # (nbody, 6) momentum balance with contacts; summed over the subtree by `project`
     subtree: Matrix  # (nbody, 6) scratch of tree sums
     residual: Vector  # (nv,) generalized residual

@@ -26,6 +26,14 @@ def copy(A: Matrix, out: Matrix) -> None:
 
 
 @kernel
+def clear(A: Matrix) -> None:
+    """A = 0"""
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            A[i, j] = 0.0
+
+
+@kernel
 def copy_vector(a: Vector, out: Vector) -> None:
     """out = a"""
     for i in range(a.shape[0]):

@@ -18,7 +18,8 @@ class Status(IntEnum):
     ANGULAR_STEP = 5
     LOOP_STEP = 6
     COLLISION_STEP = 7
-    JOINT_STEP = 8
+    ENERGY_STEP = 8
+    JOINT_STEP = 8  # deprecated name
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
@@ -40,7 +41,7 @@ MESSAGES: dict[Status, str] = {
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
     Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
     Status.COLLISION_STEP: "Shapes pass through one another, or gain energy, in what was found; use smaller steps.",
-    Status.JOINT_STEP: "Bodies turn so far that joints give them energy, in all that was found; use smaller steps.",
+    Status.ENERGY_STEP: "Every solution found gains energy, since bodies turn too far in one step; use smaller steps.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",

@@ -168,8 +168,8 @@ def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
     return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
 
 
-@late.gained_energy.defined(otherwise=False)
-def gained_energy(model: Model, work: Work, h: float) -> bool:
+@late.impacts_gained.defined(otherwise=False)
+def impacts_gained(model: Model, work: Work, h: float) -> bool:
     """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
 
     Lowering all rebounds by a part r takes some r/2 sum of gamma e |v_n'|. Parts are powers of 1/2: between them the

@@ -17,7 +17,8 @@ O stays where it is while these momenta are in use. All wrenches and momenta of 
 from __future__ import annotations
 
 from sim.dynamics import world_inertia
-from sim.elimination import project
+from sim.elimination import dot_six, project
+from sim.energy import spring_energy
 from sim.joints.ball_spring import relative_to_rest
 from sim.kinematics import tree_poses
 from sim.late import swing_curvature
@@ -95,6 +96,28 @@ def velocity_of_momenta(model: Model, work: Work, free: Integers, momenta: Vecto
         return False
     subtree_momenta(model, work)
     return True
+
+
+@kernel
+def node_energy(model: Model, work: Work) -> tuple[float, float]:
+    """Kinetic energy, and energy of the springs, at the evaluation that is in `work` [J]."""
+    kinetic = 0.0
+    for d in range(work.nu.shape[0]):
+        p = dot_six(work.S2[d], work.subtree[model.dof_body[d]]) + model.dof_armature[d] * work.nu[d]
+        kinetic += 0.5 * p * work.nu[d]
+    return kinetic, spring_energy(model, work.theta1)
+
+
+@kernel
+def outer_power(model: Model, work: Work, u: Vector) -> float:
+    """Power of gravity and inputs [W], with their wrenches, which `momentum_rates` leaves, in work.balance: of subtrees."""
+    power = 0.0
+    for d in range(work.nu.shape[0]):
+        power += dot_six(work.S2[d], work.balance[model.dof_body[d]]) * work.nu[d]
+    for j in range(u.shape[0]):
+        if model.input_kind[j] == _JOINT:
+            power += u[j] * work.nu[model.input_index[j]]
+    return power
 
 
 @kernel

@@ -158,8 +158,8 @@ def _add_joint_slopes(model: Model, q: Vector, slopes: Slopes) -> None:
 @kernel
 def slopes_at(model: Model, work: Work, free: Integers, u: Vector, out: Slopes) -> bool:
     """All derivatives at the evaluation that is in `work`, and the factors of M; False when that is singular."""
-    spatial_inertia(model, work, work.A1)
-    spatial_inertia(model, work, work.A)
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A1)
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
     add_children(model, work.A1)
     outer_slopes(model, work, u, work.A2)
     _columns(model, work, out.column)

@@ -15,7 +15,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.dynamics import joints_below_turn
-from sim.high_order.hamilton import coordinate_rates, momenta_of_velocity, momentum_rates, place, velocity_of_momenta
+from sim.energy_balance import LARGEST_GAIN
+from sim.high_order.hamilton import (
+    coordinate_rates,
+    momenta_of_velocity,
+    momentum_rates,
+    node_energy,
+    outer_power,
+    place,
+    velocity_of_momenta,
+)
 from sim.high_order.tangents import Tangents, first_tangents, keep_tangents, last_tangents, move_tangents, tangent_rates
 from sim.kinematics import displace
 from sim.layout import model_view, work_view
@@ -33,6 +42,7 @@ _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _SINGULAR = int(Status.SINGULAR)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
+_ENERGY_STEP = int(Status.ENERGY_STEP)
 
 
 class Scheme(NamedTuple):
@@ -90,19 +100,23 @@ def _evaluate(model: Model, work: Work, scheme: Scheme, h: float, weights: Vecto
 def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Vector, tangents: Tangents | None) -> int:
     """x one step later, in place, with its evaluation in `work` before and after; returns the Status.
 
-    tangents: of the node, moved along; without them nothing of them is compiled.
+    tangents: of the node, moved along; without them nothing of them is compiled. No step is solved that gains energy,
+    as those do that are too long for the method.
     """
     nq = work.theta1.shape[0]
     q, v = x[:nq], x[nq:]
     s = scheme.b.shape[0]
     if not joints_below_turn(model, v, h):
         return _ANGULAR_STEP
+    before = node_energy(model, work)
+    given = 0.0
     for d in range(v.shape[0]):
         scheme.shift[d] = 0.0
     for i in range(s):
         if i > 0 and not _evaluate(model, work, scheme, h, scheme.a[i], i, q):
             return _SINGULAR
         momentum_rates(model, work, scheme.free, u, scheme.rates_p[i])
+        given += h * scheme.b[i] * outer_power(model, work, u)
         coordinate_rates(model, scheme.shift, work.nu, scheme.rates_r[i])
         if tangents is not None:
             move_tangents(model, scheme.shift, tangents, h, scheme.a[i], i)
@@ -121,7 +135,14 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
         v[d] = work.nu[d]
         scheme.momenta[d] = scheme.stage_p[d]
         total += v[d]
-    return _SOLVED if abs(total) < 1e300 else _NOT_FINITE
+    if not abs(total) < 1e300:
+        return _NOT_FINITE
+    if not joints_below_turn(model, scheme.shift, 1.0):
+        return _ANGULAR_STEP
+    after = node_energy(model, work)
+    stored = abs(after[1] - before[1])
+    gained = after[0] + after[1] - before[0] - before[1] - given > LARGEST_GAIN * (before[0] + stored + abs(given))
+    return _ENERGY_STEP if gained else _SOLVED
 
 
 @kernel

@@ -57,6 +57,24 @@ def power_after(model: Model, work: Work, h: float, j: int) -> float:
     return f[0] * (ux - vx) + f[1] * (uy - vy) + f[2] * (uz - vz)
 
 
+@kernel
+def _overlapped(model: Model, work: Work, j: int) -> float:
+    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond what is rounding [m]."""
+    return max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
+
+
+@late.pair_slack.defined(otherwise=0.0)
+def pair_slack(model: Model, work: Work) -> float:
+    """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
+    total, overlap = 0.0, 0.0
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0:
+            overlap = _overlapped(model, work, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
+        if not is_absent(work, j):
+            total += work.cone[model.contact_height.shape[0] + j, 1] * overlap
+    return total
+
+
 @late.pairs_gained.defined(otherwise=False)
 def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
@@ -67,7 +85,7 @@ def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0:
             size = least_size(model, j)
-            overlap = max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
+            overlap = _overlapped(model, work, j)
             slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
             counts = work.pair_apart[j] == 0.0 and overlap < _THROWN * size
         if not counts or is_absent(work, j) or is_taut(model, work, j) or work.bounce[ground + j, 1] > 0.0:

@@ -13,7 +13,7 @@ Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
 * Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
   overlap is none (pairs/choice.py).
-* Nor is one in which joints gave energy (joints/work.py): impulses and large turns can wind one another up.
+* Nor is one that gains energy (energy_balance.py): impulses and large turns can wind one another up.
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0. Some solutions lie beyond folds (legs that jam between a joint limit
   and the ground), and without a part of the friction Newton's method only creeps towards them: late attempts, two of
@@ -26,8 +26,8 @@ from __future__ import annotations
 from sim import late
 from sim.contacts.far import came_near, choose_far
 from sim.contacts.friction import slip_noise
-from sim.joints.work import joints_gained
-from sim.late import begin_pairs, find_impacts, gained_energy, overlapping, pairs_gained
+from sim.energy_balance import step_gained
+from sim.late import begin_pairs, find_impacts, impacts_gained, overlapping, pairs_gained
 from sim.model import Model, Vector
 from sim.options import (
     ASTRAY,
@@ -57,7 +57,7 @@ _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 _COLLISION_STEP = int(Status.COLLISION_STEP)
-_JOINT_STEP = int(Status.JOINT_STEP)
+_ENERGY_STEP = int(Status.ENERGY_STEP)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 # first attempt whose friction smoothing is led down step by step; before, and late in all from a share of the velocity,
@@ -71,7 +71,6 @@ _REPLACED = 2  # last attempt whose first repetition has the new elements only; 
 _LENIENT = 4  # first attempt at whose end shapes may overlap a little, in elements that would have to pull
 _AS_IT_IS = 8  # first attempt that takes Newton's direction as it is, at folds too
 _FEW = 4  # halvings; an attempt that needs more is given up
-_EASY = 10  # iterations; the work of joints is looked at in steps that took more
 
 
 @inlined
@@ -145,16 +144,18 @@ def try_from(
 
 
 @inlined
-def misplacement(model: Model, work: Work, options: Options, v: Vector, out: Outcome) -> int:
+def misplacement(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], out: Outcome
+) -> int:
     """What a solution says of the elements chosen, as `overlapping`; ASTRAY also where collisions gave energy, WOUND_UP
-    where joints did.
+    where the step gained some.   inputs: (q, v, u).
     """
     if out.status != _SOLVED:
         return PLACED
     found = overlapping(model, work)
-    if found == PLACED and pairs_gained(model, work, options, v):
+    if found == PLACED and pairs_gained(model, work, options, inputs[1]):
         return ASTRAY
-    if found == PLACED and out.iterations > _EASY and joints_gained(model, work, options.h, v):
+    if found == PLACED and step_gained(model, work, options, inputs, True):
         return WOUND_UP
     return found
 
@@ -182,14 +183,14 @@ def interior_point(
                 continue
             work.pair_free[1] = 1 if attempt >= _LENIENT else 0
             out = try_from(model, work, options, (q, v, u), attempt, out.iterations, beginning)
-            misplaced = misplacement(model, work, options, v, out)
+            misplaced = misplacement(model, work, options, (q, v, u), out)
             for choice in range(_CHOICES):
                 if misplaced != OVERLAPPING or work.pair_free[0] == AT_EVERY_POSE:
                     break
                 if choice > 0 or attempt > _REPLACED:
                     work.pair_free[0] = BESIDE_KEPT
                 out = try_from(model, work, options, (q, v, u), AGAIN, out.iterations, beginning)
-                misplaced = misplacement(model, work, options, v, out)
+                misplaced = misplacement(model, work, options, (q, v, u), out)
             if misplaced == PLACED and (out.status == _SOLVED or out.status == _MAX_ITERATIONS):
                 break
             why = _COLLISION_STEP if misplaced == OVERLAPPING or misplaced == ASTRAY else _NO_PROGRESS
@@ -197,10 +198,10 @@ def interior_point(
             out = Outcome(why, out.iterations, out.residual, out.violation)
             work.pair_free[0] = AT_EVERY_POSE if (attempt + 1) // 2 % 2 == 1 else AT_START
         if wound_up and out.status != _SOLVED:
-            out = Outcome(_JOINT_STEP, out.iterations, out.residual, out.violation)
+            out = Outcome(_ENERGY_STEP, out.iterations, out.residual, out.violation)
         if came_near(model, work):
             continue
-        if out.status != _SOLVED or not gained_energy(model, work, options.h):
+        if out.status != _SOLVED or not impacts_gained(model, work, options.h):
             break
     if out.status == _SOLVED:
         absorb_residual(model, work)

@@ -1,0 +1,206 @@
+"""The energy balance of a solved step, which tells the solution that goes on with the motion from others.
+
+The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
+and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
+up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy,
+
+    K3 + V3 - K2 - V2 - W > 0.1 (K2 + |V3 - V2| + |W|) + slack,
+
+K + V the energies of the nodes (energy.py), W the work of the inputs. Dampers and friction only lose. Contacts and
+limits may give, in all,
+
+    slack = sum over contacts and limits of gamma max(0, gap3 - gap2)/h + kappa/h
+
+the work of those that throw out what overlapped where the step began; others have gap2 >= 0 and gamma gap3 = kappa.
+
+Energies of nodes cost a factorisation of the mass matrix each. They are asked for where constraints did work,
+
+    work = sum over bodies of  b.(V + V')/2  -  sum over dofs of  S2^T (subtree sums of w) (v + v')/2  >  0.03 K + noise
+
+b, w the wrenches that the momenta of a body leave over without and with those of contacts: what is left when springs,
+dampers, inputs and limits are taken away is the work of joints, loops and contacts, and none of third order in a motion
+that time steps can follow. It is that of mean velocities, so they are asked for in every step, too, in which a body
+turns so far that its sine says little; and where no body turns by .15 rad and the ground is flat, nothing is. Of 20,000
+steps of random trees (benchmarks/energy_steps.py), none that is accepted without them gained a tenth.
+"""
+
+from __future__ import annotations
+
+from sim.angular_momentum import angular_momentum
+from sim.dynamics import world_inertia
+from sim.elimination import add_children, dot_six
+from sim.energy import add_spring_momentum, gravity_energy, momentum_velocity, spatial_inertia, spring_energy
+from sim.late import pair_slack
+from sim.mass import eliminate_mass
+from sim.model import InputKind, Model, Vector
+from sim.options import Options
+from sim.rotation import cross, rotate
+from sim.solve.residual import residual_scale
+from sim.work import Work
+from solvers.dense import clear
+from solvers.jit import kernel
+
+_JOINT = int(InputKind.JOINT)
+_BODY = int(InputKind.BODY)
+LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an accepted step
+_SUSPECT = 0.03  # work of constraints, over the kinetic energy, from where the energies of the nodes are asked for
+_NEAR, _FAR = 0.99719, 0.825  # cosines of half the turns below and above which that work says nothing
+
+
+@kernel
+def least_cosine(work: Work) -> float:
+    """Cosine of half the largest turn of a body over the intervals 1-2 and 2-3."""
+    c = 1.0
+    for i in range(work.turn.shape[0]):
+        c = min(c, work.turn_in[i, 0], work.turn[i, 0])
+    return c
+
+
+@kernel
+def constraint_work(model: Model, work: Work, h: float, v: Vector) -> float:
+    """Work of joints, loops and contacts in the solved step [J]."""
+    total = 0.0
+    o = work.origin
+    for i in range(model.body_parent.shape[0]):
+        b, x = work.balance[i], work.pos2[i]
+        m = cross(x[0] - o[0], x[1] - o[1], x[2] - o[2], b[0], b[1], b[2])
+        for k in range(3):
+            total += b[k] * (work.move_in[i, k] + work.move[i, k])
+            total += (b[3 + k] - m[k]) * 2.0 * (work.turn_in[i, 1 + k] + work.turn[i, 1 + k])
+    total /= h
+    for d in range(v.shape[0]):
+        total -= dot_six(work.S2[d], work.subtree[model.dof_body[d]]) * (v[d] + work.nu[d])
+    return 0.5 * total
+
+
+@kernel
+def constraints_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
+    """Whether the work of the constraints is more than a share of the kinetic energy, and than noise.
+
+    Noise: kappa/h of each contact and limit, and residuals of the tolerance times the velocities.
+    """
+    gain = constraint_work(model, work, options.h, v)
+    if not gain > 0.0:
+        return False
+    speed = 0.0
+    for d in range(v.shape[0]):
+        speed += 0.5 * abs(v[d] + work.nu[d])
+    noise = options.kappa * (model.contact_body.shape[0] + model.limit_dof.shape[0]) / options.h
+    noise += options.tolerance * residual_scale(work) * speed
+    kinetic = 0.5 * momentum_velocity(model, work, options.h, work.move_in, work.turn_in, v)
+    return gain > _SUSPECT * kinetic + noise
+
+
+@kernel
+def _node_momenta(model: Model, work: Work, h: float, third: bool) -> None:
+    """node_momentum = momentum of each body at node 2, from the interval 1-2, or at node 3, about O."""
+    pos = work.pos3 if third else work.pos2
+    move = work.move if third else work.move_in
+    turn = work.turn if third else work.turn_in
+    for i in range(model.body_parent.shape[0]):
+        P, t, m = work.node_momentum[i], turn[i], model.body_mass[i]
+        for k in range(3):
+            P[k] = m * (move[i, k] / h + 0.5 * h * model.gravity[k])
+        x, y, z = pos[i, 0] - work.origin[0], pos[i, 1] - work.origin[1], pos[i, 2] - work.origin[2]
+        mx, my, mz = cross(x, y, z, P[0], P[1], P[2])
+        a, b, c = angular_momentum(work.node_inertia, i, h, t[0], -t[1], -t[2], -t[3])
+        P[3], P[4], P[5] = mx - a, my - b, mz - c
+
+
+@kernel
+def _turn_spring_momenta(model: Model, work: Work) -> None:
+    """Those of quaternion joints at node 3, from axes of the body there to the columns S3."""
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] == 3:
+            d = model.body_vadr[i + 1] - 3
+            e = rotate(work.rot3, i, work.node_p[d], work.node_p[d + 1], work.node_p[d + 2])
+            for k in range(d, d + 3):
+                S = work.S3[k]
+                work.node_p[k] = S[3] * e[0] + S[4] * e[1] + S[5] * e[2]
+
+
+@kernel
+def node_kinetic(model: Model, work: Work, h: float, q: Vector, v: Vector, third: bool) -> float:
+    """p.M^-1 p/2 at node 3 of the solved step, whose state is (q, v), or at node 2; 0 where M is singular."""
+    pos = work.pos3 if third else work.pos2
+    S = work.S3 if third else work.S2
+    world_inertia(model, work.rot3 if third else work.rot2, work.node_inertia)
+    _node_momenta(model, work, h, third)
+    add_children(model, work.node_momentum)
+    for d in range(v.shape[0]):
+        work.node_p[d] = 0.0
+    add_spring_momentum(model, h, q, v, work.node_p)
+    if third:
+        _turn_spring_momenta(model, work)
+    for d in range(v.shape[0]):
+        work.node_p[d] += dot_six(S[d], work.node_momentum[model.dof_body[d]])
+    spatial_inertia(model, work.origin, pos, work.node_inertia, work.A1)
+    clear(work.node_momentum)
+    if not eliminate_mass(model, S, work.A1, work.node_momentum, work.F, work.z, work.node_share, work.node_p):
+        return 0.0
+    energy = 0.0
+    for d in range(v.shape[0]):
+        energy += 0.5 * work.z[d] * work.z[d] / work.node_share[d]
+    return energy
+
+
+@kernel
+def input_work(model: Model, work: Work, h: float, v: Vector, u: Vector) -> float:
+    """Work of the inputs at node 2, at the mean of the velocities before and after [J]."""
+    total = 0.0
+    for j in range(u.shape[0]):
+        i = model.input_index[j]
+        if model.input_kind[j] == _JOINT:
+            total += 0.5 * h * u[j] * (v[i] + work.nu[i])
+            continue
+        w = model.input_wrench[j]
+        f, t = (w[0], w[1], w[2]), (w[3], w[4], w[5])
+        if model.input_kind[j] == _BODY:
+            f, t = rotate(work.rot2, i, f[0], f[1], f[2]), rotate(work.rot2, i, t[0], t[1], t[2])
+        for k in range(3):
+            total += 0.5 * u[j] * f[k] * (work.move_in[i, k] + work.move[i, k])
+            total += u[j] * t[k] * (work.turn_in[i, 1 + k] + work.turn[i, 1 + k])
+    return total
+
+
+@kernel
+def contact_slack(model: Model, work: Work, options: Options) -> float:
+    """What contacts and limits may give to what overlapped where the step began [J], and kappa/h each."""
+    total = pair_slack(model, work)
+    count = model.limit_dof.shape[0]
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            i, k, n = model.contact_body[c], work.contact_kin[c], work.contact_frame[c]
+            p = model.contact_point[c]
+            x, y, z = rotate(work.rot2, i, p[0], p[1], p[2])
+            rise = n[0] * (work.move[i, 0] + k[6] - x)
+            rise += n[1] * (work.move[i, 1] + k[7] - y) + n[2] * (work.move[i, 2] + k[8] - z)
+            total += work.cone[c, 1] * max(0.0, rise)
+        count += work.near[m, 1] - work.near[m, 0]
+    for k in range(model.limit_dof.shape[0]):
+        d, b = model.limit_dof[k], work.bound_row[k]
+        rise = model.limit_sign[k] * options.h * work.nu[d]
+        if model.limit_cone[k]:
+            rise = b[3] * work.nu[d] + b[4] * work.nu[d + 1] + b[5] * work.nu[d + 2]
+        total += work.bound[k, 1] * max(0.0, rise)
+    return (total + options.kappa * count) / options.h
+
+
+@kernel
+def step_gained(
+    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], hard: bool
+) -> bool:
+    """Whether the solved step gained energy.   inputs: (q, v, u);  hard: there are contacts or limits."""
+    q, v, u = inputs
+    h = options.h
+    turned = least_cosine(work)
+    if turned > _NEAR and model.terrain_size.shape[0] == 0:
+        return False
+    if turned > _FAR and not constraints_gained(model, work, options, v):
+        return False
+    before = node_kinetic(model, work, h, q, v, False)
+    released = gravity_energy(model, work.move) + spring_energy(model, work.theta3) - spring_energy(model, q)
+    given = input_work(model, work, h, v, u)
+    gain = node_kinetic(model, work, h, work.theta3, work.nu, True) - before + released - given
+    allowed = LARGEST_GAIN * (before + abs(released) + abs(given))
+    return gain > allowed and (not hard or gain > allowed + contact_slack(model, work, options))
