@@ -28,6 +28,7 @@ measure() {  # NAME COMMAND...: what it prints goes to NAME.txt
 measure report "$python" -m dojo_opt report all $quick --out "$out"
 export NUMBA_NUM_THREADS=1  # one core, as the tables say
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
+measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
 measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
 measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"

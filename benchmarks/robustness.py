@@ -6,7 +6,8 @@
 Mechanisms: block (8 corners), hopper (2 balls), quadruped with 4 and with 12 contacts. Orientation uniform, joints
 uniform within their limits, linear, angular and joint speeds uniform up to 20 m/s and 20 rad/s; the lowest contact is
 0 to 0.3 m above the ground, for half of the states within 1 cm. Friction 0, 0.5, 1, 2; time step 5 to 50 ms; kappa
-1e-4 and 1e-8. A state whose body turns by half a turn or more in one step cannot be represented: counted apart.
+1e-4 and 1e-8. Counted apart: states whose body turns by half a turn or more in one step, which cannot be represented,
+and those where every solution that was found gains energy, which only a shorter step goes on from.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ FRICTIONS = (0.0, 0.5, 1.0, 2.0)
 TIME_STEPS = (0.005, 0.01, 0.02, 0.05)
 KAPPAS = (1e-4, 1e-8)
 SPEED = 20.0  # [m/s, rad/s]
+GAIN = 0.1  # of the kinetic energy
 
 
 @dataclass
@@ -50,9 +52,10 @@ class Cell:
     kappa: float
     states: int = 0
     refused: int = 0  # states that a step cannot represent
+    gaining: int = 0  # whose solutions gain energy
     iterations: list[int] = field(default_factory=list)  # of the solved steps
     misses: Counter[str] = field(default_factory=Counter)  # by Status
-    unreported: int = 0  # solved by status, but not finite or below the ground
+    unreported: int = 0  # solved by status, but not finite, below the ground, or with more energy than before
 
     @property
     def solved(self) -> int:
@@ -63,6 +66,7 @@ class Cell:
         """Count the states of another cell too."""
         self.states += other.states
         self.refused += other.refused
+        self.gaining += other.gaining
         self.iterations += other.iterations
         self.misses += other.misses
         self.unreported += other.unreported
@@ -126,7 +130,11 @@ def run_cell(name: str, friction: float, h: float, kappa: float, states: int, se
             cell.unreported += status == dojo.Status.SOLVED
         elif status == dojo.Status.SOLVED:
             cell.iterations.append(int(result.iterations))
-            cell.unreported += not (np.isfinite(result.x).all() and lowest(sim, result.x) > -1e-6)
+            gain = sim.energy(result.x) - sim.energy(x)
+            fine = np.isfinite(result.x).all() and lowest(sim, result.x) > -1e-6
+            cell.unreported += not (fine and gain <= GAIN * sim.kinetic_energy(x))
+        elif status == dojo.Status.ENERGY_STEP:
+            cell.gaining += 1
         else:
             cell.misses[status.name] += 1
     return cell
@@ -136,6 +144,7 @@ HEADER = (
     "",
     "states",
     "cannot be represented",
+    "gains energy",
     "solved",
     "not solved",
     "median",
@@ -150,7 +159,7 @@ def line(cell: Cell, label: str) -> list[TableCell]:
     its = cell.iterations or [0]
     spread = [float(np.median(its)), float(np.percentile(its, 99)), max(its)]
     misses = ", ".join(f"{name} {count}" for name, count in cell.misses.items())
-    return [label, cell.states, cell.refused, cell.solved, cell.misses.total(), *spread, misses]
+    return [label, cell.states, cell.refused, cell.gaining, cell.solved, cell.misses.total(), *spread, misses]
 
 
 def total(cells: list[Cell], name: str) -> Cell:
@@ -180,7 +189,10 @@ def summary(cells: list[Cell]) -> Report:
     report.rows = [
         number("states", whole.states),
         number("not solved", whole.misses.total(), 0),
-        number("called solved without being so", whole.unreported, 0, note="not finite, or below the ground"),
+        number(
+            "called solved without being so", whole.unreported, 0, note="not finite, below the ground, or gains energy"
+        ),
+        number("refused: every solution found gains energy", whole.gaining),
         number("iterations, median", float(np.median(its))),
         number("iterations, 99 %", float(np.percentile(its, 99))),
         number("iterations, most", max(its)),

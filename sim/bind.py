@@ -28,6 +28,7 @@ _MOTION_OF_LOOPS = (
     late.is_farther,
     late.lead_again,
     late.loops_gained,
+    late.loop_slack,
 )
 _PAIRS = (
     late.pair_kinematics,

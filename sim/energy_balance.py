@@ -4,7 +4,7 @@ The equations of a step have several solutions. One is reached as the step grows
 and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
 up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy,
 
-    K3 + V3 - K2 - V2 - W > 0.1 (K2 + |V3 - V2| + |W|) + slack,
+    K3 + V3 - K2 - V2 - W > 0.1 max(K2, |V3 - V2| + |W|) + slack,
 
 K + V the energies of the nodes (energy.py), W the work of the inputs. Dampers and friction only lose. Contacts and
 limits may give, in all,
@@ -12,6 +12,7 @@ limits may give, in all,
     slack = sum over contacts and limits of gamma max(0, gap3 - gap2)/h + kappa/h
 
 the work of those that throw out what overlapped where the step began; others have gap2 >= 0 and gamma gap3 = kappa.
+Loops may give what closes them, where they were open.
 
 Energies of nodes cost a factorisation of the mass matrix each. They are asked for where constraints did work,
 
@@ -30,7 +31,7 @@ from sim.angular_momentum import angular_momentum
 from sim.dynamics import world_inertia
 from sim.elimination import add_children, dot_six
 from sim.energy import add_spring_momentum, gravity_energy, momentum_velocity, spatial_inertia, spring_energy
-from sim.late import pair_slack
+from sim.late import loop_slack, pair_slack
 from sim.mass import eliminate_mass
 from sim.model import InputKind, Model, Vector
 from sim.options import Options
@@ -187,10 +188,8 @@ def contact_slack(model: Model, work: Work, options: Options) -> float:
 
 
 @kernel
-def step_gained(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], hard: bool
-) -> bool:
-    """Whether the solved step gained energy.   inputs: (q, v, u);  hard: there are contacts or limits."""
+def step_gained(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> bool:
+    """Whether the solved step gained energy.   inputs: (q, v, u)."""
     q, v, u = inputs
     h = options.h
     turned = least_cosine(work)
@@ -202,5 +201,5 @@ def step_gained(
     released = gravity_energy(model, work.move) + spring_energy(model, work.theta3) - spring_energy(model, q)
     given = input_work(model, work, h, v, u)
     gain = node_kinetic(model, work, h, work.theta3, work.nu, True) - before + released - given
-    allowed = LARGEST_GAIN * (before + abs(released) + abs(given))
-    return gain > allowed and (not hard or gain > allowed + contact_slack(model, work, options))
+    allowed = LARGEST_GAIN * max(before, abs(released) + abs(given))
+    return gain > allowed and gain > allowed + loop_slack(model, work, options) + contact_slack(model, work, options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim import late
 from sim.dynamics import begin_step
+from sim.energy_balance import step_gained
 from sim.late import (
     is_farther,
     lead_again,
@@ -26,6 +27,7 @@ _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)
 _ANGULAR_STEP = int(Status.ANGULAR_STEP)
 _LOOP_STEP = int(Status.LOOP_STEP)
+_ENERGY_STEP = int(Status.ENERGY_STEP)
 _LEADS = 2  # times that directions of loops are found anew
 
 
@@ -36,10 +38,16 @@ def _after(r: Outcome, last: Outcome) -> Outcome:
 
 
 @inlined
-def _checked(model: Model, work: Work, options: Options, v: Vector, r: Outcome) -> Outcome:
-    """The outcome of a step, refused where the forces of loops gave energy (coupling/loop_work.py)."""
-    if r.status == _SOLVED and loops_gained(model, work, options, v):
+def _checked(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], r: Outcome) -> Outcome:
+    """The outcome of a step, refused where the forces of loops gave energy (coupling/loop_work.py), or it gained some.
+
+    The interior point asks for the latter of every solution it finds.
+    """
+    if r.status == _SOLVED and loops_gained(model, work, options, inputs[1]):
         return Outcome(_LOOP_STEP, r.iterations, r.residual, r.violation)
+    smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
+    if r.status == _SOLVED and smooth and step_gained(model, work, options, inputs):
+        return Outcome(_ENERGY_STEP, r.iterations, r.residual, r.violation)
     return r
 
 
@@ -53,7 +61,7 @@ def solve_branch(
     if loops_regular(model, work):
         r = _after(r, solve(model, work, options, q, v, u, guess))
         if stay_regular(model, work, r.status):
-            return _checked(model, work, options, v, r)
+            return _checked(model, work, options, inputs, r)
         guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)
@@ -66,7 +74,7 @@ def solve_branch(
         if r.status != _SOLVED or not lead_again(model, work, options.h, q):
             break
         r = _after(r, solve(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses)))
-    return _checked(model, work, options, v, r)
+    return _checked(model, work, options, inputs, r)
 
 
 @late.step.defined(otherwise=int(Status.NOT_FINITE))

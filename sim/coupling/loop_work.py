@@ -62,6 +62,12 @@ def _closing_work(model: Model, work: Work, tolerance: float) -> float:
     return total
 
 
+@late.loop_slack.defined(otherwise=0.0)
+def loop_slack(model: Model, work: Work, options: Options) -> float:
+    """Energy that the forces of loops may give to close what was open where the step began [J]."""
+    return 0.5 * _closing_work(model, work, options.tolerance) / options.h
+
+
 @late.loops_gained.defined(otherwise=False)
 def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the forces of loops did work on the way 1-2-3, which those of a motion do to O(h^3) only.
@@ -79,4 +85,4 @@ def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     most = _SHARE * 0.5 * (before + after)
     if not (gain > most and after > before):
         return False
-    return gain - 0.5 * _closing_work(model, work, options.tolerance) / h > most
+    return gain - loop_slack(model, work, options) > most

@@ -141,8 +141,8 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
         return _ANGULAR_STEP
     after = node_energy(model, work)
     stored = abs(after[1] - before[1])
-    gained = after[0] + after[1] - before[0] - before[1] - given > LARGEST_GAIN * (before[0] + stored + abs(given))
-    return _ENERGY_STEP if gained else _SOLVED
+    gain = after[0] + after[1] - before[0] - before[1] - given
+    return _ENERGY_STEP if gain > LARGEST_GAIN * max(before[0], stored + abs(given)) else _SOLVED
 
 
 @kernel

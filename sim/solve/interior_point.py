@@ -155,7 +155,7 @@ def misplacement(
     found = overlapping(model, work)
     if found == PLACED and pairs_gained(model, work, options, inputs[1]):
         return ASTRAY
-    if found == PLACED and step_gained(model, work, options, inputs, True):
+    if found == PLACED and step_gained(model, work, options, inputs):
         return WOUND_UP
     return found
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from sim import late
 from sim.dynamics import momentum_balance
 from sim.elimination import solve
-from sim.energy_balance import step_gained
 from sim.late import apply_loops, factor_coupling, keep_loops, move_loops, solve_coupling
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
@@ -20,7 +19,6 @@ _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
 _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
-_ENERGY_STEP = int(Status.ENERGY_STEP)
 _ROUNDED = 1e-10
 
 
@@ -107,7 +105,5 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         if not newton_step(model, work, h, q, v):
             return Outcome(_SINGULAR, iterations, r, 0.0)
     turn_bodies(work, work.rot3)
-    if step_gained(model, work, options, (q, v, u), False):
-        return Outcome(_ENERGY_STEP, iterations, r, 0.0)
     absorb_residual(model, work)
     return Outcome(_SOLVED, iterations, r, 0.0)

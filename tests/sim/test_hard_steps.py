@@ -21,10 +21,6 @@ CELLS = (
     ("hopper", 2.0, 0.05, 1e-4, 20),
     ("hopper", 2.0, 0.05, 1e-8, 134),
     ("quadruped", 0.0, 0.05, 1e-8, 90),
-    ("quadruped", 0.0, 0.05, 1e-4, 67),
-    ("quadruped", 0.0, 0.05, 1e-8, 67),
-    ("quadruped", 0.0, 0.05, 1e-4, 140),
-    ("quadruped", 0.0, 0.05, 1e-8, 140),
     ("quadruped", 1.0, 0.02, 1e-4, 109),
     ("quadruped", 2.0, 0.02, 1e-4, 130),
     ("quadruped", 2.0, 0.05, 1e-4, 45),
@@ -59,6 +55,20 @@ def test_extreme_state(robustness, cell):
     states = [robustness.random_state(sim, rng) for _ in range(number + 1)]
     result = sim.step(states[-1], np.zeros(sim.nu))
     assert result.status == 0, (result.status, result.residual, result.violation)
+
+
+@pytest.mark.parametrize("kappa", [1e-4, 1e-8])
+@pytest.mark.parametrize("number", [67, 140])
+def test_extreme_state_whose_solutions_gain_energy(robustness, number, kappa):
+    """They were accepted with 2 to 5 times the energy before the step; the motion loses some, in finer steps."""
+    sim = dojo.Simulator(robustness.MECHANISMS["quadruped"](0.0), time_step=0.05, kappa=kappa)
+    rng = np.random.default_rng([0, list(robustness.MECHANISMS).index("quadruped"), 500])
+    x = [robustness.random_state(sim, rng) for _ in range(number + 1)][-1]
+    assert sim.step(x, np.zeros(sim.nu)).status == dojo.Status.ENERGY_STEP
+    finer = sim.replace(time_step=0.05 / 32)
+    start = finer.start(x[: sim.nq], sim.velocity(x))
+    motion = finer.rollout(start, np.zeros((32, sim.nu)), throw=True)
+    assert finer.energy(motion.x[-1]) < finer.energy(start)
 
 
 @pytest.mark.parametrize("kappa", [1e-4, 1e-6, 1e-8, 1e-9])

@@ -1,0 +1,207 @@
+"""Random mechanisms in random states: what a step, a motion and a derivative must never do, counted.
+
+    python benchmarks/attacks.py                 2000 steps, 10,000 motions, 300 derivatives
+    python benchmarks/attacks.py --quick         a check that it runs
+    python benchmarks/attacks.py --only motions --first 5000 --count 2000
+
+steps          one step of any mechanism (random_mechanisms.py), kappa default or 1e-4: no exception, nothing that is not
+               finite, no contact below the ground, no impulse outside its cone, no change of momentum that the impulses
+               and gravity do not explain
+motions        passive trees of 2 to 8 bodies that fall on level ground, .3 s at 10, 20 and 50 ms: of the accepted steps,
+               none gains more than a tenth of the kinetic energy. Refused motions are counted
+derivatives    d(next state)/d(state) of a step at kappa 1e-4 against central differences on the manifold, where those
+               of two step sizes agree
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from command import deliver, number, parser, progress
+from numpy.typing import NDArray
+from random_mechanisms import COMMON, Recipe, heights, random_mechanism, random_state
+
+import dojo_opt as dojo
+from dojo_opt.report.result import Report, Table
+
+Vector = NDArray[np.float64]
+
+TIME_STEPS = (0.01, 0.02, 0.05)
+SECONDS = 0.3
+GAIN = 0.1  # of the kinetic energy, or of LEAST
+LEAST = 1e-3  # [J]
+PASSIVE = Recipe(kinds=COMMON, passive=True, contacts=16)
+ANYTHING = Recipe(bodies=12)
+BELOW = 1e-6  # [m]
+AGREE, WRONG = 1e-6, 1e-4  # of central differences of two step sizes; of a derivative, relative to the largest
+
+
+def outside_cones(mech: dojo.Mechanism, contacts: Any) -> float:
+    """Largest friction beyond the cone of its contact, over the largest impulse; pyramids lie inside sqrt(2) cones."""
+    normal, friction = contacts.normal_force, contacts.friction_force
+    parts = {c.name: c for c in (*mech.contacts, *mech.collisions)}
+    most = np.array(
+        [parts[name.split("[")[0]].friction if name.split("[")[0] in parts else np.inf for name in contacts.names]
+    )
+    wide = np.array([np.sqrt(2.0) if getattr(parts.get(n), "law", "") == "linear" else 1.0 for n in contacts.names])
+    excess = np.maximum(friction - most * wide * np.maximum(normal, 0.0), -normal)
+    return float(np.max(excess, initial=0.0) / (1.0 + np.max(np.abs(normal), initial=0.0)))
+
+
+def momentum_error(sim: dojo.Simulator, x: Vector, result: Any) -> float:
+    """Linear momentum that gravity and the impulses of the ground do not explain, over all there is."""
+    mass = sum(b.mass for b in sim.mechanism.bodies)
+    before, after = sim.momentum(x)[0], sim.momentum(result.x)[0]
+    ground = result.contacts.impulse[: len(sim.mechanism.contacts)].sum(axis=0)
+    given = ground + mass * np.asarray(sim.mechanism.gravity) * sim.time_step
+    size = 1.0 + np.abs(before).max() + np.abs(after).max() + np.abs(result.contacts.impulse).sum()
+    return float(np.abs(after - before - given).max() / size)
+
+
+def judge_step(sim: dojo.Simulator, x: Vector) -> str:
+    """What one step did: the name of its status, or of what it must not do."""
+    try:
+        result = sim.step(x)
+    except Exception as error:  # whatever it is, it is counted
+        return f"exception {type(error).__name__}"
+    arrays = (result.x, result.contacts.impulse, result.contacts.gap, result.contacts.slip, result.contacts.point)
+    if not all(np.isfinite(a).all() for a in arrays):
+        return f"not finite, {result.status.name}"
+    if not result.success:
+        return str(result.status.name)
+    if heights(sim, result.x).min() < -BELOW:
+        return "below the ground"
+    if outside_cones(sim.mechanism, result.contacts) > 1e-6:
+        return "outside its cone"
+    if momentum_error(sim, x, result) > 1e-6:
+        return "momentum"
+    return "SOLVED"
+
+
+def step_case(seed: int) -> str:
+    """One step of a random mechanism."""
+    rng = np.random.default_rng([seed, 1])
+    mech = random_mechanism(rng, ANYTHING)
+    kappa = None if rng.random() < 0.7 else 1e-4
+    sim = dojo.Simulator(mech, time_step=float(rng.choice([0.001, 0.005, *TIME_STEPS])), kappa=kappa)
+    return judge_step(sim, random_state(sim, rng))
+
+
+def motion_case(seed: int) -> tuple[float, str, float]:
+    """(time step, status, largest gain of an accepted step) of a passive fall."""
+    rng = np.random.default_rng([seed, 2])
+    h = TIME_STEPS[seed % len(TIME_STEPS)]
+    sim = dojo.Simulator(random_mechanism(rng, PASSIVE), time_step=h)
+    motion = sim.rollout(random_state(sim, rng), np.zeros((round(SECONDS / h), sim.nu)))
+    energy, kinetic = np.asarray(sim.energy(motion.x)), np.asarray(sim.kinetic_energy(motion.x))
+    gains = np.diff(energy) / np.maximum(kinetic[:-1], LEAST)
+    return h, motion.status.name, float(gains.max(initial=-1.0))
+
+
+def difference(sim: dojo.Simulator, x: Vector, direction: Vector, eps: float) -> Vector | None:
+    """Central difference of the next state along a direction, (ndx,); None where a step is not solved."""
+    ends = [sim.step(sim.integrate(x, s * eps * direction)) for s in (1.0, -1.0)]
+    if not all(end.success for end in ends):
+        return None
+    return np.asarray(sim.difference(ends[0].x, ends[1].x) / (2.0 * eps))
+
+
+def derivative_case(seed: int) -> float | None:
+    """Largest error of a derivative along a random direction, relative; None without a reference."""
+    rng = np.random.default_rng([seed, 3])
+    sim = dojo.Simulator(random_mechanism(rng, ANYTHING), time_step=0.01, kappa=1e-4, tolerance=1e-12)
+    x, direction = random_state(sim, rng), rng.normal(size=sim.ndx)
+    if not sim.step(x).success:
+        return None
+    coarse, fine = (difference(sim, x, direction, eps) for eps in (1e-6, 3e-7))
+    if coarse is None or fine is None:
+        return None
+    size = 1.0 + np.abs(fine).max()
+    if np.abs(coarse - fine).max() > AGREE * size:
+        return None
+    A, _ = sim.linearize(x, np.zeros(sim.nu))
+    return float(np.abs(A @ direction - fine).max() / size)
+
+
+def attack(args: argparse.Namespace) -> Report:
+    """All sections."""
+    sizes = {"steps": 2000, "motions": 10_000, "derivatives": 300}
+    if args.quick:
+        sizes = {"steps": 40, "motions": 60, "derivatives": 10}
+    report = Report("Attacks with random mechanisms", "")
+    for name, section in (("steps", steps), ("motions", motions), ("derivatives", derivatives)):
+        if args.only in (None, name):
+            section(report, range(args.first, args.first + (args.count or sizes[name])))
+    return report
+
+
+def steps(report: Report, seeds: range) -> None:
+    """One step each."""
+    named = [(f"step {seed}", (seed,)) for seed in seeds]
+    ends = Counter(step_case(*case) for case in progress()(named, "steps"))
+    allowed = {status.name for status in dojo.Status}
+    wrong = {name: count for name, count in ends.items() if name not in allowed}
+    report.rows += [
+        number("steps: tried", len(seeds)),
+        number("steps: wrong", sum(wrong.values()), 0, note=", ".join(wrong)),
+        number("steps: refused", len(seeds) - ends["SOLVED"] - sum(wrong.values())),
+    ]
+    report.tables.append(Table("Steps", ("ended", "steps"), [list(end) for end in ends.most_common()]))
+
+
+def motions(report: Report, seeds: range) -> None:
+    """Passive falls."""
+    named = [(f"motion {seed}", (seed,)) for seed in seeds]
+    cases = [motion_case(*case) for case in progress()(named, "motions")]
+    lines = []
+    for h in TIME_STEPS:
+        here = [case for case in cases if case[0] == h]
+        refused = Counter(status for _, status, _ in here if status != "SOLVED")
+        gained = sum(gain > GAIN for *_, gain in here)
+        worst = max((gain for *_, gain in here), default=0.0)
+        why = ", ".join(f"{name} {count}" for name, count in refused.items())
+        lines.append([f"{1e3 * h:g} ms", len(here), gained, worst, refused.total(), why])
+    gaining = [seed for seed, case in zip(seeds, cases, strict=True) if case[2] > GAIN]
+    report.rows += [
+        number("motions: tried", len(seeds)),
+        number(
+            "motions: accepted steps that gain energy", len(gaining), 0, note=f"seeds {gaining[:9]}" if gaining else ""
+        ),
+        number("motions: refused", sum(line[4] for line in lines)),
+    ]
+    header = ("time step", "motions", "gained more than a tenth", "largest gain", "refused", "by status")
+    report.tables.append(Table("Passive falls", header, lines))
+
+
+def derivatives(report: Report, seeds: range) -> None:
+    """Against central differences."""
+    named = [(f"derivative {seed}", (seed,)) for seed in seeds]
+    errors = [derivative_case(*case) for case in progress()(named, "derivatives")]
+    known = [error for error in errors if error is not None]
+    wrong = [seed for seed, error in zip(seeds, errors, strict=True) if error is not None and error > WRONG]
+    report.rows += [
+        number("derivatives: with a reference", len(known)),
+        number("derivatives: wrong", len(wrong), 0, note=f"seeds {wrong[:9]}" if wrong else ""),
+        number("derivatives: median error", float(np.median(known)) if known else 0.0),
+        number("derivatives: largest error", max(known, default=0.0)),
+    ]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report; exit status 1 if anything happened that must not."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--only", choices=("steps", "motions", "derivatives"), help="one section")
+    arguments.add_argument("--first", type=int, default=0, help="first seed")
+    arguments.add_argument("--count", type=int, help="cases of each section")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of strange inertias
+        return deliver("attacks", attack, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
