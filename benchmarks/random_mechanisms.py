@@ -1,4 +1,4 @@
-"""Random mechanisms for benchmarks/attacks.py: trees of any joints, with contacts, shapes, springs and stops; states."""
+"""Random mechanisms and states for benchmarks/attacks.py: trees of any joints, with contacts, shapes and springs."""
 
 from __future__ import annotations
 

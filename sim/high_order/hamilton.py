@@ -110,7 +110,7 @@ def node_energy(model: Model, work: Work) -> tuple[float, float]:
 
 @kernel
 def outer_power(model: Model, work: Work, u: Vector) -> float:
-    """Power of gravity and inputs [W], with their wrenches, which `momentum_rates` leaves, in work.balance: of subtrees."""
+    """Power of gravity and inputs [W], with the wrenches on subtrees that `momentum_rates` leaves in work.balance."""
     power = 0.0
     for d in range(work.nu.shape[0]):
         power += dot_six(work.S2[d], work.balance[model.dof_body[d]]) * work.nu[d]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmark import loaded
 from naive import rotation as rot
-from scenes import KINDS, ball, block, chain, free_body, order, pendulum, random_state
+from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
 from sim.bind import bind_step
