@@ -75,6 +75,12 @@ def constraint_work(model: Model, work: Work, h: float, v: Vector) -> float:
 
 
 @kernel
+def smoothing_energy(model: Model, options: Options) -> float:
+    """kappa/h of each contact and limit [J]: gamma gap of all on the central path."""
+    return options.kappa * (model.contact_body.shape[0] + model.limit_dof.shape[0]) / options.h
+
+
+@kernel
 def constraints_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the work of the constraints is more than a share of the kinetic energy, and than noise.
 
@@ -86,8 +92,7 @@ def constraints_gained(model: Model, work: Work, options: Options, v: Vector) ->
     speed = 0.0
     for d in range(v.shape[0]):
         speed += 0.5 * abs(v[d] + work.nu[d])
-    noise = options.kappa * (model.contact_body.shape[0] + model.limit_dof.shape[0]) / options.h
-    noise += options.tolerance * residual_scale(work) * speed
+    noise = smoothing_energy(model, options) + options.tolerance * residual_scale(work) * speed
     kinetic = 0.5 * momentum_velocity(model, work, options.h, work.move_in, work.turn_in, v)
     return gain > _SUSPECT * kinetic + noise
 
@@ -168,7 +173,6 @@ def input_work(model: Model, work: Work, h: float, v: Vector, u: Vector) -> floa
 def contact_slack(model: Model, work: Work, options: Options) -> float:
     """What contacts and limits may give to what overlapped where the step began [J], and kappa/h each."""
     total = pair_slack(model, work)
-    count = model.limit_dof.shape[0]
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             i, k, n = model.contact_body[c], work.contact_kin[c], work.contact_frame[c]
@@ -177,14 +181,13 @@ def contact_slack(model: Model, work: Work, options: Options) -> float:
             rise = n[0] * (work.move[i, 0] + k[6] - x)
             rise += n[1] * (work.move[i, 1] + k[7] - y) + n[2] * (work.move[i, 2] + k[8] - z)
             total += work.cone[c, 1] * max(0.0, rise)
-        count += work.near[m, 1] - work.near[m, 0]
     for k in range(model.limit_dof.shape[0]):
         d, b = model.limit_dof[k], work.bound_row[k]
         rise = model.limit_sign[k] * options.h * work.nu[d]
         if model.limit_cone[k]:
             rise = b[3] * work.nu[d] + b[4] * work.nu[d + 1] + b[5] * work.nu[d + 2]
         total += work.bound[k, 1] * max(0.0, rise)
-    return (total + options.kappa * count) / options.h
+    return total / options.h + smoothing_energy(model, options)
 
 
 @kernel
