@@ -8,6 +8,8 @@ Contacts, dampers and inputs act between nodes and are not part of it.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from sim.angular_momentum import angular_momentum
 from sim.coordinates import node_poses
 from sim.dynamics import world_inertia
@@ -16,33 +18,47 @@ from sim.joints.ball_spring import relative_to_rest
 from sim.late import close_velocity
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
-from sim.rotation import cross, quat_exp, quat_mul
+from sim.rotation import Vec3, cross, quat_exp, quat_mul
 from sim.work import Work
 from solvers.jit import kernel
 from solvers.record import Table
 
 
+class Arrival(NamedTuple):
+    """The bodies at the end of an interval, and how they moved over it."""
+
+    pos: Matrix  # (nbody, 3)
+    move: Matrix  # (nbody, 3)
+    turn: Matrix  # (nbody, 4)
+    inertia: Matrix  # (nbody, 9) world axes
+
+
 @kernel
-def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) -> None:
-    """out[i] = momentum of body i at the node, world axes, about the origin of the world:
+def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, out: Matrix) -> None:
+    """out[i] = momentum of body i at the node where the interval ends, world axes, about `origin`:
 
         linear     p = m (x2 - x1)/h + h/2 m g
         angular    x2 x p + P-(1, 2)
 
-    Springs and joints are left out: between bodies they cancel.   Fills configurations 1 and 2.   out: (nbody, 6).
+    Springs and joints are left out: between bodies they cancel.   out: (nbody, 6).
     """
+    for i in range(model.body_parent.shape[0]):
+        P, t, m = out[i], end.turn[i], model.body_mass[i]
+        for k in range(3):
+            P[k] = m * (end.move[i, k] / h + 0.5 * h * model.gravity[k])
+        x, y, z = end.pos[i, 0] - origin[0], end.pos[i, 1] - origin[1], end.pos[i, 2] - origin[2]
+        mx, my, mz = cross(x, y, z, P[0], P[1], P[2])
+        a, b, c = angular_momentum(end.inertia, i, h, t[0], -t[1], -t[2], -t[3])
+        P[3], P[4], P[5] = mx - a, my - b, mz - c
+
+
+@kernel
+def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) -> None:
+    """`arriving_momentum` of the state x, about the origin of the world.   Fills configurations 1 and 2."""
     node_poses(model, work, h, x)
     world_inertia(model, work.rot2, work.inertia_world)
-    for i in range(model.body_parent.shape[0]):
-        t = work.turn_in[i]
-        Px, Py, Pz = angular_momentum(work.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
-        m = model.body_mass[i]
-        for k in range(3):
-            out[i, k] = m * (work.move_in[i, k] / h + 0.5 * h * model.gravity[k])
-        mx, my, mz = cross(work.pos2[i, 0], work.pos2[i, 1], work.pos2[i, 2], out[i, 0], out[i, 1], out[i, 2])
-        out[i, 3] = mx - Px
-        out[i, 4] = my - Py
-        out[i, 5] = mz - Pz
+    end = Arrival(work.pos2, work.move_in, work.turn_in, work.inertia_world)
+    arriving_momentum(model, h, end, (0.0, 0.0, 0.0), out)
 
 
 @kernel

@@ -27,10 +27,17 @@ steps of random trees (benchmarks/energy_steps.py), none that is accepted withou
 
 from __future__ import annotations
 
-from sim.angular_momentum import angular_momentum
 from sim.dynamics import world_inertia
 from sim.elimination import add_children, dot_six
-from sim.energy import add_spring_momentum, gravity_energy, momentum_velocity, spatial_inertia, spring_energy
+from sim.energy import (
+    Arrival,
+    add_spring_momentum,
+    arriving_momentum,
+    gravity_energy,
+    momentum_velocity,
+    spatial_inertia,
+    spring_energy,
+)
 from sim.late import loop_slack, pair_slack
 from sim.mass import eliminate_mass
 from sim.model import InputKind, Model, Vector
@@ -98,22 +105,6 @@ def constraints_gained(model: Model, work: Work, options: Options, v: Vector) ->
 
 
 @kernel
-def _node_momenta(model: Model, work: Work, h: float, third: bool) -> None:
-    """node_momentum = momentum of each body at node 2, from the interval 1-2, or at node 3, about O."""
-    pos = work.pos3 if third else work.pos2
-    move = work.move if third else work.move_in
-    turn = work.turn if third else work.turn_in
-    for i in range(model.body_parent.shape[0]):
-        P, t, m = work.node_momentum[i], turn[i], model.body_mass[i]
-        for k in range(3):
-            P[k] = m * (move[i, k] / h + 0.5 * h * model.gravity[k])
-        x, y, z = pos[i, 0] - work.origin[0], pos[i, 1] - work.origin[1], pos[i, 2] - work.origin[2]
-        mx, my, mz = cross(x, y, z, P[0], P[1], P[2])
-        a, b, c = angular_momentum(work.node_inertia, i, h, t[0], -t[1], -t[2], -t[3])
-        P[3], P[4], P[5] = mx - a, my - b, mz - c
-
-
-@kernel
 def _turn_spring_momenta(model: Model, work: Work) -> None:
     """Those of quaternion joints at node 3, from axes of the body there to the columns S3."""
     for i in range(model.body_parent.shape[0]):
@@ -128,10 +119,13 @@ def _turn_spring_momenta(model: Model, work: Work) -> None:
 @kernel
 def node_kinetic(model: Model, work: Work, h: float, q: Vector, v: Vector, third: bool) -> float:
     """p.M^-1 p/2 at node 3 of the solved step, whose state is (q, v), or at node 2; 0 where M is singular."""
-    pos = work.pos3 if third else work.pos2
     S = work.S3 if third else work.S2
+    o = (work.origin[0], work.origin[1], work.origin[2])
+    end = Arrival(work.pos2, work.move_in, work.turn_in, work.node_inertia)
+    if third:
+        end = Arrival(work.pos3, work.move, work.turn, work.node_inertia)
     world_inertia(model, work.rot3 if third else work.rot2, work.node_inertia)
-    _node_momenta(model, work, h, third)
+    arriving_momentum(model, h, end, o, work.node_momentum)
     add_children(model, work.node_momentum)
     for d in range(v.shape[0]):
         work.node_p[d] = 0.0
@@ -140,7 +134,7 @@ def node_kinetic(model: Model, work: Work, h: float, q: Vector, v: Vector, third
         _turn_spring_momenta(model, work)
     for d in range(v.shape[0]):
         work.node_p[d] += dot_six(S[d], work.node_momentum[model.dof_body[d]])
-    spatial_inertia(model, work.origin, pos, work.node_inertia, work.A1)
+    spatial_inertia(model, work.origin, end.pos, work.node_inertia, work.A1)
     clear(work.node_momentum)
     if not eliminate_mass(model, S, work.A1, work.node_momentum, work.F, work.z, work.node_share, work.node_p):
         return 0.0
