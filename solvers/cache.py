@@ -26,7 +26,7 @@ import tempfile
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +41,6 @@ _KEEP = 4  # digests kept on disk: the newest few, so that switching between two
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
 _CHECK = hashlib.blake2b().digest_size  # bytes of a file before what it holds
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
-
-
-# -- the folder --------------------------------------------------------------------------------------------------------
 
 
 def _sources() -> list[Path]:
@@ -127,9 +124,6 @@ def cache_folder() -> Path | None:
     return _found()[0]
 
 
-# -- what it holds -----------------------------------------------------------------------------------------------------
-
-
 class Store:
     """The files of the folder, each as it was written or not at all."""
 
@@ -209,7 +203,7 @@ class Store:
 STORE = Store()
 
 
-@lru_cache(maxsize=None)
+@cache
 def _text_digest(file: str) -> bytes:
     return hashlib.sha256(Path(file).read_bytes()).digest()
 
@@ -225,20 +219,16 @@ class KernelCache(FunctionCache):
         self._cache_path = str(STORE.folder)
         self.enable()
 
-    def _key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
-        """What the compiled code depends on, apart from the sources of the digest."""
+    def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
+        """(what the compiled code depends on, apart from the sources of the digest; name of its file)."""
         version = (*sys.version_info[:2], getattr(sys, "abiflags", ""))
-        return (self._form, self._file, _text_digest(self._file), version, self._index_key(sig, codegen))
-
-    def _name(self, key: tuple[Any, ...]) -> str:
-        """Name of the file: readable, and another one for every key."""
-        return f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
+        key = (self._form, self._file, _text_digest(self._file), version, self._index_key(sig, codegen))
+        return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compile result that was kept for this signature; None where there is none, or none of use."""
         target_context.refresh()
-        key = self._key(sig, target_context.codegen())
-        name = self._name(key)
+        key, name = self._key(sig, target_context.codegen())
         try:
             kept, payload = pickle.loads(STORE.read(name))
             if kept == key:
@@ -255,8 +245,8 @@ class KernelCache(FunctionCache):
         if data.lifted or data.library.has_dynamic_globals:
             STORE.tell(f"{self._py_func.__name__} holds addresses of this process")
             return
-        key = self._key(sig, data.codegen)
-        STORE.write(self._name(key), dumps((key, data._reduce())))
+        key, name = self._key(sig, data.codegen)
+        STORE.write(name, dumps((key, data._reduce())))
 
     def flush(self) -> None:
         """Drop what is kept of this form."""

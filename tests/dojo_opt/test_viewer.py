@@ -146,7 +146,10 @@ def opened(page, path):
     """What went wrong, or out, after loading a page and opening every folder of MeshCat's menu."""
     wrong = []
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("request", lambda request: wrong.append(request.url) if request.url[:5] not in ("file:", "data:", "blob:") else None)
+    page.on(
+        "request",
+        lambda request: wrong.append(request.url) if request.url[:5] not in ("file:", "data:", "blob:") else None,
+    )
     page.add_init_script("window.hits = []; window.hit = name => window.hits.push(name)")
     page.goto(path.as_uri())
     page.evaluate("document.querySelectorAll('.dg .title, .dg .close-button').forEach(e => e.click())")
@@ -164,8 +167,7 @@ def test_names_of_a_user_are_text_in_the_page(page, tmp_path, names):
     assert opened(page, path) == []
     assert page.title() == " ".join(names[0].split())
     assert page.locator("#bar b").inner_text() == names[0]
-    parts = page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'bodies']).children)")
-    assert len(parts) == 1 and "hit" in names[1] or names[1].replace("/", "|") in parts[0] or "<object>" in names[1]
+    assert page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'bodies']).children).length") == 1
     dojo.plots.trajectory(motion_of).savefig(tmp_path / "a.png")
 
 

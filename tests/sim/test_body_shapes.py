@@ -29,13 +29,22 @@ def trunk(folder: Path) -> Path:
     seen = collision(ROTOR).replace("collision", "visual")
     rotor = link("rotor", inertial(0.1), collision(ROTOR), seen)
     at = 'xyz="0.2 0 0" rpy="0 0 0"'
-    head = link("head", inertial(0.1), collision('<sphere radius="0.03"/>'), collision('<capsule radius="0.03" length="0.04"/>'))
+    head = link(
+        "head", inertial(0.1), collision('<sphere radius="0.03"/>'), collision('<capsule radius="0.03" length="0.04"/>')
+    )
     parts = (link("trunk", inertial(5.0), collision(TRUNK)), rotor, head)
-    return write(folder, *parts, joint("a", "trunk", "rotor", "fixed", "", at=at), joint("b", "trunk", "head", "fixed", "", at=at))
+    return write(
+        folder,
+        *parts,
+        joint("a", "trunk", "rotor", "fixed", "", at=at),
+        joint("b", "trunk", "head", "fixed", "", at=at),
+    )
 
 
 def test_the_largest_shape_of_a_merged_body_stays_and_the_others_are_named(tmp_path: Path) -> None:
-    with pytest.warns(dojo.UrdfWarning, match=f"{LEFT_OUT}: rotor \\(cylinder\\), head \\(sphere\\), head \\(capsule\\)"):
+    with pytest.warns(
+        dojo.UrdfWarning, match=f"{LEFT_OUT}: rotor \\(cylinder\\), head \\(sphere\\), head \\(capsule\\)"
+    ):
         mech = dojo.load_urdf(trunk(tmp_path))
     shape = mech.bodies[0].shape
     assert isinstance(shape, dojo.Box) and (shape.x, shape.y, shape.z) == (0.4, 0.1, 0.12)
@@ -57,7 +66,10 @@ def test_a_trunk_with_rotors_lands_on_a_beam(tmp_path: Path) -> None:
 def test_what_is_seen_only_counts_where_nothing_collides(tmp_path: Path) -> None:
     small, big = '<sphere radius="0.1"/>', '<sphere radius="0.3"/>'
     seen = collision(big).replace("collision", "visual")
-    for parts, radius in (((collision(small), seen), 0.1), ((seen, collision(small).replace("collision", "visual")), 0.3)):
+    for parts, radius in (
+        ((collision(small), seen), 0.1),
+        ((seen, collision(small).replace("collision", "visual")), 0.3),
+    ):
         mech = dojo.load_urdf(write(tmp_path, link("ball", inertial(), *parts)), ground=False)
         assert isinstance(mech.bodies[0].shape, dojo.Sphere) and mech.bodies[0].shape.radius == radius
         assert left_out(mech) == ()

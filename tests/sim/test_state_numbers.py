@@ -72,7 +72,9 @@ def test_a_result_is_finite_or_refused(name: str, call: str, rng: np.random.Gene
             except ValueError as error:
                 assert str(error).startswith(("Simulator.", "Mechanism(")), error
                 refused = True
-    assert refused or call not in ("energy", "kinetic_energy", "momentum", "difference of opposites"), "nothing was refused"
+    assert refused or call not in ("energy", "kinetic_energy", "momentum", "difference of opposites"), (
+        "nothing was refused"
+    )
 
 
 def test_the_joint_whose_numbers_are_largest_is_named() -> None:
@@ -98,7 +100,9 @@ def test_a_quaternion_of_length_zero_is_refused(name: str, call: str) -> None:
         pytest.skip("of order 2")
     x = sim.neutral()
     x[3:7] = 0.0
-    with pytest.raises(ValueError, match=f"Simulator.{call.split()[0]}.* joint '.*expected a unit quaternion, got length 0"):
+    with pytest.raises(
+        ValueError, match=f"Simulator.{call.split()[0]}.* joint '.*expected a unit quaternion, got length 0"
+    ):
         CALLS[call](sim, x)
 
 
