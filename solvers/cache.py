@@ -129,8 +129,7 @@ class Store:
 
     def __init__(self) -> None:
         self.folder, self.why_not = _found()
-        self.wanted = self.folder is not None or bool(self.why_not)
-        self._told = False
+        self.wanted, self._told = self.folder is not None or bool(self.why_not), False
         if self.folder is not None:
             with suppress(OSError):  # one that is filled, and read-only
                 os.utime(self.folder)
@@ -183,10 +182,7 @@ class Store:
         if self.folder is not None:
             path = self.folder / name
             with suppress(OSError):
-                if path.is_dir() and not path.is_symlink():
-                    shutil.rmtree(path)
-                else:
-                    path.unlink()
+                shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
 
     def tell(self, why: str) -> None:
         """Warn, once, that compiled code is not kept."""

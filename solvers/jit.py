@@ -1,5 +1,5 @@
-"""`@kernel`: Numba, its flags, and compiled code on disk, which cache.py keeps. (Numba is imported here and in cache.py,
-code.py, lowering.py, arithmetic.py, lanes.py, late.py and record.py only.)
+"""`@kernel`: Numba, its flags, and compiled code on disk, of cache.py. (Numba is imported here, in cache.py, code.py,
+lowering.py, arithmetic.py, lanes.py, late.py and record.py only.)
 """
 
 from __future__ import annotations
