@@ -217,7 +217,7 @@ def _warmup(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({**numbers, "cache": str(folder) if folder else None}))
     else:
-        where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no folder can be written)"
+        where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no folder can be used)"
         print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)
     return 0 if plan.success else 1
 

@@ -5,15 +5,15 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 
 from __future__ import annotations
 
-import base64
 import warnings
-from importlib.resources import files
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dojo_opt.motion import Motion, motion
+from dojo_opt.viewer_page import page
 from sim import shapes
 from sim.build import contact_frame
 from sim.parts import WORLD
@@ -28,50 +28,7 @@ _THICK = 0.002  # of a drawn plane [m]
 _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
-_SKY, _HORIZON, _FLOOR, _LINE = (1.0, 1.0, 1.0), (0.84, 0.88, 0.93), 0xECEBE7, 0xB9B7B1
-
-_PAGE = """<!DOCTYPE html>
-<html>
-<head><meta charset="utf-8"><title>{title}</title>
-<style>
-body {{margin: 0; font: 14px system-ui, sans-serif; color: #223}}
-#meshcat-pane {{width: 100vw; height: 100vh; overflow: hidden}}
-#bar {{position: absolute; left: 0; right: 0; bottom: 0; display: flex; gap: 12px; align-items: center;
-      padding: 8px 16px; background: rgba(255, 255, 255, 0.8)}}
-#bar input {{flex: 1}} #bar button {{width: 64px}} #clock {{width: 110px; font-variant-numeric: tabular-nums}}
-</style></head>
-<body><div id="meshcat-pane"></div>
-<div id="bar"><b>{title}</b><button id="play">pause</button><input id="time" type="range" min="0" max="{duration}"
-step="0.001" value="0"><span id="clock"></span><span>drag to turn, scroll to zoom</span></div>
-<script>{viewer}</script>
-<script>
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const text of [{commands}])
-    viewer.handle_command_bytearray(Uint8Array.from(atob(text), c => c.charCodeAt(0)));
-viewer.camera.position.set({eye});
-viewer.controls.target.set({target});
-viewer.controls.update();
-viewer.set_property(["Background"], "top_color", [{sky}]);
-viewer.set_property(["Background"], "bottom_color", [{horizon}]);
-viewer.show_background();
-for (const part of ["Axes", "Grid"]) viewer.set_property([part], "visible", false);
-viewer.set_dirty();
-const animator = viewer.animator, slider = document.getElementById("time"), button = document.getElementById("play");
-const now = () => animator.actions.length ? animator.actions[0].time : 0;
-const tell = () => {{document.getElementById("clock").textContent = now().toFixed(2) + " of {duration} s"}};
-button.onclick = () => {{
-    animator.playing ? animator.pause() : animator.play();
-    button.textContent = animator.playing ? "pause" : "play";
-}};
-slider.oninput = () => {{
-    animator.pause();
-    button.textContent = "play";
-    animator.seek(Number(slider.value));
-    tell();
-}};
-setInterval(() => {{ if (animator.playing) {{slider.value = now(); tell();}} }}, 50);
-</script></body></html>
-"""
+_FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
 
 
 def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
@@ -82,24 +39,8 @@ def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = No
 
     m = motion(result, simulator)
     target = Path(path)
-    target.write_text(_page(m, [*_ground(m), *_scene(m), _animation(m)]), encoding="utf-8")
+    target.write_text(page(m, [*_ground(m), *_scene(m), _animation(m)]), encoding="utf-8")
     return target
-
-
-def _page(m: Motion, commands: list[Any]) -> str:
-    """The page that shows the commands, with the camera beside the motion."""
-    from umsgpack import packb
-
-    encoded = ",".join(f'"{base64.b64encode(packb(c.lower())).decode()}"' for c in commands)
-    viewer = files("meshcat").joinpath("viewer/dist/main.min.js").read_text(encoding="utf-8")
-    low, high = m.position.min(axis=(0, 1)), m.position.max(axis=(0, 1))
-    target = 0.5 * (low + high)
-    eye = target + max(1.0, float(np.linalg.norm(high - low))) * np.array([0.5, -1.0, 0.4])
-    # the axes of MeshCat's camera: y is up
-    places = {name: f"{x:.3f}, {z:.3f}, {-y:.3f}" for name, (x, y, z) in (("eye", eye), ("target", target))}
-    places |= {name: ", ".join(map(str, rgb)) for name, rgb in (("sky", _SKY), ("horizon", _HORIZON))}
-    duration = f"{m.time[-1]:.3g}"
-    return _PAGE.format(title=m.mechanism.name, viewer=viewer, commands=encoded, duration=duration, **places)
 
 
 def _ground(m: Motion) -> list[Any]:
@@ -165,29 +106,42 @@ def _scene(m: Motion) -> list[Any]:
     """Commands that draw every body at its first pose: its shape, and a ball for every contact."""
     from meshcat import geometry
     from meshcat.commands import SetObject, SetTransform
-    from meshcat.path import Path as Node
 
     commands = []
     steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
     for k, body in enumerate(m.mechanism.bodies):
-        node = Node(("meshcat", "bodies", body.name))
+        node = _node("bodies", k, body.name)
         for part, (solid, place) in enumerate(_solids(body.shape)):
             commands.append(SetObject(solid, steel, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
-        for contact in m.mechanism.contacts:
+        for c, contact in enumerate(m.mechanism.contacts):
             if contact.body == body.name:
-                ball = node.append(f"contact {contact.name}")
+                ball = node.append(_label(f"contact {c}", contact.name))
                 commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), rubber, ball))
                 commands.append(SetTransform(_place(contact.point), ball))
         commands.append(SetTransform(_place(m.position[0, k], m.quaternion[0, k]), node))
     earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
-    for collision in m.mechanism.collisions:
+    for k, collision in enumerate(m.mechanism.collisions):
         if collision.b != WORLD or isinstance(collision.shape_b, shapes.String):
             continue
         for part, (solid, place) in enumerate(_solids(collision.shape_b)):
-            node = Node(("meshcat", "obstacles", collision.name, f"part{part}"))
+            node = _node("obstacles", k, collision.name).append(f"part{part}")
             commands += [SetObject(solid, earth, node), SetTransform(place, node)]
     return commands
+
+
+def _node(kind: str, number: int, name: str) -> Any:
+    """Where a body or an obstacle is in MeshCat's scene."""
+    from meshcat.path import Path as Node
+
+    return Node(("meshcat", kind, _label(str(number), name)))
+
+
+def _label(before: str, name: str) -> str:
+    """What MeshCat calls a part with a name of the user's: in its paths a slash separates, and in its table of parts
+    JavaScript has words of its own, such as "constructor", which the number before keeps apart.
+    """
+    return escape(f"{before} {name.replace('/', '|')}")
 
 
 def _solids(shape: Any) -> list[tuple[Any, Any]]:
@@ -229,7 +183,6 @@ def _animation(m: Motion) -> Any:
     """One clip per body, a key at every knot; the browser interpolates."""
     from meshcat.animation import Animation, AnimationClip
     from meshcat.commands import SetAnimation
-    from meshcat.path import Path as Node
 
     clips = {}
     # a plant steps more often than a screen: keys that no frame would show only make the file larger
@@ -240,5 +193,5 @@ def _animation(m: Motion) -> Any:
         for frame, position, quaternion in zip(frames, m.position[::every, k], m.quaternion[::every, k], strict=True):
             clip.set_property(frame, "position", "vector3", position.tolist())
             clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
-        clips[Node(("meshcat", "bodies", body.name))] = clip
+        clips[_node("bodies", k, body.name)] = clip
     return SetAnimation(Animation(clips, default_framerate=FRAMES), play=True, repetitions=1000)

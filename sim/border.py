@@ -100,17 +100,41 @@ class Border:
             raise ValueError(f"{call}(limits=...): expected lower <= upper")
         return lo, hi
 
-    def check_maximal(self, zs: Floats) -> None:
+    def finite(self, method: str, out: Floats, *given: Floats) -> Floats:
+        """What a call made of the rows (n, ...) of its arguments; refused where it is too large for a float."""
+        if checks.finite(out):
+            return out
+        row = int(np.argwhere(~np.isfinite(out.reshape(len(given[0]), -1)).all(axis=1))[0, 0])
+        size, name = max((self._largest(rows[row]) for rows in given), key=lambda found: abs(found[0]))
+        at = f" in row {row}" if len(given[0]) > 1 else ""
+        raise ValueError(
+            f"Simulator.{method}{at}: the result is not finite, because numbers overflow or the mass matrix is "
+            f"singular; the largest entry is {size:g}, of {name}"
+        )
+
+    def _largest(self, row: Floats) -> tuple[float, str]:
+        """(largest entry of a state, a perturbation or a maximal state, the joint or body it belongs to)."""
+        flat = row.ravel()
+        k, nq = int(np.abs(flat).argmax()), self.mechanism.nq
+        if len(flat) == 13 * self.nbody and row.ndim == 2:
+            return float(flat[k]), f"body {self.mechanism.body_names[k // 13]!r}"
+        place, at = (self.mechanism.q_slice, k) if len(flat) == self.nx and k < nq else (self.mechanism.v_slice, k - nq)
+        if len(flat) != self.nx:
+            at = k % self.mechanism.nv
+        return float(flat[k]), next(f"joint {n!r}" for n in self.mechanism.joint_names if at < place(n).stop)
+
+    def check_maximal(self, method: str, zs: Floats) -> None:
         """Quaternions of length one, and less than half a turn per step."""
-        length = np.linalg.norm(zs[..., 6:10], axis=-1)
-        turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
+        with np.errstate(over="ignore"):
+            length = np.linalg.norm(zs[..., 6:10], axis=-1)
+            turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
         for bad, what in (
             (np.abs(length - 1.0) > _UNIT, "expected a unit quaternion"),
             (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
         ):
             if bad.any():
                 raise ValueError(
-                    f"Simulator.minimal(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {what}"
+                    f"Simulator.{method}(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {what}"
                 )
         zs[..., 6:10] /= length[..., None]
 

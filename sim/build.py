@@ -62,37 +62,48 @@ def pack(mech: Mechanism) -> Model:
     return model
 
 
+def _numbers(names: Sequence[str]) -> dict[str, int]:
+    return {name: i for i, name in enumerate(names)}
+
+
 def _pack_tree(mech: Mechanism, model: Model) -> None:
-    index = {name: i for i, name in enumerate(mech.body_names)}
+    index = _numbers(mech.body_names)
+    carrying = {j.parent for j in mech.joints}
     for i, (body, joint) in enumerate(zip(mech.bodies, mech.joints, strict=True)):
         model.body_parent[i] = index.get(joint.parent or "", -1)
         model.body_qadr[i + 1] = model.body_qadr[i] + joint.nq
         model.body_vadr[i + 1] = model.body_vadr[i] + joint.nv
         model.body_mass[i] = body.mass
-        model.body_leaf[i] = body.name not in {j.parent for j in mech.joints}
+        model.body_leaf[i] = body.name not in carrying
         model.body_inertia[i] = np.ravel(np.asarray(body.inertia, dtype=np.float64))
 
 
 def _pack_branches(model: Model) -> None:
     """Which degrees of freedom are above a body, and which in its joint and below, as bits of blocks of LANES."""
-    below = np.eye(len(model.body_parent), dtype=bool)  # [i, b]: b is i, or below it
-    for i, parent in enumerate(model.body_parent):
-        if parent >= 0:
-            below[:, i] |= below[:, parent]
-    for d, body in enumerate(model.dof_body):
-        block, bit = divmod(d, LANES)
-        model.body_below[:, block] |= below[:, body].astype(np.int64) << bit
-        above = below[body] & (np.arange(len(below)) != body)
-        model.body_above[:, block] |= above.astype(np.int64) << bit
-    for i, row in enumerate(below):
-        own = model.dof_body == i
-        for rows, counts, chosen in (
-            (model.dofs_above, model.count_above, below[model.dof_body, i] & ~own),
-            (model.dofs_below, model.count_below, row[model.dof_body] & ~own),
-        ):
-            dofs = np.flatnonzero(chosen)
-            counts[i] = len(dofs)
-            rows[i, : len(dofs)] = dofs if rows is model.dofs_above else dofs[::-1]
+    bodies = [
+        (i, p, np.arange(model.body_vadr[i], model.body_vadr[i + 1])) for i, p in enumerate(model.body_parent.tolist())
+    ]
+    for i, p, own in bodies:
+        if p >= 0:
+            inherited = np.concatenate([model.dofs_above[p, : model.count_above[p]], bodies[p][2]])
+            model.count_above[i] = len(inherited)
+            model.dofs_above[i, : len(inherited)] = inherited
+            model.body_above[i] = model.body_above[p]
+            _set_bits(model.body_above[i], bodies[p][2])
+        _set_bits(model.body_below[i], own)
+    for i, p, own in reversed(bodies):
+        if p >= 0:
+            model.body_below[p] |= model.body_below[i]
+        dofs = np.flatnonzero(np.unpackbits(model.body_below[i].astype(np.uint8), bitorder="little"))
+        dofs = dofs[dofs >= own[0] + len(own)] if len(own) else dofs  # those of the bodies below come after its own
+        model.count_below[i] = len(dofs)
+        model.dofs_below[i, : len(dofs)] = dofs[::-1]
+
+
+def _set_bits(row: NDArray[np.int64], dofs: NDArray[np.int64]) -> None:
+    """Set bits of a row of blocks of LANES."""
+    for d in dofs.tolist():
+        row[d // LANES] |= 1 << d % LANES
 
 
 def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
@@ -192,8 +203,9 @@ def _pack_terrain(mech: Mechanism, model: Model) -> None:
 
 
 def _pack_contacts(mech: Mechanism, model: Model) -> None:
+    bodies = _numbers(mech.body_names)
     for c, contact in enumerate(mech.contacts):
-        model.contact_body[c] = mech.body_names.index(contact.body)
+        model.contact_body[c] = bodies[contact.body]
         model.contact_law[c] = _law(contact)
         model.contact_point[c] = np.asarray(contact.point)
         model.contact_radius[c] = contact.radius
@@ -206,10 +218,10 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
 
 def _pack_loops(mech: Mechanism, model: Model) -> None:
     first = len(model.coupling_body) - len(mech.loops)
+    bodies = {WORLD: -1, **_numbers(mech.body_names)}
     for m, joint in enumerate(mech.loops):
         k = first + m
-        ends = (joint.child, joint.parent)
-        model.coupling_body[k] = [-1 if name == WORLD else mech.body_names.index(name or "") for name in ends]
+        model.coupling_body[k] = bodies[joint.child], bodies[joint.parent or WORLD]
         model.coupling_row[k + 1] = model.coupling_row[k] + 6 - joint.nv
         model.loop_ntrans[m], model.loop_nrot[m] = joint.ntrans, joint.nrot
         model.loop_point[m] = np.concatenate([np.asarray(joint.parent_point), np.asarray(joint.child_point)])
@@ -221,18 +233,20 @@ def _pack_loops(mech: Mechanism, model: Model) -> None:
 
 
 def _pack_gears(mech: Mechanism, model: Model) -> None:
+    joints = _numbers(mech.joint_names)
     for k, gear in enumerate(mech.gears):
         ends = ((gear.joint, gear.dof), (gear.other, gear.other_dof))
-        model.gear_dof[k] = [model.body_vadr[mech.joint_names.index(name)] + dof for name, dof in ends]
+        model.gear_dof[k] = [model.body_vadr[joints[name]] + dof for name, dof in ends]
         model.gear_ratio[k], model.gear_offset[k] = gear.ratio, gear.offset
 
 
 def _pack_inputs(mech: Mechanism, model: Model) -> None:
+    joints, bodies = _numbers(mech.joint_names), _numbers(mech.body_names)
     for k, part in enumerate(mech.inputs or ()):
         if part.joint is not None:
             model.input_kind[k] = InputKind.JOINT
-            model.input_index[k] = model.body_vadr[mech.joint_names.index(part.joint)] + part.dof
+            model.input_index[k] = model.body_vadr[joints[part.joint]] + part.dof
         else:
             model.input_kind[k] = InputKind.WORLD if part.frame == "world" else InputKind.BODY
-            model.input_index[k] = mech.body_names.index(part.body or "")
+            model.input_index[k] = bodies[part.body or ""]
             model.input_wrench[k] = np.concatenate([np.asarray(part.force), np.asarray(part.torque)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -30,22 +30,26 @@ def _floats(call: str, value: Any) -> Floats:
         raise ValueError(f"{call}: expected real numbers, got {value!r}") from None
 
 
+def finite(values: Floats) -> bool:
+    """Whether all entries are finite numbers."""
+    # the sum of their squares says so at a third of the price, without a warning, where it does not overflow itself
+    return isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
+
+
 def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     """`value` as a finite float64 array of the given shape; None or a letter stands for any length."""
     out = _floats(call, value)
     fits = out.ndim == len(shape) and all(
         not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True)
     )
-    if fits and isfinite(out.sum()):
+    if fits and finite(out):
         return out
     if not fits:
         wanted = ", ".join("any" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "")
         raise ValueError(f"{call}: expected shape ({wanted}), got {out.shape}")
-    if not np.isfinite(out).all():  # a sum of finite numbers may overflow
-        index = tuple(int(i) for i in np.argwhere(~np.isfinite(out))[0])
-        where = f" at index {index[0] if len(index) == 1 else index}" if index else ""
-        raise ValueError(f"{call}: expected finite numbers, got {out[index]}{where}")
-    return out
+    index = tuple(int(i) for i in np.argwhere(~np.isfinite(out))[0])
+    where = f" at index {index[0] if len(index) == 1 else index}" if index else ""
+    raise ValueError(f"{call}: expected finite numbers, got {out[index]}{where}")
 
 
 def number(call: str, value: Any, at_least: float | None = None, above: float | None = None) -> float:
@@ -95,7 +99,7 @@ def name(call: str, value: Any) -> str:
 
 def one_of(call: str, value: Any, known: Iterable[str]) -> str:
     """`value` as one of the known words."""
-    words = list(known)
+    words = known if isinstance(known, Mapping | Sequence) and not isinstance(known, str) else list(known)
     if not isinstance(value, str) or value not in words:
         raise ValueError(f"{call}: {value!r} is not one of: {', '.join(words) or '(none)'}{nearest(value, words)}")
     return value

@@ -8,6 +8,7 @@ Contacts, dampers and inputs act between nodes and are not part of it.
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 from sim.angular_momentum import angular_momentum
@@ -151,15 +152,21 @@ def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
 
 @kernel
 def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
-    """work.dnu = P M^-1 p, P: coupling/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual."""
+    """work.dnu = P M^-1 p, P: coupling/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual.
+
+    NaN, and False, when M is singular.
+    """
     node_momentum(model, work, h, x, work.wrench)
     subtree_sums(model, work.wrench, work.subtree)
     project(model, work.S2, work.subtree, work.residual)
     nq = work.theta1.shape[0]
     add_spring_momentum(model, h, x[:nq], x[nq:], work.residual)
-    solved = solve_mass_matrix(model, work, work.residual, work.dnu)
+    if not solve_mass_matrix(model, work, work.residual, work.dnu):
+        for d in range(work.dnu.shape[0]):
+            work.dnu[d] = nan
+        return False
     close_velocity(model, work, h, x[:nq], x[nq:], work.dnu)
-    return solved
+    return True
 
 
 @kernel

@@ -67,9 +67,10 @@ class Mechanism:
         check_gears(f"{call})", self.gears, joints)
         if self.nv == 0:
             raise ValueError(f"{call}): no joint is free to move")
+        ends = dict.fromkeys([*self.body_names, WORLD])
         for c in self.collisions:
             for name in (c.a, c.b):
-                checks.one_of(f"{call}): body of collision {c.name!r}", name, [*self.body_names, WORLD])
+                checks.one_of(f"{call}): body of collision {c.name!r}", name, ends)
         checks.distinct(f"{call}): collisions", (c.name for c in self.collisions))
         object.__setattr__(self, "contacts", name_contacts(f"{call})", self.contacts, self.body_names))
         object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
@@ -87,22 +88,22 @@ class Mechanism:
         """Number of bodies, and of joints."""
         return len(self.bodies)
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Number of coordinates."""
         return sum(j.nq for j in self.joints)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Number of degrees of freedom."""
         return sum(j.nv for j in self.joints)
 
-    @property
+    @cached_property
     def body_names(self) -> tuple[str, ...]:
         """Names of the bodies, in tree order."""
         return tuple(b.name for b in self.bodies)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints, in tree order."""
         return tuple(j.name for j in self.joints)
@@ -144,15 +145,19 @@ class Mechanism:
 
     def q_slice(self, joint: str) -> slice:
         """Where the coordinates of a joint are in q."""
-        i = self.joint_names.index(checks.one_of("Mechanism.q_slice(joint)", joint, self.joint_names))
-        start = sum(j.nq for j in self.joints[:i])
-        return slice(start, start + self.joints[i].nq)
+        return self._slices[checks.one_of("Mechanism.q_slice(joint)", joint, self._slices)][0]
 
     def v_slice(self, joint: str) -> slice:
         """Where the velocities of a joint are in v."""
-        i = self.joint_names.index(checks.one_of("Mechanism.v_slice(joint)", joint, self.joint_names))
-        start = sum(j.nv for j in self.joints[:i])
-        return slice(start, start + self.joints[i].nv)
+        return self._slices[checks.one_of("Mechanism.v_slice(joint)", joint, self._slices)][1]
+
+    @cached_property
+    def _slices(self) -> dict[str, tuple[slice, slice]]:
+        """By joint, where it is in q and in v."""
+        out, q, v = {}, 0, 0
+        for joint in self.joints:
+            out[joint.name] = slice(q, q := q + joint.nq), slice(v, v := v + joint.nv)
+        return out
 
     def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
         """This mechanism and another one, in one: its bodies, joints, contacts, inputs and collisions after ours.
@@ -203,7 +208,7 @@ class Mechanism:
         table = {} if given is None else given
         if isinstance(table, Mapping):
             for name in table:
-                checks.one_of(f"{call}: joint", name, self.joint_names)
+                checks.one_of(f"{call}: joint", name, self._slices)
         else:
             values = checks.array(call, table, (self.nq,))
             table = {j.name: values[self.q_slice(j.name)] for j in self.joints}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,11 +25,11 @@ def renamed(part: Any, name: str) -> Any:
 
 def number_repeats(parts: Sequence[Any]) -> list[Any]:
     """Parts of equal name get numbers: foot, foot -> foot_0, foot_1."""
-    names = [p.name for p in parts]
+    total = Counter(p.name for p in parts)
     counts: dict[str, int] = {}
     out = []
     for part in parts:
-        if names.count(part.name) > 1:
+        if total[part.name] > 1:
             k = counts.get(part.name, 0)
             counts[part.name] = k + 1
             out.append(renamed(part, f"{part.name}_{k}"))
@@ -39,8 +40,9 @@ def number_repeats(parts: Sequence[Any]) -> list[Any]:
 
 def name_contacts(call: str, contacts: Sequence[Contact], bodies: Sequence[str]) -> tuple[Contact, ...]:
     """The contacts with names, after a look at their bodies."""
+    known = dict.fromkeys(bodies)
     for c in contacts:
-        checks.one_of(f"{call}: body of contact {c.name!r}" if c.name else f"{call}: contact body", c.body, bodies)
+        checks.one_of(f"{call}: body of contact {c.name!r}" if c.name else f"{call}: contact body", c.body, known)
     checks.distinct(f"{call}: contacts", (c.name for c in contacts if c.name))
     named = number_repeats([renamed(c, c.name or c.body) for c in contacts])
     checks.distinct(f"{call}: contacts", (c.name for c in named))
@@ -51,7 +53,7 @@ def name_inputs(
     call: str, inputs: Sequence[Input], joints: Sequence[Joint], bodies: Sequence[str]
 ) -> tuple[Input, ...]:
     """The inputs with names, after a look at what they act on."""
-    by_name = {j.name: j for j in joints}
+    by_name, known = {j.name: j for j in joints}, dict.fromkeys(bodies)
     out = []
     for part in inputs:
         if part.joint is not None:
@@ -61,6 +63,6 @@ def name_inputs(
                 raise ValueError(f"{call}): Input({label!r}, dof={part.dof!r}): the joint has {nv} degrees of freedom")
             label += f"[{part.dof}]" if nv > 1 else ""
         else:
-            label = checks.one_of(f"{call}, inputs=...): body", part.body, bodies)
+            label = checks.one_of(f"{call}, inputs=...): body", part.body, known)
         out.append(renamed(part, part.name or label))
     return tuple(number_repeats(out))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,14 +15,20 @@ Floats = NDArray[np.float64]
 
 def rotation_matrix(quat: ArrayLike) -> Floats:
     """R(q), (3, 3), of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = (float(c) for c in np.asarray(quat, dtype=np.float64))
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(_matrix(*(float(c) for c in np.asarray(quat, dtype=np.float64))))
+
+
+def rotation_matrices(quats: Floats) -> Floats:
+    """R(q), (n, 3, 3), of unit quaternions (n, 4)."""
+    return np.moveaxis(np.array(_matrix(*quats.T)), -1, 0)
+
+
+def _matrix(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)

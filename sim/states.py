@@ -65,8 +65,15 @@ class States:
 
         Trees: x itself. ValueError: no such state is found; which loop joint or gear stays open, and by how much.
         """
-        state = self._border.state("close", x)
+        state = self._placed("close", x)
         return Closure(self.mechanism, self._calls).close(state) if self._closes else state
+
+    def _placed(self, method: str, x: ArrayLike) -> Floats:
+        """A state whose bodies have poses and velocities that are finite."""
+        state = self._border.state(method, x)
+        if self._closes:
+            self._border.finite(f"{method}(x)", self._calls.maximal(state[None], self.nbody), state[None])
+        return state
 
     @property
     def _closes(self) -> bool:
@@ -75,7 +82,7 @@ class States:
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
         """By loop joint, and "gear NAME", how far it is open: distances [m], then angles [rad]."""
-        return Closure(self.mechanism, self._calls).gaps(self._border.state("loop_gaps", x))
+        return Closure(self.mechanism, self._calls).gaps(self._placed("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
         """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
@@ -83,7 +90,7 @@ class States:
             raise ValueError(
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
             )
-        state = self.neutral() if x is None else self._border.state("loop_rank", x)
+        state = self.neutral() if x is None else self._placed("loop_rank", x)
         return Closure(self.mechanism, self._calls).rank(state)
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
@@ -100,8 +107,10 @@ class States:
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
         q0 = self._border.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
-        closes = self._closes and self.order == 2
-        return Closure(self.mechanism, self._calls).start(q0, v0) if closes else self._calls.started(q0, v0)
+        x0 = np.concatenate([q0, v0])
+        if self._closes and self.order == 2:
+            return Closure(self.mechanism, self._calls).start(self._placed("start", x0)[: self.nq], v0)
+        return self._border.finite("start", self._calls.started(q0, v0), x0[None])
 
     def velocity(self, x: ArrayLike) -> Floats:
         """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
@@ -110,7 +119,7 @@ class States:
         along closed loops, whose forces act before and after the node.
         """
         xs, lead = self._border.stacked("velocity", "x", x)
-        return self._calls.node_velocities(xs).reshape(*lead, self.nv)
+        return self._border.finite("velocity(x)", self._calls.node_velocities(xs), xs).reshape(*lead, self.nv)
 
     def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """(nbody, 13) per body [position, velocity (world), quaternion, omega (body)] where the joints have the
@@ -120,22 +129,25 @@ class States:
         """
         qs, vs, lead = self._border.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
         xs = self._border.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
-        return self._calls.bodies(xs).reshape(*lead, self.nbody, 13)
+        return self._border.finite("bodies", self._calls.bodies(xs), xs).reshape(*lead, self.nbody, 13)
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
         xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
-        return self._calls.integrate(xs, dxs).reshape(*lead, self.nx)
+        xs = self._border.states("Simulator.integrate(x)", xs)
+        return self._border.finite("integrate", self._calls.integrate(xs, dxs), xs, dxs).reshape(*lead, self.nx)
 
     def difference(self, x1: ArrayLike, x0: ArrayLike) -> Floats:
         """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
         x1s, x0s, lead = self._border.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
-        return self._calls.difference(x0s, x1s).reshape(*lead, self.ndx)
+        x1s, x0s = (self._border.states(f"Simulator.difference({n})", x) for n, x in (("x1", x1s), ("x0", x0s)))
+        return self._border.finite("difference", self._calls.difference(x0s, x1s), x1s, x0s).reshape(*lead, self.ndx)
 
     def maximal(self, x: ArrayLike) -> Floats:
         """z (nbody, 13) per body [position, velocity (world), quaternion, omega (body)]; leading axes allowed."""
         xs, lead = self._border.stacked("maximal", "x", x)
-        return self._calls.maximal(xs, self.nbody).reshape(*lead, self.nbody, 13)
+        zs = self._border.finite("maximal(x)", self._calls.maximal(xs, self.nbody), xs)
+        return zs.reshape(*lead, self.nbody, 13)
 
     def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
         """The state x with maximal(x) = z; leading axes allowed.
@@ -146,36 +158,47 @@ class States:
         zs = np.array(shaped("Simulator.minimal(z)", z, (self.nbody, 13)))
         lead = zs.shape[:-2]
         zs = zs.reshape(-1, self.nbody, 13)
-        self._border.check_maximal(zs)
-        xs = self._calls.minimal(zs)
+        self._border.check_maximal("minimal", zs)
+        xs = self._border.finite("minimal(z)", self._calls.minimal(zs), zs)
         if joint_tolerance < np.inf:
             self._border.check_joints(zs, self._calls.maximal(xs, self.nbody), joint_tolerance)
         return xs.reshape(*lead, self.nx)
 
     def maximal_jacobian(self, x: ArrayLike) -> Floats:
         """dz/dx (12 nbody, ndx), per body [position, velocity, rotation, omega], in tangent coordinates."""
-        return self._calls.maximal_jacobian(self._border.state("maximal_jacobian", x), self.nbody)
+        state = self._border.state("maximal_jacobian", x)
+        return self._border.finite(
+            "maximal_jacobian(x)", self._calls.maximal_jacobian(state, self.nbody)[None], state[None]
+        )[0]
 
     def minimal_jacobian(self, z: ArrayLike) -> Floats:
         """dx/dz (ndx, 12 nbody), the inverse of `maximal_jacobian` along the joints."""
         zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
-        self._border.check_maximal(zs[None])
-        return self._calls.minimal_jacobian(zs)
+        self._border.check_maximal("minimal_jacobian", zs[None])
+        return self._border.finite("minimal_jacobian(z)", self._calls.minimal_jacobian(zs)[None], zs[None])[0]
 
     def energy(self, x: ArrayLike) -> Any:
         """Kinetic and potential energy at the node [J]; leading axes allowed."""
         xs, lead = self._border.stacked("energy", "x", x)
-        total = self._calls.energies(xs).sum(axis=1).reshape(lead)
+        total = self._energies("energy", xs, [0, 1]).reshape(lead)
         return total if lead else float(total)
 
     def kinetic_energy(self, x: ArrayLike) -> Any:
         """Kinetic energy at the node [J]; leading axes allowed."""
         xs, lead = self._border.stacked("kinetic_energy", "x", x)
-        kinetic = self._calls.energies(xs)[:, 0].reshape(lead)
+        kinetic = self._energies("kinetic_energy", xs, [0]).reshape(lead)
         return kinetic if lead else float(kinetic)
+
+    def _energies(self, method: str, xs: Floats, parts: list[int]) -> Floats:
+        """Sum of these of the (kinetic, potential) energy of every row."""
+        with np.errstate(all="ignore"):
+            total = self._calls.energies(xs)[:, parts].sum(axis=1)
+        return self._border.finite(f"{method}(x)", total, xs)
 
     def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
         """(linear [N s], angular about the world's origin [N m s]) momentum at the node; leading axes allowed."""
         xs, lead = self._border.stacked("momentum", "x", x)
-        p = self._calls.momenta(xs).reshape(*lead, 6)
+        with np.errstate(all="ignore"):
+            momenta = self._calls.momenta(xs)
+        p = self._border.finite("momentum(x)", momenta, xs).reshape(*lead, 6)
         return p[..., :3].copy(), p[..., 3:].copy()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
+from heapq import heappop, heappush
 
 import numpy as np
 
@@ -17,9 +19,10 @@ def check_loops(
     call: str, loops: Sequence[Joint], bodies: Sequence[Body], joints: Sequence[Joint]
 ) -> tuple[Joint, ...]:
     """Joints that close a loop, after a look at their bodies and names."""
-    names = [b.name for b in bodies]
+    names = dict.fromkeys(b.name for b in bodies)
+    ends = {WORLD: None, **names}
     for j in loops:
-        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *names])
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, ends)
         checks.one_of(f"{call}: child of joint {j.name!r}", j.child, names)
         if j.nv == 6:
             raise ValueError(f"{call}: joint {j.name!r} closes a loop, but constrains nothing")
@@ -39,8 +42,9 @@ def sort_tree(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> tup
     if WORLD in by_name:
         raise ValueError(f"{call}: a body cannot be named {WORLD!r}")
     hangs_on: dict[str, str] = {}
+    parents = dict.fromkeys([WORLD, *by_name])
     for j in joints:
-        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, [WORLD, *by_name])
+        checks.one_of(f"{call}: parent of joint {j.name!r}", j.parent, parents)
         checks.one_of(f"{call}: child of joint {j.name!r}", j.child, by_name)
         if j.child in hangs_on:
             raise ValueError(
@@ -53,15 +57,19 @@ def sort_tree(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> tup
             raise ValueError(
                 f"{call}: body {name!r} hangs on no joint; a free body needs Joint('floating', None, {name!r})"
             )
-    placed, order, waiting = {WORLD}, [], list(joints)
-    while waiting:
-        ready = [j for j in waiting if j.parent in placed]
-        if not ready:
-            raise ValueError(f"{call}: joints in a cycle: {', '.join(repr(j.name) for j in waiting)}")
-        # one at a time, so that the given order survives wherever it is a tree order
-        placed.add(ready[0].child)
-        order.append(ready[0])
-        waiting.remove(ready[0])
+    below: dict[str | None, list[int]] = {}
+    for k, j in enumerate(joints):
+        below.setdefault(j.parent, []).append(k)
+    # the first that can be placed, one at a time, so that the given order survives wherever it is a tree order
+    order, ready = [], below.get(WORLD, [])
+    while ready:
+        order.append(joints[heappop(ready)])
+        for k in below.get(order[-1].child, ()):
+            heappush(ready, k)
+    if len(order) < len(joints):
+        placed = {j.child for j in order}
+        cycle = ", ".join(repr(j.name) for j in joints if j.child not in placed)
+        raise ValueError(f"{call}: joints in a cycle: {cycle}")
     return tuple(by_name[j.child] for j in order), tuple(order)
 
 
@@ -80,10 +88,10 @@ def check_axes(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> No
     them: only the sum of their coordinates moves anything. Springs, dampers and armature tell them apart.
     """
     above = {j.child: j for j in joints}
-    below = [j.parent for j in joints]
+    below = Counter(j.parent for j in joints)
     massless = {b.name for b in bodies if not b.mass > 0.0}
     for joint in joints:
-        before = above[joint.parent] if joint.parent in massless and below.count(joint.parent) == 1 else joint
+        before = above[joint.parent] if joint.parent in massless and below[joint.parent] == 1 else joint
         kinds = {before.kind, joint.kind}
         if before is joint or kinds not in ({"revolute"}, {"prismatic"}):
             continue

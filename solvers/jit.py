@@ -1,25 +1,14 @@
-"""`@kernel`: Numba, its flags, and a disk cache that cannot go stale. (Numba is imported here and in code.py,
+"""`@kernel`: Numba, its flags, and compiled code on disk, of cache.py. (Numba is imported here, in cache.py, code.py,
 lowering.py, arithmetic.py, lanes.py, late.py and record.py only.)
-
-Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
-in another file. Here the cache folder is named by a digest of every source file that can reach a kernel, so any edit
-starts from an empty folder.
-
-    DOJO_OPT_CACHE=0         compile in memory only
-    NUMBA_CACHE_DIR=DIR      keep the compiled code below DIR instead of the user's cache folder
 """
 
 from __future__ import annotations
 
-import hashlib
+import inspect
 import os
-import re
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property, update_wrapper
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -29,6 +18,7 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
+from solvers.cache import STORE, KernelCache, cache_folder
 from solvers.code import EntryCompiler, InnerCompiler
 
 __all__ = [
@@ -49,61 +39,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # "contract": products and sums are fused where the processor can; nothing is assumed of infinities and NaN
 _FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
-_KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
-_LOADERS = ("urdf", "mjcf")  # folders without kernels
 _REGISTRY: list[Any] = []
-
-
-def _sources() -> list[Path]:
-    """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
-    root = Path(__file__).resolve().parent.parent
-    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
-    files += [
-        f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
-    ]
-    return sorted(files)
-
-
-def _digest() -> str:
-    """Digest of all kernel sources and of the flags that Numba's own cache key leaves out."""
-    digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK}".encode())
-    for path in _sources():
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
-
-
-def cache_folder() -> Path | None:
-    """Folder of the compiled code, or None when the cache is off or no folder can be written."""
-    if os.environ.get("DOJO_OPT_CACHE", "1") == "0":
-        return None
-    if numba.config.CACHE_DIR:
-        root = Path(numba.config.CACHE_DIR) / "dojo_opt"
-    else:
-        root = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "dojo_opt"
-    folder = root / _digest()
-    return folder if _writable(folder) else None
-
-
-def _prune(root: Path) -> None:
-    """Drop all but the newest few digests below `root`."""
-    old = sorted((d for d in root.iterdir() if d.is_dir() and len(d.name) == 16), key=lambda d: d.stat().st_mtime)
-    for folder in old[:-_KEEP]:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-_FOLDER = cache_folder()
-if _FOLDER is not None:
-    os.utime(_FOLDER)
-    _prune(_FOLDER.parent)
 
 
 # Plain arithmetic before anything else: a first look into a cache registers the operators of sets and strings first,
@@ -171,14 +107,9 @@ class Kernel:
 
 
 def _cached(form: Any, name: str = "entry") -> Any:
-    """The form, with its cache in our folder, in which any edit of a source starts anew; one folder per form."""
-    if _FOLDER is not None:
-        users_folder = numba.config.CACHE_DIR
-        try:
-            numba.config.CACHE_DIR = str(_FOLDER / name)
-            form.enable_caching()
-        finally:
-            numba.config.CACHE_DIR = users_folder
+    """The form, with its compiled code on disk; that of a function without a file is in memory."""
+    if STORE.wanted and os.path.isfile(inspect.getfile(form.py_func)):
+        form._cache = KernelCache(form.py_func, name)
     return form
 
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 __all__ = ["compiling"]
 
 _PATIENCE = 2.0  # [s] of compilation before a word about it
-_TEXT = "dojo_opt: compiling. It takes up to a minute and is kept on disk; `dojo-opt warmup` does it ahead of time"
+_TEXT = "dojo_opt: compiling, for up to a minute; kept on disk where it can be. `dojo-opt warmup` does it ahead of time"
 
 
 class _Clock:

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
+import pickle
 import shutil
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -69,6 +76,214 @@ def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
     blocked.write_text("")
     program = "from solvers import jit; print(jit.cache_folder())"
     assert python(program, NUMBA_CACHE_DIR=str(blocked / "cache")).strip() == "None"
+
+
+# -- what is kept, and what of it is believed ---------------------------------------------------------------------------
+
+HITS = "print(one(1.0), sum(one.entry.stats.cache_hits.values()))"  # of a kernel, and how often it was loaded
+COUNTED = f"""
+import warnings
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    from own import one, two
+    {HITS}
+    two(1.0)
+print([str(w.message) for w in told])
+"""
+
+
+class Filled:
+    """A folder of compiled code, and a program whose kernel is in it."""
+
+    def __init__(self, home: Path) -> None:
+        self.home, self.base = home, home / "cache"
+        text = "from solvers.jit import kernel\n\n@kernel\ndef {}(x):\n    return x + {}\n\n"
+        (home / "own.py").write_text(text.format("one", "1.0") + text.format("two", "2.0"))
+        assert self.run() == ["2.0", "0"]
+        self.digest = next((self.base / "dojo_opt").iterdir())
+        (self.file,) = self.digest.iterdir()
+        self.code = self.file.read_bytes()
+
+    def restore(self) -> None:
+        """As after the first run."""
+        for path in (self.base, self.digest.parent, self.digest):
+            if hasattr(os, "geteuid") and os.geteuid() == 0:
+                os.chown(path, 0, 0)
+            path.chmod(0o700)
+        for path in self.digest.iterdir():
+            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+        self.file.write_bytes(self.code)
+        self.file.chmod(0o600)
+        shutil.rmtree(self.home / "ran", ignore_errors=True)
+
+    def run(self, program: str = f"from own import one; {HITS}", **environment: str) -> list[str]:
+        return python(program, cwd=self.home, **{"NUMBA_CACHE_DIR": str(self.base), **environment}).split(maxsplit=2)
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Filled:
+    return Filled(tmp_path_factory.mktemp("filled"))
+
+
+@pytest.fixture
+def filled(once: Filled) -> Filled:
+    once.restore()
+    return once
+
+
+def written(path: Path, body: bytes) -> None:
+    """A file as the cache writes it."""
+    path.write_bytes(hashlib.blake2b(body).digest() + body)
+
+
+def swapped(path: Path, make: Callable[[Path], object]) -> None:
+    path.unlink()
+    make(path)
+
+
+class Evil:
+    """Unpickling it leaves a folder."""
+
+    def __init__(self, marker: Path) -> None:
+        self.marker = str(marker)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (os.makedirs, (self.marker,))
+
+
+DAMAGE: dict[str, Callable[[Path], object]] = {
+    "empty": lambda p: p.write_bytes(b""),
+    "cut": lambda p: p.write_bytes(p.read_bytes()[:-100]),
+    "cut before its check": lambda p: p.write_bytes(p.read_bytes()[:10]),
+    "zeros": lambda p: p.write_bytes(bytes(p.stat().st_size)),
+    "other bytes": lambda p: p.write_bytes(b"\x80\x04 not a pickle" * 100),
+    "one bit": lambda p: p.write_bytes((b := p.read_bytes())[:2000] + bytes([b[2000] ^ 1]) + b[2001:]),
+    "longer": lambda p: p.write_bytes(p.read_bytes() + b"0"),
+    "no pickle": lambda p: written(p, b"nothing"),
+    "another pickle": lambda p: written(p, pickle.dumps([1, 2, 3])),
+    "another key": lambda p: written(p, pickle.dumps((("key",), ()))),
+    "a folder": lambda p: swapped(p, lambda q: (q / "in").mkdir(parents=True)),
+    "a link to nothing": lambda p: swapped(p, lambda q: q.symlink_to("nowhere")),
+    "a link to itself": lambda p: swapped(p, lambda q: q.symlink_to(q)),
+    "a pipe": lambda p: swapped(p, os.mkfifo),
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_a_damaged_file_is_compiled_again(filled: Filled, kind: str) -> None:
+    DAMAGE[kind](filled.file)
+    assert filled.run() == ["2.0", "0"]
+    assert filled.file.read_bytes()[:64] == hashlib.blake2b(filled.file.read_bytes()[64:]).digest()
+    assert [path.name for path in filled.digest.iterdir()] == [filled.file.name]
+
+
+def test_a_full_disk_is_one_warning(filled: Filled) -> None:
+    filled.file.unlink()
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # the system's own error for a write
+    value, hits, told = filled.run(limit + COUNTED)
+    assert (value, hits) == ("2.0", "0")
+    assert told.count("compiled code is not kept") == 1 and "NUMBA_CACHE_DIR" in told
+    assert list(filled.digest.iterdir()) == []
+
+
+def test_a_disk_without_room_for_a_folder_is_one_warning(filled: Filled) -> None:
+    patch = "import errno, os, pathlib\ndef full(*a, **k): raise OSError(errno.ENOSPC, 'No space left on device')\n"
+    value, hits, told = filled.run(
+        patch + "pathlib.Path.mkdir = full\n" + COUNTED, NUMBA_CACHE_DIR=str(filled.home / "new")
+    )
+    assert (value, hits) == ("2.0", "0")
+    assert told.count("compiled code is not kept") == 1 and "No space left on device" in told
+
+
+def test_a_filled_folder_that_is_read_only_is_read(filled: Filled) -> None:
+    for path in (filled.file, filled.digest, filled.digest.parent, filled.base):
+        path.chmod(path.stat().st_mode & ~0o222)
+    value, hits, told = filled.run(COUNTED.replace("two(1.0)", "pass"))
+    assert (value, hits, told.strip()) == ("2.0", "1", "[]")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes of POSIX")
+@pytest.mark.parametrize("part", ["base", "root", "digest", "file"])
+@pytest.mark.parametrize("whose", ["group", "world", "another user"])
+def test_what_others_can_write_is_not_read(filled: Filled, part: str, whose: str) -> None:
+    marker = filled.home / "ran"
+    written(filled.file, pickle.dumps(Evil(marker)))
+    path = {"base": filled.base, "root": filled.digest.parent, "digest": filled.digest, "file": filled.file}[part]
+    if whose == "another user":
+        if os.geteuid() != 0:
+            pytest.skip("only root gives files away")
+        os.chown(path, 12345, 12345)
+    else:
+        path.chmod(path.stat().st_mode | (stat.S_IWGRP if whose == "group" else stat.S_IWOTH))
+    value, hits, told = filled.run(COUNTED)
+    assert (value, hits) == ("2.0", "0")
+    assert not marker.exists()
+    if part != "file":  # which is replaced
+        wrong = "belongs to the user with id 12345" if whose == "another user" else "others can write to"
+        assert told.count(wrong) == 1 and str(path) in told
+
+
+def test_a_planted_file_runs_where_the_folder_is_believed(filled: Filled) -> None:
+    """What the tests above rely on: the planted file is one that would run."""
+    marker = filled.home / "ran"
+    written(filled.file, pickle.dumps(Evil(marker)))
+    assert filled.run() == ["2.0", "0"]
+    assert marker.exists()
+
+
+def test_a_new_folder_is_the_users_own(filled: Filled) -> None:
+    for path in (filled.base, filled.digest.parent, filled.digest):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o700
+    assert stat.S_IMODE(filled.file.stat().st_mode) == 0o600
+
+
+def test_a_sticky_folder_of_root_is_no_danger(filled: Filled) -> None:
+    filled.base.chmod(0o1777)
+    assert filled.run() == ["2.0", "1"]
+
+
+def test_a_link_to_the_folder_is_followed(filled: Filled) -> None:
+    (filled.home / "link").symlink_to(filled.base)
+    assert filled.run(NUMBA_CACHE_DIR=str(filled.home / "link")) == ["2.0", "1"]
+
+
+@pytest.mark.parametrize("given", ["", "here", "./here"])
+def test_no_folder_depends_on_where_a_process_starts(tmp_path: Path, given: str) -> None:
+    home = tmp_path / "home"
+    program = "from solvers.jit import cache_folder; print(cache_folder())"
+    folder = python(program, cwd=tmp_path, NUMBA_CACHE_DIR="", XDG_CACHE_HOME=given, HOME=str(home)).strip()
+    assert folder.startswith(str(home / ".cache" / "dojo_opt"))
+    assert python(program, cwd=tmp_path, NUMBA_CACHE_DIR="", XDG_CACHE_HOME=given, HOME="here").strip() == "None"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["home"]
+
+
+def test_a_user_that_the_system_does_not_know_can_import(filled: Filled) -> None:
+    unknown = """
+import os, pwd
+def nobody(uid): raise KeyError(uid)
+pwd.getpwuid = nobody
+for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+    os.environ.pop(name, None)
+import dojo_opt
+"""
+    value, hits, told = filled.run(unknown + COUNTED, DOJO_OPT_CACHE="1")
+    assert (value, hits) == ("2.0", "0")
+    assert told.count("the user has no home folder") == 1
+
+
+def test_two_processes_may_write_at_once(filled: Filled) -> None:
+    for _ in range(2):
+        filled.file.unlink()
+        environment = {
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(filled.base),
+            "PYTHONPATH": f"{filled.home}{os.pathsep}{HOME}",
+        }
+        command = [sys.executable, "-W", "error", "-c", f"from own import one; {HITS}"]
+        both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) for _ in range(2)]
+        assert [process.communicate()[0].split()[0] for process in both] == [b"2.0", b"2.0"]
+        assert [path.name for path in filled.digest.iterdir()] == [filled.file.name]
+        assert filled.run() == ["2.0", "1"]
 
 
 # -- kernels -----------------------------------------------------------------------------------------------------------

@@ -44,6 +44,9 @@ def finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
         ax.legend(fontsize="small", framealpha=0.6)
     elif _FEW < entries <= _MANY:
         ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
+    legend = ax.get_legend()
+    for label in legend.get_texts() if legend else ():
+        label.set_parse_math(False)  # names of a user, in which a dollar sign is no formula
     return ax
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import re
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -80,21 +81,34 @@ def _overview(reports: Mapping[str, Report]) -> Table:
 
 
 def _markdown(reports: Mapping[str, Report], command: str) -> str:
-    lines = ["# dojo-opt: what it measures here", "", f"`{command}`", "", *_markdown_table(_overview(reports))]
+    lines = ["# dojo-opt: what it measures here", "", _code(command), "", *_markdown_table(_overview(reports))]
     for name, report in reports.items():
-        lines += ["", f"## {report.title}", "", *([report.summary, ""] if report.summary else [])]
+        lines += ["", f"## {_plain(report.title)}", "", *([_plain(report.summary), ""] if report.summary else [])]
         if report.figure is not None:
-            lines += [f"![{report.title}]({name}.png)", ""]
+            lines += [f"![{_plain(report.title)}]({name}.png)", ""]
         for table in _tables(report):
-            lines += [*([f"### {table.title}", ""] if table.title else []), *_markdown_table(table), ""]
-            lines += [table.note, ""] if table.note else []
-        lines += [*(f"- {note}" for note in report.notes), "", f"`{report.command}`; {_facts(report)}"]
+            lines += [*([f"### {_plain(table.title)}", ""] if table.title else []), *_markdown_table(table), ""]
+            lines += [_plain(table.note), ""] if table.note else []
+        facts = f"{_code(report.command)}; {_plain(_facts(report))}"
+        lines += [*(f"- {_plain(note)}" for note in report.notes), "", facts]
     return "\n".join(lines) + "\n"
+
+
+def _plain(text: str) -> str:
+    """Text of Markdown, on one line, in which names of a user are neither HTML nor links."""
+    return escape(" ".join(text.split()), quote=False).replace("](", "]\\(")
+
+
+def _code(text: str) -> str:
+    """A span of code, whose fence is longer than what is inside."""
+    fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
+    pad = " " if len(fence) > 1 else ""
+    return f"{fence}{pad}{' '.join(text.split())}{pad}{fence}"
 
 
 def _markdown_table(table: Table) -> list[str]:
     def line(cells: list[str]) -> str:
-        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+        return "| " + " | ".join(_plain(cell).replace("|", "\\|") for cell in cells) + " |"
 
     rows = [line([shown(cell) for cell in row]) for row in table.rows]
     return [line(list(table.header)), line(["---"] * len(table.header)), *rows]

@@ -14,15 +14,12 @@ STIFFNESS = 1000.0  # largest e (far.py) of a contact that is left out, in units
 
 def pack_clusters(model: Model) -> None:
     """Contacts that follow one another on one body, against one direction: the ball around them (far.py)."""
-    first, count = 0, len(model.contact_height)
-    while first < count:
-        level = model.contact_terrain == 0
-        same = (
-            (model.contact_body[:count] == model.contact_body[first])
-            & level
-            & np.all(model.contact_frame == model.contact_frame[first], axis=1)
-        )
-        end = first + int(np.argmin(np.append(same[first:], False))) if not model.contact_terrain[first] else first + 1
+    count = len(model.contact_height)
+    level = model.contact_terrain == 0
+    joined = (np.diff(model.contact_body[:count]) == 0) & level[1:] & level[:-1]
+    joined &= np.all(model.contact_frame[1:] == model.contact_frame[:-1], axis=1)
+    ends = [*(1 + np.flatnonzero(~joined)).tolist(), count]
+    for first, end in zip([0, *ends[:-1]], ends if count else [], strict=False):
         points, radii = model.contact_point[first:end], model.contact_radius[first:end]
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         around = float(np.max(np.linalg.norm(points - centre, axis=1) + radii))
@@ -36,7 +33,6 @@ def pack_clusters(model: Model) -> None:
         friction = model.contact_friction[first:end].max()
         model.cluster_end[first] = end
         model.cluster[first] = *centre, around, arm, mobility, friction, _swing(inertia, points.mean(axis=0)) * easy
-        first = end
 
 
 def _swing(inertia: Floats, p: Floats) -> float:

@@ -15,20 +15,21 @@ from sim.coupling.loop_rank import LoopRank
 from sim.coupling.nearest import jacobian, nearest, newton
 from sim.mechanism import Mechanism
 from sim.parts import WORLD, Joint
-from sim.shapes import rotation_matrix
+from sim.shapes import rotation_matrices, rotation_matrix
 
 Floats = NDArray[np.float64]
 
 _APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
 _ASIDE = 0.03  # [m, rad]
+_ALONE = 2  # starts of each distance of one loop alone, which are only to explain why all of them stay open
 _STARTS = 30  # repetitions, each of which halves the error at least
 _DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
 
 
-def _angle(sine: Floats, cosine: float) -> Floats:
-    """The rotation vector along sin(angle) direction."""
-    size = float(np.linalg.norm(sine))
-    return sine * (np.arctan2(size, cosine) / size) if size > 0.0 else sine
+def _angle(sine: Floats, cosine: Floats) -> Floats:
+    """The rotation vectors along sin(angle) direction, of rows."""
+    size = np.linalg.norm(sine, axis=1)
+    return sine * (np.arctan2(size, cosine) / np.where(size > 0.0, size, np.inf))[:, None]
 
 
 class _Frame(NamedTuple):
@@ -56,32 +57,39 @@ class Closure:
 
         Angles and not the sines of the step (sim/coupling/loops.py), which vanish after half a turn as well.
         """
+        return {name: gap[0] for name, gap in self._gaps(x[None]).items()}
+
+    def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
+        """`gaps` of every row, or one of them."""
         mech = self._mechanism
-        z = self._calls.maximal(x[None], mech.nbody)[0]
-        out = {joint.name: self._gap(joint, z) for joint in mech.loops}
+        z = self._calls.maximal(xs, mech.nbody)
+        out = {joint.name: self._gap(joint, z) for joint in mech.loops if only in ("", joint.name)}
         for gear in mech.gears:
-            a, b = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
-            out[f"gear {gear.name}"] = np.array([x[a] - gear.ratio * x[b] - gear.offset])
+            if only in ("", name := f"gear {gear.name}"):
+                a, b = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
+                out[name] = xs[:, [a]] - gear.ratio * xs[:, [b]] - gear.offset
         return out
 
     def _gap(self, joint: Joint, z: Floats) -> Floats:
         names, fixed = self._mechanism.body_names, self._frames[joint.name]
-        a = names.index(joint.child)
-        Ra, xa = rotation_matrix(z[a, 6:10]), z[a, :3]
-        Rb, xb = np.eye(3), np.zeros(3)
+        a = z[:, names.index(joint.child)]
+        Ra = rotation_matrices(a[:, 6:10])
+        apart, Q = a[:, :3] + Ra @ np.asarray(joint.child_point) - np.asarray(joint.parent_point), fixed.turn
         if joint.parent != WORLD:
-            b = names.index(joint.parent or "")
-            Rb, xb = rotation_matrix(z[b, 6:10]), z[b, :3]
-        Q = Rb @ fixed.turn
-        apart = Q.T @ (xa + Ra @ np.asarray(joint.child_point) - xb - Rb @ np.asarray(joint.parent_point))
-        E = Q.T @ Ra
+            b = z[:, names.index(joint.parent or "")]
+            Rb = rotation_matrices(b[:, 6:10])
+            apart = a[:, :3] + Ra @ np.asarray(joint.child_point) - b[:, :3] - Rb @ np.asarray(joint.parent_point)
+            Q = Rb @ fixed.turn
+        back = np.swapaxes(Q, -1, -2)
+        E = back @ Ra
         if joint.nrot == 1:
-            axis, across = fixed.axes[0], fixed.axes[1:]
-            turned = _angle(across @ (E @ axis), float(axis @ E @ axis))
+            axis = E @ fixed.axes[0]
+            turned = _angle(axis @ fixed.axes[1:].T, axis @ fixed.axes[0])
         else:
-            sine = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
-            turned = _angle(sine, 0.5 * (float(np.trace(E)) - 1.0))
-        return np.concatenate([fixed.held @ apart, turned if joint.nrot < 3 else turned[:0]])
+            sine = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1)
+            turned = _angle(0.5 * sine, 0.5 * (np.trace(E, axis1=1, axis2=2) - 1.0))
+        held = (back @ apart[:, :, None])[:, :, 0] @ fixed.held.T
+        return np.concatenate([held, turned if joint.nrot < 3 else turned[:, :0]], axis=1)
 
     def close(self, x: Floats, *, search: bool = True) -> Floats:
         """The state near x whose loops are closed at both ends of its interval.
@@ -93,8 +101,8 @@ class Closure:
         x = self._placed(x, search)
 
         def before(dv: Floats) -> Floats:
-            back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros(nv)])
-            return self._calls.integrate(x[None], back[None])[0]
+            back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros((len(dv), nv))], axis=1)
+            return self._calls.integrate(np.tile(x, (len(dv), 1)), back)
 
         x[self._nq :] += self._solve(before)
         return x
@@ -102,7 +110,7 @@ class Closure:
     def _placed(self, x: Floats, search: bool) -> Floats:
         """The state near x whose loops are closed at its end."""
         place = self._around(self._with_shares(x))
-        return place(self._solve(place, search))
+        return place(self._solve(place, search)[None])[0]
 
     def start(self, q: Floats, v: Floats) -> Floats:
         """The closed state near q whose velocity at the node is the part of v along the loops.
@@ -165,7 +173,7 @@ class Closure:
         states = []
         for _ in range(2 if len(free) else 0):
             d = rng.normal(size=len(free)) @ free
-            moved = self._around(x)(d * (_ASIDE / np.abs(d).max()))
+            moved = self._around(x)(d[None] * (_ASIDE / np.abs(d).max()))[0]
             moved[self._nq :] = 0.0
             try:
                 states.append(self.close(moved, search=False))
@@ -190,7 +198,7 @@ class Closure:
         return rank, np.linalg.svd(rows)[2][found:]
 
     def _solve(self, place: Callable[[Floats], Floats], search: bool = False) -> Floats:
-        """The small d (nv,) with closed loops at the state place(d).
+        """The small d (nv,) with closed loops at the state of place(d[None]).
 
         search: whether to look further away where Newton's method finds none.
         """
@@ -202,23 +210,18 @@ class Closure:
         return zero.d
 
     def _around(self, x: Floats) -> Callable[[Floats], Floats]:
-        """The state whose configuration is d (nv,) away from that of x."""
-        return lambda d: self._calls.integrate(x[None], np.concatenate([d, np.zeros(len(d))])[None])[0]
+        """The states (m, nx) whose configurations are d (m, nv) away from that of x."""
+        return lambda d: self._calls.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
 
     def _error(self, place: Callable[[Floats], Floats], name: str = "") -> Callable[[Floats], Floats]:
-        """The gaps at the state place(d), of all loops and gears or of one."""
-
-        def error(d: Floats) -> Floats:
-            gaps = self.gaps(place(d))
-            return gaps[name] if name else np.concatenate(list(gaps.values()))
-
-        return error
+        """The gaps (m, n) at the states place(d), of all loops and gears or of one."""
+        return lambda d: np.concatenate(list(self._gaps(place(d), name).values()), axis=1)
 
     def _refusal(self, place: Callable[[Floats], Floats], d: Floats, search: bool) -> str:
         """What to say when the state place(d) is the best that was found."""
-        gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d)).items()}
+        gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d[None])[0]).items()}
         names = [*gaps] if search and len(gaps) > 1 else []
-        alone = [name for name in names if not nearest(self._error(place, name), len(d)).found]
+        alone = [name for name in names if not nearest(self._error(place, name), len(d), _ALONE).found]
         worst = max(alone or gaps, key=lambda name: gaps[name])
         welds = {j.name: j.name.removeprefix(f"{j.parent}.") for j in self._mechanism.loops if is_weld(j)}
         what = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"

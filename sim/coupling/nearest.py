@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Error = Callable[[Floats], Floats]
+Error = Callable[[Floats], Floats]  # (m, k) of m places (m, n)
 
 CLOSED = 1e-11  # [m], and as much of an angle
 _STEP = 1e-6  # of central differences [m, rad]
@@ -25,8 +25,10 @@ _LONGEST = 0.5  # step of Newton's method [m, rad]
 _RANK = 1e-9  # singular values below this share of the largest belong to directions without effect
 _FAR = 1.0  # [m, rad] a zero further away than this may not be the nearest
 _AROUND = (0.1, 0.4, 1.6)  # standard deviations of the starts [m, rad]
-_STARTS = 6  # of each of them
+STARTS = 6  # of each of them
 _EVALUATIONS = 40  # of least squares from each
+_SLOW = 1e-3  # share of the sum of squares by which a step of least squares that goes on reduces it at least
+_NEAR = 1e-2  # [m, rad] from a minimum above this, no zero is within the reach of Newton's method
 _BACK = 30  # steps along the zeros
 
 
@@ -42,35 +44,47 @@ class Zero(NamedTuple):
         return self.left < CLOSED
 
 
+def linearized(error: Error, d: Floats) -> tuple[Floats, Floats]:
+    """The error at d (n,), (k,), and its Jacobian (k, n) by central differences: all places in one call."""
+    n = len(d)
+    steps = np.zeros((2 * n + 1, n))
+    steps[1 : n + 1], steps[n + 1 :] = _STEP * np.eye(n), -_STEP * np.eye(n)
+    rows = error(d + steps)
+    return rows[0], (rows[1 : n + 1] - rows[n + 1 :]).T / (2.0 * _STEP)
+
+
 def jacobian(error: Error, d: Floats) -> Floats:
-    """Of the error at d, (m, n), by central differences."""
-    return np.array([error(d + e) - error(d - e) for e in _STEP * np.eye(len(d))]).T / (2.0 * _STEP)
+    """Of the error at d (n,), (k, n)."""
+    return linearized(error, d)[1]
 
 
 def newton(error: Error, d: Floats) -> Zero:
     """The zero near d (n,), by steps of least norm; the best that was met where there is none."""
     best, idle = Zero(d, np.inf), 0
     for _ in range(_ITERATIONS):
-        g = error(d)
+        g, J = linearized(error, d)
         size = float(np.abs(g).max())
         best, idle = (Zero(d, size), 0) if size < best.left else (best, idle + 1)
         if best.found or idle == _IDLE:
             break
-        step = np.linalg.lstsq(jacobian(error, d), -g, rcond=_RANK)[0]
+        step = np.linalg.lstsq(J, -g, rcond=_RANK)[0]
         d = d + step * min(1.0, _LONGEST / max(np.abs(step).max(), 1e-300))
     return best
 
 
-def nearest(error: Error, n: int) -> Zero:
-    """The zero nearest to d = 0 (n,) of those that are found; the least error that was met where there is none."""
+def nearest(error: Error, n: int, starts: int = STARTS) -> Zero:
+    """The zero nearest to d = 0 (n,) of those that are found; the least error that was met where there is none.
+
+    starts: how many of each distance.
+    """
     best = newton(error, np.zeros(n))
     if best.found and np.abs(best.d).max() < _FAR:
         return best
     zeros = [_led_back(error, best)] if best.found else []
     rng = np.random.default_rng(0)
     for size in _AROUND:
-        for _ in range(_STARTS):
-            zero = newton(error, _settled(error, size * rng.normal(size=n)))
+        for _ in range(starts):
+            zero = _settled(error, size * rng.normal(size=n))
             best = min(best, zero, key=lambda z: z.left)
             zeros += [_led_back(error, zero)] if zero.found else []
         if zeros:  # of mirror images, whose distances differ by rounding, the first
@@ -78,11 +92,28 @@ def nearest(error: Error, n: int) -> Zero:
     return best
 
 
-def _settled(error: Error, d: Floats) -> Floats:
-    """Where the sum of squares of the error has a minimum, downhill from d."""
+def _settled(error: Error, d: Floats) -> Zero:
+    """The zero downhill from d, or the minimum of the sum of squares that is there.
+
+    Towards a zero, the sum falls ever faster. Where it hardly falls, there is a minimum of another kind, which most
+    starts of a loop that cannot be closed come to; to go on there would take most of the time.
+    """
     from scipy.optimize import least_squares
 
-    return np.asarray(least_squares(error, d, lambda y: jacobian(error, y), max_nfev=_EVALUATIONS).x)
+    last: dict[bytes, Floats] = {}
+
+    def here(y: Floats) -> Floats:
+        g, J = linearized(error, y)
+        last.clear()
+        last[y.tobytes()] = J
+        return g
+
+    def slope(y: Floats) -> Floats:
+        return last[y.tobytes()] if y.tobytes() in last else jacobian(error, y)
+
+    end = least_squares(here, d, slope, ftol=_SLOW, max_nfev=_EVALUATIONS)
+    left = float(np.abs(end.fun).max())
+    return Zero(end.x, left) if end.status > 0 and left > _NEAR else newton(error, end.x)
 
 
 def _led_back(error: Error, zero: Zero) -> Zero:

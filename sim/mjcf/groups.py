@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.urdf.drawing import Named, largest
 from sim.urdf.inertia import RigidInertia, combined
 from sim.urdf.pose import HERE, Pose
+from sim.urdf.report import Notes
 
 Floats = NDArray[np.float64]
 
@@ -77,18 +79,17 @@ def find_groups(model: Any) -> tuple[list[Group], Where]:
     return groups, where
 
 
-def drawn(model: Any, group: Group) -> Shape | None:
-    """The largest primitive geom of the group."""
-    best: Shape | None = None
-    volume = 0.0
+def drawn(model: Any, group: Group, notes: Notes) -> Shape | None:
+    """The largest primitive among the geoms of the group that collide, or else among the others."""
+    found: tuple[list[Named], list[Named]] = ([], [])
     for b, frame in group.members.items():
         start = int(model.body_geomadr[b])
         for g in range(start, start + int(model.body_geomnum[b])):
             solid = solid_of(model, g, frame, group.com)
-            size = float(np.prod(np.maximum(model.geom_size[g], 1e-3)))
-            if solid is not None and size > volume:
-                best, volume = solid, size
-    return best
+            collides = model.geom_contype[g] | model.geom_conaffinity[g]
+            if solid is not None:
+                found[0 if collides else 1].append((name_of(model, "geom", g), solid))
+    return largest(found[0], notes) or largest(found[1])
 
 
 def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | None:

@@ -111,7 +111,7 @@ def _tree(
     for group in groups:
         carried = carry(model, group, merge, notes)
         inertia = group.inertia
-        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group)) if inertia.mass else None
+        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group, notes)) if inertia.mass else None
         bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
         joints += carried.joints
         homes |= carried.homes

@@ -70,15 +70,16 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     base = base if base not in taken else f"{root}_{base}"
     joints = [_joint(body, places, coms, choices, base) for body in groups]
     closing = _closing(loops, places, coms, zero_poses(root, order), choices, notes)
+    known = dict.fromkeys([*robot.joints, *(j.name for j in joints)])
     for name in choices.neutral:
-        checks.one_of("load_urdf(neutral=...): joint", name, dict.fromkeys([*robot.joints, *(j.name for j in joints)]))
+        checks.one_of("load_urdf(neutral=...): joint", name, known)
     if not any(joint.nv for joint in joints):
         raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
     found = find_contacts(places, coms, choices.contacts, (choices.friction, choices.law, choices.rim_points), notes)
     neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
     neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
     mech = UrdfMechanism(
-        [_body(body, inertias[body.name]) for body in groups],
+        [_body(body, inertias[body.name], notes) for body in groups],
         [*joints, *closing],
         found,
         _inputs(joints, closing, choices),
@@ -164,8 +165,8 @@ def _joint(body: Group, places: Mapping[str, Place], coms: Mapping[str, Floats],
     )
 
 
-def _body(body: Group, part: RigidInertia) -> Body:
-    return Body(body.name, part.mass, part.inertia, drawn(body, part.com))
+def _body(body: Group, part: RigidInertia, notes: Notes) -> Body:
+    return Body(body.name, part.mass, part.inertia, drawn(body, part.com, notes))
 
 
 def _closing(
@@ -187,8 +188,9 @@ def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list
     if choices.actuated is None:
         chosen = [j for j in joints if j.kind != "floating"]
     else:
+        moving = {j.name: j for j in by_name.values() if j.nv}
         for name in choices.actuated:
-            checks.one_of("load_urdf(actuated=...): joint that moves", name, [j.name for j in by_name.values() if j.nv])
+            checks.one_of("load_urdf(actuated=...): joint that moves", name, moving)
         chosen = [by_name[name] for name in choices.actuated]
     return [Input(j.name, dof=d) for j in chosen for d in range(j.nv)]
 

@@ -52,10 +52,10 @@ def find_contacts(
         body = place.group.name
         given = picked[name]
         if body not in coms:
-            if given or place.group.links and _shapes(place, name):
+            if given or place.group.links and _shapes(place):
                 notes.add("no contacts on links that are fixed to the world", [name])
             continue
-        link = next(u for u, _ in place.group.links if u.name == name)
+        link = place.link
         mu, law, rim = settings
         friction = mu if mu is not None else link.friction if link.friction is not None else FRICTION
         for contact in given:
@@ -68,7 +68,7 @@ def find_contacts(
             )
         if given:
             continue
-        balls = [ball for shape in _shapes(place, name) for ball in _balls(shape, place, rim)]
+        balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, rim)]
         for k, (point, radius) in enumerate(balls):
             label = _free(name if len(balls) == 1 else f"{name}_{k}", taken)
             out.append(Contact(body, point - coms[body], radius, friction, law, name=label))
@@ -106,10 +106,9 @@ def _free(name: str, taken: set[str]) -> str:
     return label
 
 
-def _shapes(place: Place, name: str) -> list[Geometry]:
+def _shapes(place: Place) -> list[Geometry]:
     """The collision shapes of a link that make contacts."""
-    link = next(u for u, _ in place.group.links if u.name == name)
-    return [s for s in link.collisions if s.kind in SHAPES]
+    return [s for s in place.link.collisions if s.kind in SHAPES]
 
 
 def _balls(shape: Geometry, place: Place, rim: int) -> Balls:

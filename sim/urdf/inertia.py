@@ -27,11 +27,6 @@ class RigidInertia(NamedTuple):
         """The same in an outer frame in which this frame has the given pose."""
         return RigidInertia(self.mass, pose.at(self.com), pose.rotation @ self.inertia @ pose.rotation.T)
 
-    @property
-    def empty(self) -> bool:
-        """Whether there is neither mass nor inertia."""
-        return self.mass == 0.0 and not self.inertia.any()
-
 
 def combined(parts: list[RigidInertia]) -> RigidInertia:
     """One rigid body out of several in the same frame.

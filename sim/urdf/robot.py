@@ -69,6 +69,11 @@ class UrdfLink:
     friction: float | None  # <contact><lateral_friction>, as PyBullet reads it
     element: Element
 
+    @property
+    def empty(self) -> bool:
+        """Whether there is neither mass nor inertia."""
+        return self.mass == 0.0 and not self.inertia.any()
+
 
 @dataclass(frozen=True)
 class UrdfJoint:

@@ -25,6 +25,7 @@ class Group:
     parent: Group | None
     links: list[tuple[UrdfLink, Pose]] = field(default_factory=list)
     fixed: bool = False  # whether it stays on its joint as if that was a fixed one
+    empty: bool = True  # whether all its links are without mass and inertia
 
     @property
     def name(self) -> str:
@@ -36,16 +37,17 @@ class Group:
         """Those of the links, in the frame of the group."""
         return [RigidInertia(u.mass, u.com, u.inertia).seen_from(pose) for u, pose in self.links]
 
-    @property
-    def empty(self) -> bool:
-        """Whether all its links are without mass and inertia."""
-        return all(part.empty for part in self.inertias)
+    def add(self, link: UrdfLink, pose: Pose) -> None:
+        """One more link."""
+        self.links.append((link, pose))
+        self.empty &= link.empty
 
 
 @dataclass(frozen=True)
 class Place:
     """Where a link is: its group, and its pose there."""
 
+    link: UrdfLink
     group: Group
     pose: Pose
 
@@ -117,18 +119,18 @@ def group(
     base = robot.links[root]
     joins_world = root == WORLD or (fixed_base and (merge or base.mass == 0.0))
     first = world if joins_world else Group(None, world, fixed=fixed_base)
-    first.links.append((base, HERE))
+    first.add(base, HERE)
     bodies = [] if joins_world else [first]
-    places = {root: Place(first, HERE)}
+    places = {root: Place(base, first, HERE)}
     for joint in order:
         at, link = places[joint.parent], robot.links[joint.child]
         held = held_pose(joint, locked)
-        bare = RigidInertia(link.mass, link.com, link.inertia).empty
-        if held is not None and (merge or bare or (at.group.empty and at.group is not world)):
-            places[joint.child] = Place(at.group, at.pose.then(held))
-            at.group.links.append((link, places[joint.child].pose))
+        if held is not None and (merge or link.empty or (at.group.empty and at.group is not world)):
+            places[joint.child] = Place(link, at.group, at.pose.then(held))
+            at.group.add(link, places[joint.child].pose)
         else:
-            body = Group(joint, at.group, [(link, HERE)], fixed=held is not None)
+            body = Group(joint, at.group, fixed=held is not None)
+            body.add(link, HERE)
             bodies.append(body)
-            places[joint.child] = Place(body, HERE)
+            places[joint.child] = Place(link, body, HERE)
     return bodies, places

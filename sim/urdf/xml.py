@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
@@ -63,22 +64,27 @@ class Element:
 
     def vector(self, attribute: str, length: int, default: tuple[float, ...] | None = None) -> Floats:
         """`length` finite numbers, separated by blanks."""
+        return np.array(self._numbers(attribute, length, default), dtype=np.float64)
+
+    def number(self, attribute: str, default: float | None = None) -> float:
+        """One finite number."""
+        return self._numbers(attribute, 1, None if default is None else (default,))[0]
+
+    def _numbers(self, attribute: str, length: int, default: Sequence[float] | None) -> Sequence[float]:
         if attribute not in self.attributes and default is not None:
-            return np.array(default, dtype=np.float64)
+            return default
         text = self.text(attribute)
+        # Python reads "1_000" and the digits of every script, too, which are no numbers of XML
+        plain = text.isascii() and "_" not in text
         try:
-            values = np.array([float(word) for word in text.split()])
+            values = [float(word) for word in text.split()] if plain else []
         except ValueError:
-            values = np.array([np.nan])
-        if len(values) != length or not np.all(np.abs(values) < _HUGE):
+            values = []
+        if len(values) != length or not all(abs(value) < _HUGE for value in values):
             expected = "a finite number" if length == 1 else f"{length} finite numbers"
             hint = "; this is a xacro file, run xacro on it first" if "${" in text or "$(" in text else ""
             raise self.error(f"{attribute}={text!r}: expected {expected}{hint}")
         return values
-
-    def number(self, attribute: str, default: float | None = None) -> float:
-        """One finite number."""
-        return float(self.vector(attribute, 1, None if default is None else (default,))[0])
 
 
 def parse(path: Path) -> Element:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -63,6 +64,21 @@ def test_the_page_holds_pictures_tables_and_numbers(tmp_path: Path) -> None:
     assert numbers["studies"]["one"]["rows"][2]["value"] == "nan"
     markdown = (tmp_path / "new/report.md").read_text()
     assert "![A study](one.png)" in markdown and "a \\| b" in markdown and "1 of 3" in markdown
+
+
+def test_names_of_a_user_are_text_in_every_page(tmp_path: Path) -> None:
+    name = "</h2><script>alert(1)</script><img src=x onerror=alert(1)>\n\n# [x](javascript:alert(1)) ``` `"
+    hostile = Report(name, f"dojo-opt report accuracy {name}", summary=name, notes=[name], machine={name: name})
+    hostile.rows.append(Row(name, 1.0, name, note=name))
+    hostile.tables.append(Table(name, (name,), [(name,)], name))
+    write_page({"accuracy": hostile}, tmp_path, name)
+    page = Tags()
+    page.feed((tmp_path / "report.html").read_text())
+    assert page.open == [] and not {"script", "img"} & {tag for tag, _ in page.seen}
+    outside = re.sub(r"(`+)(?!`).*?(?<!`)\1(?!`)", "", (tmp_path / "report.md").read_text())
+    assert "<" not in outside and "](javascript" not in outside
+    assert [line for line in outside.splitlines() if line.startswith("# ")] == ["# dojo-opt: what it measures here"]
+    assert json.loads((tmp_path / "report.json").read_text())["studies"]["accuracy"]["title"] == name
 
 
 def test_long_tables_are_folded_and_the_overview_leads_to_the_studies(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt import viewer
 from dojo_opt.motion import motion
+from dojo_opt.viewer_page import page as page_of
 
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [
@@ -75,7 +76,7 @@ def shown(page, path, empty=None, seconds=20.0):
 @pytest.mark.slow
 def test_the_robot_is_drawn_and_moves(page, quadruped, tmp_path):
     path = viewer.save_html(quadruped, tmp_path / "fall.html")
-    (tmp_path / "empty.html").write_text(viewer._page(motion(quadruped), []))
+    (tmp_path / "empty.html").write_text(page_of(motion(quadruped), []))
     shown(page, tmp_path / "empty.html")
     time.sleep(2.0)
     empty = shot(page)
@@ -126,3 +127,60 @@ def test_obstacles_are_drawn():
     commands = viewer._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
     drawn = [command.path.lower() for command in commands if "obstacles" in command.path.lower()]
     assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
+
+
+HOSTILE = "</title></script><script>hit('{}')</script><img src=x onerror=\"hit('{}')\">'\"&{{viewer}}$\\frac/{}"
+NAMES = ["constructor", "__proto__", "<object>", "a/b", "//", "$\\frac{", *(HOSTILE.format(*3 * [k]) for k in "mbjco")]
+
+
+def hostile(names):
+    """A mechanism whose every name is one of these."""
+    m, b, j, c, o = names
+    ball = dojo.Body(b, 1.0, shape=dojo.Sphere(0.1))
+    wall = dojo.Collision(b, shape_b=dojo.Box(0.2, 1.0, 1.0, center=(1, 0, 0)), name=o)
+    contact = dojo.Contact(b, radius=0.1, name=c)
+    return dojo.Mechanism([ball], [dojo.Joint("floating", None, b, j)], [contact], name=m, collisions=[wall])
+
+
+def opened(page, path):
+    """What went wrong, or out, after loading a page and opening every folder of MeshCat's menu."""
+    wrong = []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on(
+        "request",
+        lambda request: wrong.append(request.url) if request.url[:5] not in ("file:", "data:", "blob:") else None,
+    )
+    page.add_init_script("window.hits = []; window.hit = name => window.hits.push(name)")
+    page.goto(path.as_uri())
+    page.evaluate("document.querySelectorAll('.dg .title, .dg .close-button').forEach(e => e.click())")
+    page.wait_for_timeout(500)
+    return wrong + page.evaluate("window.hits")
+
+
+@pytest.mark.parametrize("names", [[name] * 5 for name in NAMES[:6]] + [NAMES[6:]], ids=[*map(str, range(6)), "html"])
+def test_names_of_a_user_are_text_in_the_page(page, tmp_path, names):
+    sim = dojo.Simulator(hostile(names), time_step=0.01)
+    x = sim.neutral()
+    x[2] = 1.0
+    motion_of = sim.rollout(x, np.zeros((3, sim.nu)))
+    path = viewer.save_html(motion_of, tmp_path / "a.html")
+    assert opened(page, path) == []
+    assert page.title() == " ".join(names[0].split())
+    assert page.locator("#bar b").inner_text() == names[0]
+    assert page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'bodies']).children).length") == 1
+    dojo.plots.trajectory(motion_of).savefig(tmp_path / "a.png")
+
+
+def test_names_of_a_file_are_text_in_the_page_of_show(page, tmp_path):
+    from xml.sax.saxutils import quoteattr
+
+    from dojo_opt.cli import main
+
+    link = """<link name={}><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><sphere radius="0.1"/></geometry></collision></link>"""
+    text = f"<robot name={quoteattr(NAMES[6])}>{link.format(quoteattr(NAMES[7]))}</robot>"
+    (tmp_path / "r.urdf").write_text(text)
+    assert main(["show", str(tmp_path / "r.urdf"), "--seconds", "0.05", "--html", str(tmp_path / "r.html")]) == 0
+    assert opened(page, tmp_path / "r.html") == []
+    assert page.title() == NAMES[6]

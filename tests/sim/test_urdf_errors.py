@@ -64,6 +64,18 @@ BROKEN: dict[str, tuple[tuple[str, ...], str]] = {  # parts from line 2 on, and 
         (link("base", inertial().replace('value="1.0"', 'value="heavy"')),),
         "line 2, <mass>: value='heavy': expected",
     ),
+    "grouped digits": (
+        (link("base", inertial().replace('"1.0"', '"1_000"')),),
+        "line 2, <mass>: value='1_000': expected a finite number",
+    ),
+    "other digits": (
+        (link("base", inertial().replace('"1.0"', '"\u0661\u0662"')),),
+        "line 2, <mass>: value='\u0661\u0662': expected a finite number",
+    ),
+    "other blanks": (
+        (link("base", inertial(xyz="1\u00a02\u20033")),),
+        "<origin>: xyz='1.*3': expected 3 finite numbers",
+    ),
     "infinity": ((link("base", inertial(mass=float("inf"))),), "line 2, <mass>: value='inf': expected a finite number"),
     "huge": (
         (link("base", inertial(xyz="0 0 1e300")),),

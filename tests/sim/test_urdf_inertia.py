@@ -14,6 +14,8 @@ from sim.urdf.inertia import BALL_MASS, BALL_RADIUS, RigidInertia, combined, fau
 from sim.urdf.pose import roll_pitch_yaw
 from sim.urdf.stance import poses
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.urdf.report.UrdfWarning")
+
 
 def test_an_inertia_is_that_of_its_point_masses(tmp_path: Path, rng: np.random.Generator) -> None:
     """Masses at points of two links, one fixed to the other; written about turned frames, read back as one body."""

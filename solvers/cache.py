@@ -1,0 +1,250 @@
+"""Compiled code on disk: a folder that nobody else can write to, with one file per compiled signature.
+
+Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
+in another file. Here the folder is named by a digest of every source file that can reach a kernel, so any edit starts
+from an empty folder.
+
+To load compiled code is to run it. So a folder is read only where its owner is the user or root, and where neither a
+group nor the world can write; and a file only when it is as it was written. Everything else is compiled, in memory
+where it cannot be kept, with one warning that says why.
+
+    DOJO_OPT_CACHE=0         compile in memory only
+    NUMBA_CACHE_DIR=DIR      keep the compiled code below DIR instead of the user's cache folder
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import os
+import pickle
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+__all__ = ["STORE", "KernelCache", "cache_folder"]
+
+_KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
+_LOADERS = ("urdf", "mjcf")  # folders without kernels
+_CHECK = hashlib.blake2b().digest_size  # bytes of a file before what it holds
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def _sources() -> list[Path]:
+    """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
+    root = Path(__file__).resolve().parent.parent
+    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
+    files += [
+        f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
+    ]
+    return sorted(files)
+
+
+def _digest() -> str:
+    """Digest of all kernel sources and of the flags that Numba's own cache key leaves out."""
+    digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK}".encode())
+    for path in _sources():
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _base() -> tuple[Path | None, int]:
+    """(folder of NUMBA_CACHE_DIR, or the user's cache folder; who must not write there); None where nobody knows one.
+
+    A folder that the XDG specification calls invalid, because it depends on where the process was started, is none.
+    """
+    named = [numba.config.CACHE_DIR and os.path.abspath(numba.config.CACHE_DIR), os.environ.get("XDG_CACHE_HOME", "")]
+    for name in named:
+        if os.path.isabs(name):
+            return Path(name), _OTHERS
+    try:
+        home = Path.home()
+    except RuntimeError:  # of a user that the system does not know
+        return None, 0
+    # the group of a home is often that of its user alone; and what is below is looked at folder by folder
+    return (home / ".cache" if home.is_absolute() else None), stat.S_IWOTH
+
+
+def _foreign(path: Path, about: os.stat_result, forbidden: int = _OTHERS) -> str:
+    """Why the code in a file or folder may be somebody else's; empty when it is the user's own, or root's."""
+    if not hasattr(os, "geteuid"):  # Windows, where a user's folders are his own
+        return ""
+    if about.st_uid not in (os.geteuid(), 0):
+        return f"{path} belongs to the user with id {about.st_uid}"
+    if about.st_mode & forbidden:
+        return f"others can write to {path} (chmod go-w ends that)"
+    return ""
+
+
+def _opened(base: Path, forbidden: int) -> tuple[Path | None, str]:
+    """(folder below the base, made if need be; why there is none)."""
+    for outer in (base, *base.parents):  # root makes no folders where they would be in another user's way
+        if outer.exists():
+            if why := _foreign(outer, outer.stat(), forbidden=0):
+                return None, why
+            break
+    base.parent.mkdir(parents=True, exist_ok=True)
+    folder = base / "dojo_opt" / _digest()
+    for part in (base, folder.parent, folder):
+        part.mkdir(mode=0o700, exist_ok=True)
+        about = part.stat()
+        # in a sticky folder, as /tmp is, nobody can put another one in the place of ours
+        bits = _OTHERS if part != base else 0 if about.st_mode & stat.S_ISVTX else forbidden
+        if why := _foreign(part, about, bits):
+            return None, why
+    return folder, ""
+
+
+def _found() -> tuple[Path | None, str]:
+    """(folder of the compiled code; why there is none, empty where nobody wants one)."""
+    if os.environ.get("DOJO_OPT_CACHE", "1") == "0":
+        return None, ""
+    try:
+        base, forbidden = _base()
+        return _opened(base, forbidden) if base else (None, "the user has no home folder")
+    except OSError as error:
+        return None, str(error)
+
+
+def cache_folder() -> Path | None:
+    """Folder of the compiled code, or None when the cache is off or no folder can be used."""
+    return _found()[0]
+
+
+class Store:
+    """The files of the folder, each as it was written or not at all."""
+
+    def __init__(self) -> None:
+        self.folder, self.why_not = _found()
+        self.wanted, self._told = self.folder is not None or bool(self.why_not), False
+        if self.folder is not None:
+            with suppress(OSError):  # one that is filled, and read-only
+                os.utime(self.folder)
+                self._prune(self.folder.parent)
+
+    @staticmethod
+    def _prune(root: Path) -> None:
+        """Drop all but the newest few digests below `root`."""
+        old = sorted((d for d in root.iterdir() if d.is_dir() and len(d.name) == 16), key=lambda d: d.stat().st_mtime)
+        for folder in old[:-_KEEP]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def read(self, name: str) -> bytes:
+        """What was written under this name; OSError or ValueError when that cannot be had."""
+        if self.folder is None:
+            raise FileNotFoundError(name)
+        path = self.folder / name
+        # a named pipe, which nobody writes to, would be waited for
+        with open(path, "rb", opener=lambda p, flags: os.open(p, flags | getattr(os, "O_NONBLOCK", 0))) as file:
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode) or _foreign(path, about):
+                raise ValueError(f"{path}: not a file of this user")
+            data = file.read()
+        if hashlib.blake2b(data[_CHECK:]).digest() != data[:_CHECK]:
+            raise ValueError(f"{path}: damaged")
+        return data[_CHECK:]
+
+    def write(self, name: str, body: bytes) -> None:
+        """Keep it, at once and as a whole; where that cannot be, say so once."""
+        if self.folder is None or self._told:
+            self.tell(self.why_not)
+            return
+        try:
+            self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # another version may have pruned it
+            handle, draft = tempfile.mkstemp(dir=self.folder)
+            try:
+                with open(handle, "wb") as file:
+                    file.write(hashlib.blake2b(body).digest() + body)
+                os.replace(draft, self.folder / name)
+            except BaseException:
+                Path(draft).unlink(missing_ok=True)
+                raise
+        except OSError as error:
+            # Windows refuses to replace a file that another process, which compiled the same, is reading
+            if os.name != "nt" or not (self.folder / name).exists():
+                self.tell(str(error))
+
+    def drop(self, name: str) -> None:
+        """Remove a file that is of no use, or what else is in its place."""
+        if self.folder is not None:
+            path = self.folder / name
+            with suppress(OSError):
+                shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+
+    def tell(self, why: str) -> None:
+        """Warn, once, that compiled code is not kept."""
+        if not self._told:
+            self._told = True
+            warnings.warn(
+                f"dojo_opt: compiled code is not kept, and every process compiles it again: {why}. "
+                "NUMBA_CACHE_DIR=DIR keeps it elsewhere, DOJO_OPT_CACHE=0 asks for none to be kept",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+
+
+STORE = Store()
+
+
+@cache
+def _text_digest(file: str) -> bytes:
+    return hashlib.sha256(Path(file).read_bytes()).digest()
+
+
+class KernelCache(FunctionCache):
+    """The signatures of one form of a kernel; any failure to load one is a reason to compile it."""
+
+    def __init__(self, py_func: Callable[..., Any], form: str) -> None:
+        self._py_func, self._form = py_func, form
+        self._file = inspect.getfile(py_func)
+        name = re.sub(r"\W+", "_", f"{Path(self._file).stem}.{py_func.__name__}")
+        self._stem = f"{name}-{py_func.__code__.co_firstlineno}-{form}"
+        self._cache_path = str(STORE.folder)
+        self.enable()
+
+    def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
+        """(what the compiled code depends on, apart from the sources of the digest; name of its file)."""
+        version = (*sys.version_info[:2], getattr(sys, "abiflags", ""))
+        key = (self._form, self._file, _text_digest(self._file), version, self._index_key(sig, codegen))
+        return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compile result that was kept for this signature; None where there is none, or none of use."""
+        target_context.refresh()
+        key, name = self._key(sig, target_context.codegen())
+        try:
+            kept, payload = pickle.loads(STORE.read(name))
+            if kept == key:
+                return CompileResult._rebuild(target_context, *payload)
+        except FileNotFoundError:
+            return None
+        except Exception:  # of a damaged file, whatever unpickling runs into
+            pass
+        STORE.drop(name)
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compile result."""
+        if data.lifted or data.library.has_dynamic_globals:
+            STORE.tell(f"{self._py_func.__name__} holds addresses of this process")
+            return
+        key, name = self._key(sig, data.codegen)
+        STORE.write(name, dumps((key, data._reduce())))
+
+    def flush(self) -> None:
+        """Drop what is kept of this form."""
+        for path in STORE.folder.glob(f"{self._stem}-*.nbc") if STORE.folder else ():
+            STORE.drop(path.name)
