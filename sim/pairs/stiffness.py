@@ -107,7 +107,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 
 @late.condense_pairs.defined()
-def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool) -> None:
+def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
     """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
@@ -118,7 +118,7 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: floa
     for m in range(work.counts[0], work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             pair_jacobian(model, work, h, c - ground)
-            condense_contact(model, work, c, kappa, share, linear)
+            condense_contact(model, work, h, c, kappa, share, form)
             if not is_absent(work, c - ground):
                 add_pair_stiffness(model, work, c - ground, share)
 
