@@ -19,6 +19,7 @@ class Status(IntEnum):
     LOOP_STEP = 6
     COLLISION_STEP = 7
     JOINT_STEP = 8
+    CONTACT_SUNK = 9
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
@@ -41,6 +42,7 @@ MESSAGES: dict[Status, str] = {
     Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
     Status.COLLISION_STEP: "Shapes pass through one another, or gain energy, in what was found; use smaller steps.",
     Status.JOINT_STEP: "Bodies turn so far that joints give them energy, in all that was found; use smaller steps.",
+    Status.CONTACT_SUNK: "A contact is below the ground, and its joints let no motion lift it out.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",

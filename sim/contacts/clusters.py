@@ -20,6 +20,7 @@ def pack_clusters(model: Model) -> None:
         same = (
             (model.contact_body[:count] == model.contact_body[first])
             & level
+            & (model.contact_hold == model.contact_hold[first])
             & np.all(model.contact_frame == model.contact_frame[first], axis=1)
         )
         end = first + int(np.argmin(np.append(same[first:], False))) if not model.contact_terrain[first] else first + 1

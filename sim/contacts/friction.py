@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim.contacts.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
 from sim.contacts.contact import contact_rate
-from sim.contacts.softening import soften, yielding
+from sim.contacts.softening import soften
 from sim.late import (
     condense_pyramid,
     pair_rate,
@@ -195,8 +195,7 @@ def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, s
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
     if form == SOFT:
-        d = yielding(model, work, h, c)
-        soften(W, h * d, d)
+        soften(model, work, h, c)
 
 
 @kernel

@@ -5,9 +5,9 @@ left of the inertia in the directions that the contact leaves free would be its 
 little, E = W^-1 - D, has nearly the same derivative: it differs by D/G, G the velocity per impulse that the bodies
 answer with there, and rounding adds 1e-16 M/D, M the same of a body that is free. So
 
-    W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 1e-8 sqrt(M G)
+    W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 
-balances the two. M is 1/m of the bodies that touch, with what is fixed to them. G is known from what the impulse gamma
+balances the two, and 1e-14 M W' is an estimate of what is left (Linearization.accuracy): 3e-7 where M = G. M is 1/m of the bodies that touch, with what is fixed to them. G is known from what the impulse gamma
 has done: it has stopped the speed v of the contact point, or carried weight for h, so G = (v + |g| h)/gamma. A foot of
 1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those of a foot alone.
 """
@@ -48,8 +48,8 @@ def speed_before(work: Work, h: float, i: int, x: float, y: float, z: float) -> 
 
 
 @kernel
-def yielding(model: Model, work: Work, h: float, c: int) -> float:
-    """d of contact c [m/s per N s]."""
+def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
+    """M and G of contact c [m/s per N s]."""
     k = work.contact_kin[c]
     a = model.contact_body[c]
     M = free_response(model, a)
@@ -64,12 +64,22 @@ def yielding(model: Model, work: Work, h: float, c: int) -> float:
             x, y, z = x - u, y - v, z - w
     g = model.gravity
     speed = sqrt(x * x + y * y + z * z) + h * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    G = max(min(M, speed / work.cone[c, 1]), _LEAST * M)
-    return _PART * sqrt(M * G)
+    return M, max(min(M, speed / work.cone[c, 1]), _LEAST * M)
 
 
 @kernel
-def soften(W: Vector, normal: float, along: float) -> None:
+def soften(model: Model, work: Work, h: float, c: int) -> None:
+    """W of contact c becomes W'; contact_hard: M W', at most."""
+    W = work.contact_W[c]
+    M, G = responses(model, work, h, c)
+    d = _PART * sqrt(M * G)
+    _compose(W, h * d, d)
+    hard = max(-h * W[0], -W[4], -W[8])
+    work.contact_hard[0] = max(work.contact_hard[0], M * hard)
+
+
+@kernel
+def _compose(W: Vector, normal: float, along: float) -> None:
     """W = (I - W D)^-1 W,   D = diag(normal, along, along); the normal impulse does not depend on the slip."""
     n = 1.0 / (1.0 - W[0] * normal)
     a, b, c, d = 1.0 - W[4] * along, -W[5] * along, -W[7] * along, 1.0 - W[8] * along

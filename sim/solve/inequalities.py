@@ -181,6 +181,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
 @late.add_stiffness.defined()
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
+    work.contact_hard[0] = 0.0
     condense_into(model, work, h, kappa, 1.0, SOFT, work.A3)
     add_slip_jacobians(model, work, h)
     add_limit_blocks(model, work, h)
