@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from sim import late
 from sim.contacts.contact import (
-    add_contact_matrix,
+    add_contact_law,
+    add_contact_turn,
     add_contact_wrench,
     contact_jacobian,
     contact_kinematics,
@@ -172,7 +173,9 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
             contact_jacobian(model, work, h, c)
             condense_contact(model, work, h, c, kappa, share, form)
             fn, f1, f2 = contact_impulse(model, work, c)
-            add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+            if form != SOFT or work.bounce[c, 1] == 0.0:  # for impacts see restitution_gradient.py
+                add_contact_law(model, work, c, out)
+            add_contact_turn(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
                 add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
     condense_pairs(model, work, h, kappa, share, form)
@@ -192,7 +195,8 @@ def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
     """A2 -= contacts: slips depend on pose 2."""
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            add_slip_jacobian(model, work, h, c)
+            if work.bounce[c, 1] == 0.0:
+                add_slip_jacobian(model, work, h, c)
 
 
 @kernel
