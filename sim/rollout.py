@@ -24,7 +24,7 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
-ACCURACY = 1e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
+ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
 Cube = Matrix  # (n, rows, columns)
 
 

@@ -87,6 +87,7 @@ def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
         for c in range(work.near[m, 0], work.near[m, 1]):
             if work.bounce[c, 1] != 0.0:
                 _add_ground(model, work, h, c)
+                _add_composites(model, work, h, c)
     for j in range(model.pair_kind.shape[0]):
         b = work.bounce[ground + j]
         one = model.coupling_body[model.pair_coupling[j], 0]
@@ -104,21 +105,20 @@ def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def _gap_and_slip(model: Model, work: Work, h: float, c: int, d: int) -> tuple[Vec3, float]:
-    """Rates of (gap - floor, slip) of an impact on the ground by coordinate d, and what of it is by configuration 1."""
+def _rates(model: Model, work: Work, h: float, c: int, twists: tuple[Vector, Vector, Vector]) -> Vec3:
+    """d(gap - floor, slip) of an impact on the ground by the twists of configurations 1, 2 and 3."""
+    s1, s, t = twists
     b, k, F = work.bounce[c], work.contact_kin[c], work.contact_frame[c]
     i = model.contact_body[c]
-    s, o, p = work.S2[d], work.origin, work.pos2[i]
+    o, p = work.origin, work.pos2[i]
     e = (s[3], s[4], s[5])
     u, v, w = cross(s[3], s[4], s[5], p[0] - o[0], p[1] - o[1], p[2] - o[2])
     x = (s[0] + u, s[1] + v, s[2] + w)
     r = (k[3], k[4], k[5])
-    t = work.S3[d]
-    first = b[1] * dot(b[2:8], work.S1[d])
-    gap = dot(k[18:21], t[:3]) + dot(k[9:12], t[3:]) - first - (1.0 - b[1]) * dot(b[8:14], s)
+    gap = dot(k[18:21], t[:3]) + dot(k[9:12], t[3:]) - b[1] * dot(b[2:8], s1) - (1.0 - b[1]) * dot(b[8:14], s)
     one = dot(k[21:24], t[:3]) + dot(k[12:15], t[3:]) + slip_rate(F[3], F[4], F[5], r, work.turn[i], x, e) / h
     two = dot(k[24:27], t[:3]) + dot(k[15:18], t[3:]) + slip_rate(F[6], F[7], F[8], r, work.turn[i], x, e) / h
-    return (gap, one, two), first
+    return gap, one, two
 
 
 @kernel
@@ -136,15 +136,45 @@ def _impulse_wrench(model: Model, work: Work, c: int, g: Vec3) -> None:
 
 @kernel
 def _add_ground(model: Model, work: Work, h: float, c: int) -> None:
-    """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, and dR_dv += that by configuration 1, of one contact."""
+    """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, and dR_dv -= that by configuration 1, of one contact."""
+    none = work.pair_rows[0]
+    for k in range(6):
+        none[k] = 0.0
     i = model.contact_body[c]
     while i >= 0:
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            rates, first = _gap_and_slip(model, work, h, c, d)
-            _impulse_wrench(model, work, c, rates)
+            s1 = work.S1[d]
+            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, work.S2[d], work.S3[d])))
             add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dq)
-            _impulse_wrench(model, work, c, (first, 0.0, 0.0))
-            add_column(model, work, model.contact_body[c], 1.0, d, work.dR_dv)
+            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, none, none)))
+            add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dv)
+        i = model.body_parent[i]
+
+
+@kernel
+def _add_composites(model: Model, work: Work, h: float, c: int) -> None:
+    """A1, A2, A3 of the body of one contact and those above it, once they are composites: for parameters."""
+    none, unit = work.pair_rows[0], work.pair_rows[1]
+    for k in range(6):
+        none[k] = unit[k] = 0.0
+    for k in range(6):
+        unit[k] = 1.0
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (unit, none, none)))
+        _subtract_column(model, work, c, k, work.A1)
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, unit, none)))
+        _subtract_column(model, work, c, k, work.A2)
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, none, unit)))
+        _subtract_column(model, work, c, k, work.A3)
+        unit[k] = 0.0
+
+
+@kernel
+def _subtract_column(model: Model, work: Work, c: int, k: int, A: Matrix) -> None:
+    """Column k of A[i] -= couple_wrench, i from the body of contact c up to the root."""
+    i = model.contact_body[c]
+    while i >= 0:
+        for r in range(6):
+            A[i, 6 * r + k] -= work.couple_wrench[r]
         i = model.body_parent[i]
 
 

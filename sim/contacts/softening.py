@@ -7,20 +7,22 @@ answer with there, and rounding adds 1e-16 M/D, M the same of a body that is fre
 
     W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 
-balances the two, and 1e-14 M W' is an estimate of what is left (Linearization.accuracy): 3e-7 where M = G. M is 1/m of the bodies that touch, with what is fixed to them. G is known from what the impulse gamma
-has done: it has stopped the speed v of the contact point, or carried weight for h, so G = (v + |g| h)/gamma. A foot of
-1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those of a foot alone.
+balances the two; 3e-14 M W' is an estimate of what is lost (Linearization.accuracy), 1e-6 where M = G. M is 1/m of the
+bodies that touch, with what is fixed to them. G is known from what the impulse gamma has done: it has stopped the speed
+v of the contact point, or carried weight for h, so G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has
+G = M/1000, and its impulses are not taken for those of a foot alone.
 """
 
 from __future__ import annotations
 
 from math import sqrt
 
-from sim.model import Model, Vector
+from sim.model import Law, Model, Vector
 from sim.rotation import Vec3, cross
 from sim.work import Work
 from solvers.jit import kernel
 
+_LINEAR = int(Law.LINEAR)
 _PART = 3e-8
 _LEAST = 1e-6  # of M, which G is not taken to be below: forces between parts that hold one another stop no speed
 
@@ -69,23 +71,25 @@ def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]
 
 @kernel
 def soften(model: Model, work: Work, h: float, c: int) -> None:
-    """W of contact c becomes W'; contact_hard: M W', at most."""
+    """W of contact c becomes W', and its derivative by friction (contact_scale) what it is with W'; contact_hard: M W'."""
     W = work.contact_W[c]
+    q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
     M, G = responses(model, work, h, c)
     d = _PART * sqrt(M * G)
-    _compose(W, h * d, d)
+    _compose(W, q, h * d, d)
     hard = max(-h * W[0], -W[4], -W[8])
     work.contact_hard[0] = max(work.contact_hard[0], M * hard)
 
 
 @kernel
-def _compose(W: Vector, normal: float, along: float) -> None:
-    """W = (I - W D)^-1 W,   D = diag(normal, along, along); the normal impulse does not depend on the slip."""
+def _compose(W: Vector, q: Vector, normal: float, along: float) -> None:
+    """W = (I - W D)^-1 W and q likewise, D = diag(normal, along, along); the normal impulse does not depend on slip."""
     n = 1.0 / (1.0 - W[0] * normal)
     a, b, c, d = 1.0 - W[4] * along, -W[5] * along, -W[7] * along, 1.0 - W[8] * along
     i = 1.0 / (a * d - b * c)
     a, b, c, d = i * d, -i * b, -i * c, i * a
     W[0] *= n
+    q[0], q[1] = a * q[0] + b * q[1], c * q[0] + d * q[1]
     x, y = n * W[3], n * W[6]
     W[3], W[6] = a * x + b * y, c * x + d * y
     x, y = W[4], W[7]
