@@ -25,8 +25,8 @@ from sim import checks
 from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.model import Model
-from sim.results import check_finite
 from sim.parts import WORLD, Joint
+from sim.results import check_finite
 from sim.shapes import rotation_matrix
 from sim.work import Work
 

@@ -136,7 +136,7 @@ def _impulse_wrench(model: Model, work: Work, c: int, g: Vec3) -> None:
 
 @kernel
 def _add_ground(model: Model, work: Work, h: float, c: int) -> None:
-    """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, and dR_dv -= that by configuration 1, of one contact."""
+    """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, dR_dv -= that by configuration 1, of one contact."""
     none = work.pair_rows[0]
     for k in range(6):
         none[k] = 0.0

@@ -41,7 +41,7 @@ def free_response(model: Model, i: int) -> float:
 
 @kernel
 def speed_before(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
-    """Velocity over interval 1-2 of the point of body i at the arm (x, y, z) from its centre of mass; 0 for the world."""
+    """Velocity over interval 1-2 of the point of body i at the arm (x, y, z) from its centre of mass; 0: the world."""
     if i < 0:
         return 0.0, 0.0, 0.0
     s, d = work.turn_in[i], work.move_in[i]
@@ -71,7 +71,7 @@ def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]
 
 @kernel
 def soften(model: Model, work: Work, h: float, c: int) -> None:
-    """W of contact c becomes W', and its derivative by friction (contact_scale) what it is with W'; contact_hard: M W'."""
+    """W of contact c becomes W', its derivative by friction (contact_scale) what it is then; contact_hard: M W'."""
     W = work.contact_W[c]
     q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
     M, G = responses(model, work, h, c)

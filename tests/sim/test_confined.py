@@ -124,7 +124,9 @@ def test_reach_bounds_what_a_chain_can_do(seed: int) -> None:
     gaps = []
     for _ in range(300):
         z = loose.maximal(random_state(loose, rng, spread=2.0))
-        gaps.append([z[i, 2] + rot.rotate(z[i, 6:10], np.asarray(c.point))[2] - c.height for i, c in enumerate(contacts)])
+        gaps.append(
+            [z[i, 2] + rot.rotate(z[i, 6:10], np.asarray(c.point))[2] - c.height for i, c in enumerate(contacts)]
+        )
     top, spread = np.max(gaps, axis=0), np.ptp(gaps, axis=0)
     for k, hold in enumerate(found):
         assert hold != SUNK or top[k] < 0.0
