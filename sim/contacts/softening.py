@@ -24,6 +24,7 @@ from solvers.jit import kernel
 
 _LINEAR = int(Law.LINEAR)
 _PART = 3e-8
+_PART_OF_IMPACTS = 1e-8  # with restitution, whose rates are summed first (restitution_gradient.py): less is rounded
 _LEAST = 1e-6  # of M, which G is not taken to be below: forces between parts that hold one another stop no speed
 
 
@@ -75,7 +76,7 @@ def soften(model: Model, work: Work, h: float, c: int) -> None:
     W = work.contact_W[c]
     q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
     M, G = responses(model, work, h, c)
-    d = _PART * sqrt(M * G)
+    d = (_PART if work.bounce[c, 1] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
     _compose(W, q, h * d, d)
     hard = max(-h * W[0], -W[4], -W[8])
     work.contact_hard[0] = max(work.contact_hard[0], M * hard)
