@@ -172,9 +172,7 @@ def bind_gradient(model: Model) -> None:
     if _has_strings(model):
         _bind(model, (late.add_string_turn,))
     if np.any(model.contact_restitution):
-        _bind(model, (late.add_bounce_composites,))
-        if len(model.pair_kind):
-            _bind(model, (late.add_bounce_derivatives,))
+        _bind(model, (late.add_bounce_composites, late.add_bounce_derivatives))
 
 
 def bind_parameters(model: Model) -> None:

@@ -1,13 +1,15 @@
 """Calls: where Python enters the compiled steps, rollouts and derivatives, with all buffers that cross the border.
 
 settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
-report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
+report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
+           accuracy of derivatives, 0 where there are none
 contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +26,29 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-REPORT, CONTACT, CONE, BOUND = 5, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
+REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
+_SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
+
+
+def finite_rows(array: Floats) -> NDArray[np.bool_]:
+    """Which rows (along the first axis) are finite throughout."""
+    return np.asarray(np.isfinite(array).reshape(len(array), -1).all(axis=1))
+
+
+def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
+    """The first of `count` steps with a row that is not finite, whose status says so then; `count` where there is none.
+
+    A sum is looked at first, which takes a tenth of the time; small ones by `dot`, which has less to set up.
+    """
+    if all(isfinite(flat.dot(flat) if flat.size < _SMALL else flat.sum()) for flat in [a.ravel() for a in arrays]):
+        return count
+    good = np.logical_and.reduce([finite_rows(a) for a in arrays])
+    if good.all():
+        return count
+    first = int(good.argmin())
+    reports[first, 0] = Status.NOT_FINITE
+    return first
 
 
 class Calls(StateCalls):
@@ -63,6 +86,7 @@ class Calls(StateCalls):
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
         settings = self.settings.array()
         knot = rollout.roll(self._table(bind_step), self._scratch.table(), settings, x, us, xs, reports, contacts)
+        knot = refuse(reports, knot, contacts[:knot])
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, reports, contacts
@@ -120,7 +144,8 @@ class Calls(StateCalls):
             rollout.linearize(model, self._scratch.table(), settings, (0, n), substeps, line)
         else:
             rollout.linearize_knots(model, self._scratch.chunks(n), settings, substeps, line)
-        if reports[:, 0].any():
+        if reports[:, 0].any() or refuse(reports, n, A, B) < n:
+            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
@@ -135,6 +160,7 @@ class Calls(StateCalls):
         line = rollout.Linearized(xs, us, A, B, xs, reports)
         model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
         knot = linear_rollout.roll_linear(model, self._scratch.table(), settings, line)
+        knot = refuse(reports, knot, A[:knot], B[:knot])
         if knot < n:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return int(knot), xs, A, B, reports

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
-from sim.results import Linearization, Trajectory, error_of, path_of
+from sim.results import Linearization, Trajectory, check_finite, error_of, path_of
 from sim.states import States
 from sim.wrenches import Wrenches
 from solvers.status import Status
@@ -77,6 +77,7 @@ class Derivatives(States):
             return A, B
         asked, found, plan = self._by_parameters.select("Simulator.linearize(wrt=...)", wrt)
         J = self._by_parameters.columns((state, us), A, plan)
+        check_finite("Simulator.linearize(wrt=...)", J)
         blocks = {"state": A, "input": B}
         return {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
 
@@ -108,7 +109,8 @@ class Derivatives(States):
             knot, xs, A, B, reports = self._calls.roll_linear(state, inputs, level)
         if knot < len(inputs):
             raise error_of(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
-        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64), blocks)
+        check_finite(f"Simulator.{call}(wrt=...)", *blocks.values())
+        return xs, Linearization(A, B, xs[1:], reports[:, 0].astype(np.int64), blocks, reports[:, 5])
 
     def linearize_trajectory(
         self,
@@ -134,7 +136,7 @@ class Derivatives(States):
         steps = whole(f"{call}(substeps=...)", substeps)
         level = self._border.kappa("linearize_trajectory", kappa)
         A, B, x_next, reports = self._calls.linearize(states, inputs, steps, level)
-        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))
+        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64), accuracy=reports[:, 5])
 
     def linearize_maximal(
         self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None
@@ -184,6 +186,7 @@ class Derivatives(States):
         knot, line = self._by_parameters.sweep(path, loss, plan, self._border.kappa("vjp", kappa))
         if knot >= 0:
             raise error_of(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
+        check_finite(call, line.costate[0], line.inputs, line.parameters)
         blocks = {"state": line.costate[0], "input": line.inputs}
         return {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
 

@@ -91,12 +91,13 @@ def _collision_lines(mech: Mechanism) -> list[str]:
     lines = []
     for c in mech.collisions:
         points = sum(touch.name == c.name or touch.name.startswith(f"{c.name}_") for touch in mech.touches)
+        met = _count(points, "point", "points") if points else "fixed to one another, left out"
         kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
         more = f", restitution {c.restitution:g}" if c.restitution else ""
         law = c.law if c.friction > 0 else "impact"
         lines.append(
             f"  {c.name:<18}{kinds[0]} on {c.a}, {kinds[1]} {'of the' if c.b == WORLD else 'on'} {c.b}: "
-            f"{_count(points, 'point', 'points')}, law {law}, friction {c.friction:g}{more}"
+            f"{met}, law {law}, friction {c.friction:g}{more}"
         )
     return _titled("collisions", lines)
 

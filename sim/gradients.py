@@ -46,14 +46,14 @@ def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vec
     all_near(model, work)
     add_stiffness(model, work, h, kappa)
     pose2_to_origin(work)
-    add_bounce_composites(model, work)
-    if not factor_of(model, work, work.A3):
+    bounces = add_bounce_composites(model, work)
+    if not factor_of(model, work, work.A if bounces else work.A3):
         return False
     add_coupling_composites(model, work, h)
     sum_composites(model, work)
     residual_derivatives(model, work, h)
     add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
-    add_bounce_derivatives(model, work)
+    add_bounce_derivatives(model, work, h)
     add_coupling_derivatives(model, work)
     if not factor_coupling(model, work):
         return False

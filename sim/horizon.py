@@ -95,7 +95,7 @@ class Horizon:
         guess: (T, nx) where the velocities after each knot are looked for first; by default in the later rows of xs.
         """
         A, B, x_next, reports = self._calls.linearize(xs, us, self._substeps, kappa, guess)
-        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64))
+        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64), accuracy=reports[:, 5])
 
     def gaps(self, linear: Linearization, xs: Floats) -> Floats:
         """(T + 1, ndx) f(x_t, u_t) (-) x_t+1, in the rows of the later knots; zero in the first."""

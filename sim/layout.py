@@ -33,7 +33,7 @@ MODEL_INTS = _shapes(
     body_above nbody nblock, body_below nbody nblock,
     dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
     dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
-    contact_terrain nground, terrain_size nterrain 3,
+    contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
     limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
@@ -73,7 +73,7 @@ WORK_FLOATS = _shapes(
     joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
-    contact_W ncontact 9, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
+    contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
     bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
@@ -88,7 +88,7 @@ WORK_FLOATS = _shapes(
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
-    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 5,
+    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6,
     far nground 37, far_law 2,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """

@@ -6,7 +6,7 @@ from sim.late import gradient, step
 from sim.layout import model_view, work_view
 from sim.model import Vector
 from sim.options import Guess
-from sim.rollout import Linearized, begin
+from sim.rollout import ACCURACY, Linearized, begin
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -34,4 +34,5 @@ def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Lineari
         if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], line.A[t], line.B[t]):
             report[0] = _SINGULAR
             return t
+        report[5] = ACCURACY * work.contact_hard[0]
     return line.us.shape[0]

@@ -65,6 +65,7 @@ class Model(NamedTuple):
     late: Integers  # addresses of kernels, by sim/late.py; 0 where the scene has no use for one, or had none so far
     contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
     terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
+    contact_hold: Integers  # (nground,) IDLE or SUNK of contacts/confined.py, 0 for the others
     cluster_end: Integers  # (nground,) one past the last contact of the cluster that begins here (contacts/far.py)
     pair_coupling: Integers  # (npair,) the coupling of its two bodies
     pair_kind: Integers  # (npair,) of shapes

@@ -49,4 +49,7 @@ AT_START, AT_EVERY_POSE, BESIDE_KEPT = 0, 1, 2
 # whatever touches, the step gained energy
 PLACED, OVERLAPPING, ASTRAY, WOUND_UP = 0, 1, 2, 3
 
+# forms of a contact law in a matrix: as it stands; linear in the slip of what sticks; soft enough for its digits
+PLAIN, LINEAR, SOFT = 0, 1, 2
+
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

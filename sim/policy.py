@@ -44,7 +44,7 @@ class Path(NamedTuple):
     us: Matrix  # (T, nu)
     cones: Cube  # (T, ncontact, 12) or empty
     bounds: Cube
-    report: Vector  # (5,) of the last step, but for the iterations, which are those of all
+    report: Vector  # (6,) of the last step, but for the iterations, which are those of all
 
 
 @kernel

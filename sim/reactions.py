@@ -26,6 +26,7 @@ from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.model import Model
 from sim.parts import WORLD, Joint
+from sim.results import check_finite
 from sim.shapes import rotation_matrix
 from sim.work import Work
 
@@ -101,6 +102,7 @@ def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, frame: str) -> 
         rows += [_loop_joint(sim.mechanism, loop, m, sim.model, work, h, frame) for m, loop in loops]
         for n, row in enumerate(rows):
             out[:, k, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
+    check_finite(call, out)
     return Reactions(names, frame, *out.reshape(5, *lead, len(names), 3))
 
 

@@ -131,6 +131,8 @@ class Linearization:
     x_next: Floats  # (T, nx)
     status: Integers  # (T,) Status of each knot; what belongs to an unsolved knot is zero
     parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
+    # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
+    accuracy: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -164,9 +166,11 @@ def error_of(
 
     loop: by how much the one that is furthest open is, and which it is.
     """
-    status, iterations, residual, violation, contact = report
+    status, iterations, residual, violation, contact = report[:5]
     reason = Status(int(status))
     text = f"{where}: {MESSAGES[reason]}"
+    if reason == Status.CONTACT_SUNK:
+        text += f" It is {mech.contact_names[int(contact)]!r}."
     if reason in (Status.MAX_ITERATIONS, Status.NO_PROGRESS):
         text += f" Residual {residual:.1e} after {int(iterations)} iterations (tolerance {tolerance:g})"
         text += f", off the central path by {violation:.1e}." if violation > 0.0 else "."
@@ -175,6 +179,12 @@ def error_of(
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
     return SimulationError(text, reason)
+
+
+def check_finite(where: str, *arrays: Floats) -> None:
+    """SimulationError unless all numbers are finite."""
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise SimulationError(f"{where}: {MESSAGES[Status.NOT_FINITE]}", Status.NOT_FINITE)
 
 
 def fastest(mech: Mechanism, z: Floats) -> str:

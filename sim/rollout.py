@@ -1,7 +1,8 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
     settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
-    report     (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none)
+    report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
+               accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
@@ -23,6 +24,7 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
+ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
 Cube = Matrix  # (n, rows, columns)
 
 
@@ -34,7 +36,7 @@ class Linearized(NamedTuple):
     A: Cube  # (T, ndx, ndx)
     B: Cube  # (T, ndx, nu)
     x_next: Matrix  # (T, nx), in: where the steps of one-step knots start to look for their velocities
-    reports: Matrix  # (T, 5)
+    reports: Matrix  # (T, 6)
 
 
 @kernel
@@ -66,7 +68,7 @@ def roll(
 ) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
 
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 11).
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 6); contacts: (T, ncontact, 11).
     """
     model = model_view(model_at)
     work = work_view(work_at)
@@ -145,6 +147,7 @@ def linearize(
             if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
                 report[0] = _SINGULAR
                 break
+            report[5] = max(report[5], ACCURACY * work.contact_hard[0])
             if s > 0:
                 _chain(work, A, B)
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from sim import checks
 from sim import wrenches as pushed
 from sim.border import whole
+from sim.calls import REPORT
 from sim.contact_settings import with_contacts
 from sim.contacts.left_out import left_out
 from sim.derivatives import Derivatives
@@ -150,7 +151,7 @@ class Simulator(Derivatives):
         else:
             inputs = self._border.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
             knot, xs, reports, contacts = self._calls.roll(state, inputs)
-        last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
+        last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(REPORT)
         status = Status(int(last[0]))
         error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last, xs[knot])
         if error and throw:

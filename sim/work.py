@@ -82,6 +82,7 @@ class Work(NamedTuple):
     bounce: Matrix  # (ncontact, 22) see contacts/restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
+    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contacts/softening.py
     contact_w: Matrix  # (ncontact, 3) constant part of the same
     contact_scale: Matrix  # (ncontact, 16) scaling of the cone
     # pairs
@@ -163,4 +164,4 @@ class Work(NamedTuple):
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
     step_x: Matrix  # (2, nq + nv) states inside a knot
-    report: Vector  # (5,) of a step nobody asks about
+    report: Vector  # (6,) of a step nobody asks about

@@ -20,6 +20,7 @@ class Status(IntEnum):
     COLLISION_STEP = 7
     ENERGY_STEP = 8
     JOINT_STEP = 8  # deprecated name
+    CONTACT_SUNK = 9
     MAX_REGULARIZATION = 10
     LINE_SEARCH = 11
     TIME_LIMIT = 12
@@ -42,6 +43,7 @@ MESSAGES: dict[Status, str] = {
     Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
     Status.COLLISION_STEP: "Shapes pass through one another, or gain energy, in what was found; use smaller steps.",
     Status.ENERGY_STEP: "Every solution found gains energy, since bodies turn too far in one step; use smaller steps.",
+    Status.CONTACT_SUNK: "A contact is below the ground, and its joints let no motion lift it out.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
     Status.TIME_LIMIT: "The time budget is used up.",

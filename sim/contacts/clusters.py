@@ -17,6 +17,7 @@ def pack_clusters(model: Model) -> None:
     count = len(model.contact_height)
     level = model.contact_terrain == 0
     joined = (np.diff(model.contact_body[:count]) == 0) & level[1:] & level[:-1]
+    joined &= np.diff(model.contact_hold[:count]) == 0
     joined &= np.all(model.contact_frame[1:] == model.contact_frame[:-1], axis=1)
     ends = [*(1 + np.flatnonzero(~joined)).tolist(), count]
     for first, end in zip([0, *ends[:-1]], ends if count else [], strict=False):

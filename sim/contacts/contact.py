@@ -103,11 +103,10 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
 
 
 @kernel
-def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
-    """out[body] -= B^T W C + geometric term, about O (accumulated):
+def add_contact_law(model: Model, work: Work, c: int, out: Matrix) -> None:
+    """out[body] -= B^T W C, about O (accumulated):
 
-    C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench;
-    the arm turns with the body: d(r x f) = [f] [R3 p] dphi.
+    C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench.
     """
     i = model.contact_body[c]
     k = work.contact_kin[c]
@@ -132,7 +131,14 @@ def add_contact_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f
         A[18 + j] -= ay * z - az * y
         A[24 + j] -= az * x - ax * z
         A[30 + j] -= ax * y - ay * x
-    x, y, z = transposed_times(F, fn, f1, f2)
+
+
+@kernel
+def add_contact_turn(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[body] -= [f] [R3 p] on rotations: the arm of the impulse turns with the body, d(r x f) = [f] [R3 p] dphi."""
+    k = work.contact_kin[c]
+    A = out[model.contact_body[c]]
+    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
     px, py, pz = k[6], k[7], k[8]
     dot = x * px + y * py + z * pz
     A[21] -= px * x - dot

@@ -30,6 +30,7 @@ Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: larges
 from __future__ import annotations
 
 from sim.contacts.clusters import STIFFNESS
+from sim.contacts.confined import SUNK
 from sim.late import enlist_pairs, pairs_came_near, terrain_gap
 from sim.model import Model
 from sim.options import Options
@@ -59,6 +60,15 @@ def cluster_gap(model: Model, work: Work, c: int, height: float, third: bool) ->
     p = model.cluster[c]
     x, y, z = rotate(rot, i, p[0], p[1], p[2])
     return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[3]
+
+
+@kernel
+def sunk_contact(model: Model) -> int:
+    """A contact that no motion lifts out of the ground (confined.py), or -1."""
+    for c in range(model.contact_hold.shape[0]):
+        if model.contact_hold[c] == SUNK:
+            return c
+    return -1
 
 
 @kernel
@@ -98,7 +108,9 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
 
 @kernel
 def _enlist(model: Model, work: Work, c: int) -> None:
-    """Append a cluster to far_first, or its contacts to the runs of near."""
+    """Append a cluster to far_first, or its contacts to the runs of near; what cannot move is in neither."""
+    if model.contact_hold[c] != 0:
+        return
     end = model.cluster_end[c]
     runs = work.counts[0]
     if work.far[c, 0] > 0.0:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from sim.contacts.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
 from sim.contacts.contact import contact_rate
+from sim.contacts.softening import soften
 from sim.late import (
     condense_pyramid,
     pair_rate,
@@ -22,7 +23,7 @@ from sim.late import (
     start_pyramid,
 )
 from sim.model import Law, Model
-from sim.options import Goal
+from sim.options import LINEAR, SOFT, Goal
 from sim.work import Work
 from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.jit import kernel
@@ -177,11 +178,12 @@ def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> 
 
 
 @kernel
-def condense_contact(model: Model, work: Work, c: int, kappa: float, share: float, linear: bool) -> None:
+def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, share: float, form: int) -> None:
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
     share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
-    linear: whether a contact that sticks may take the form of its law that is linear in the slip.
+    form: in the LINEAR one a contact that sticks takes the form of its law that is linear in the slip; the SOFT one is
+    that of derivatives (softening.py).
     """
     W = work.contact_W[c]
     for e in range(9):
@@ -189,9 +191,11 @@ def condense_contact(model: Model, work: Work, c: int, kappa: float, share: floa
     W[0] = -work.cone[c, 1] / work.cone[c, 0]
     law = law_of(model, c)
     if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa, share, linear)
+        condense_cone(model, work, c, kappa, share, form == LINEAR)
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
+    if form == SOFT:
+        soften(model, work, h, c)
 
 
 @kernel

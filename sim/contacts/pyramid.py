@@ -121,7 +121,12 @@ def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float
 
 @late.condense_pyramid.defined()
 def condense_pyramid(model: Model, work: Work, c: int) -> None:
-    """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4)."""
+    """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4).
+
+    On the diagonal K and psi g e^2 nearly cancel where the contact slides, but not as sums of what is positive:
+
+        (k1 + k2) (s_psi + psi (k3 + k4)) g + 4 psi k1 k2 g
+    """
     z = work.cone[c]
     W = work.contact_W[c]
     q = work.contact_scale[c]
@@ -134,10 +139,11 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
     q[5] = q[2] - q[3]
     q[6] = 1.0 / (z[3] + z[2] * total)
     g = z[2] * q[6]
-    W[4] = -(q[0] + q[1] - g * q[4] * q[4])
+    x, y = q[0] + q[1], q[2] + q[3]
+    W[4] = -q[6] * (x * (z[3] + z[2] * y) + 4.0 * z[2] * q[0] * q[1])
     W[5] = g * q[4] * q[5]
     W[7] = W[5]
-    W[8] = -(q[2] + q[3] - g * q[5] * q[5])
+    W[8] = -q[6] * (y * (z[3] + z[2] * x) + 4.0 * z[2] * q[2] * q[3])
     W[3] = mu * W[0] * g * q[4]
     W[6] = mu * W[0] * g * q[5]
 

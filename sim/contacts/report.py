@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim import late
 from sim.contacts.contact import contact_kinematics
+from sim.contacts.far import sunk_contact
 from sim.contacts.friction import contact_error, contact_impulse, slip_violation
 from sim.late import report_pairs
 from sim.model import Matrix, Model, Vector
@@ -13,7 +14,12 @@ from solvers.jit import kernel
 
 @late.worst_contact.defined(otherwise=-1.0)
 def worst_contact(model: Model, work: Work, kappa: float) -> float:
-    """Index of the contact furthest from its law, -1 when a limit is worse or there is none."""
+    """Index of the contact that cannot leave the ground, or of the one furthest from its law; -1 when a limit is worse
+    or there is none.
+    """
+    sunk = sunk_contact(model)
+    if sunk >= 0:
+        return float(sunk)
     worst = -1.0
     error = 0.0
     for k in range(model.limit_dof.shape[0]):
@@ -37,6 +43,8 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
         first = work.far_first[m]
         contact_kinematics(model, work, h, first, model.cluster_end[first])
     for c in range(model.contact_height.shape[0]):
+        if model.contact_hold[c] != 0:
+            contact_kinematics(model, work, h, c, c + 1)
         report_contact(model, work, c, work.contact_frame[c], out[c])
     report_pairs(model, work, out)
 

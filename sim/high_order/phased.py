@@ -35,7 +35,7 @@ class March(NamedTuple):
 
     knot: int  # number of solved steps
     xs: Floats  # (T + 1, nx)
-    reports: Floats  # (T, 5)
+    reports: Floats  # (T, 6)
     contacts: Floats  # (T, ncontact, 11)
     means: Floats  # (T, nx) the states of order 2 where the steps of order 2 begin
     near: NDArray[np.bool_]  # (T,) which those are

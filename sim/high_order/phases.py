@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
+from sim.contacts.confined import IDLE
 from sim.contacts.far import cluster_gap, highest
 from sim.high_order.runge_kutta import Scheme, advance, begin
 from sim.late import report_contacts
@@ -74,7 +75,7 @@ def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> flo
     """
     total = 0.0
     for c in range(model.contact_height.shape[0]):
-        if model.cluster_end[c] > 0:
+        if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
             row, speed = work.far[c], _speed(model, work, c)
             gap = cluster_gap(model, work, c, highest(model, c), False)
             g = _least(gap, speed, row[0], row[1], h)
@@ -152,7 +153,7 @@ def roll_far(
     """xs[t + 1] = step(xs[t], us[t]) from xs[0] while all is far.
 
     Returns how many steps were taken, and why no more: SOLVED at the end of us, NEAR, or the Status of the next.
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 5); contacts: (T, ncontact, 11).
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 6); contacts: (T, ncontact, 11).
     """
     model = model_view(model_at)
     work = work_view(work_at)

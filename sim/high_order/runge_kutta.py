@@ -151,7 +151,7 @@ def roll(
 ) -> int:  # fmt: skip
     """xs[t + 1] = step(xs[t], us[t]) from xs[0]; returns the number of steps that were possible.
 
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 5).
+    us: (T, nu); xs: (T + 1, nx); reports: (T, 6).
     """
     model = model_view(model_at)
     work = work_view(work_at)

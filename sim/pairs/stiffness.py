@@ -107,7 +107,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 
 @late.condense_pairs.defined()
-def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool) -> None:
+def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
     """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
@@ -118,7 +118,7 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: floa
     for m in range(work.counts[0], work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             pair_jacobian(model, work, h, c - ground)
-            condense_contact(model, work, c, kappa, share, linear)
+            condense_contact(model, work, h, c, kappa, share, form)
             if not is_absent(work, c - ground):
                 add_pair_stiffness(model, work, c - ground, share)
 
@@ -176,15 +176,15 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
         for k in range(6):
             x = centre_shift(work, work.pos2, i, k)
             e = unit_vector(k - 3)
-            s1 = _slip_rate(F[3], F[4], F[5], r, w, x, e) * sign / h
-            s2 = _slip_rate(F[6], F[7], F[8], r, w, x, e) * sign / h
+            s1 = slip_rate(F[3], F[4], F[5], r, w, x, e) * sign / h
+            s2 = slip_rate(F[6], F[7], F[8], r, w, x, e) * sign / h
             df = pair_force(work, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
             q = weight[0] if side == 0 else weight[1]
             add_wrench_column(K2[side], k, f, df, P, (q * x[0], q * x[1], q * x[2]))
 
 
 @kernel
-def _slip_rate(tx: float, ty: float, tz: float, r: Vec3, w: Vector, x: Vec3, e: Vec3) -> float:
+def slip_rate(tx: float, ty: float, tz: float, r: Vec3, w: Vector, x: Vec3, e: Vec3) -> float:
     """-t.x + (-c y + s x y).e"""
     yx, yy, yz = cross(r[0], r[1], r[2], tx, ty, tz)
     sx, sy, sz = cross(w[1], w[2], w[3], yx, yy, yz)

@@ -44,10 +44,24 @@ class Touch:
 
 
 def touches(mech: Mechanism) -> list[Touch]:
-    """All contact points of the collisions of a mechanism; those of the same two bodies follow one another."""
+    """All contact points of the collisions of a mechanism; those of the same two bodies follow one another.
+
+    What is fixed to one another cannot touch: no motion changes the gap, and no impulse could be told.
+    """
+    holder = _holders(mech)
     found = [touch for collision in mech.collisions for touch in _touches(mech, collision)]
+    found = [touch for touch in found if holder[touch.bodies[0]] != holder[touch.bodies[1]]]
     order = list(dict.fromkeys(touch.bodies for touch in found))
     return sorted(found, key=lambda touch: order.index(touch.bodies))
+
+
+def _holders(mech: Mechanism) -> dict[int, int]:
+    """The first body of those that are fixed to one another, of each body; -1 for what is fixed to the world."""
+    holder = {-1: -1}
+    for i, joint in enumerate(mech.joints):
+        parent = mech.body_names.index(joint.parent) if joint.parent in mech.body_names else -1
+        holder[i] = holder[parent] if joint.nv == 0 else i
+    return holder
 
 
 def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:

@@ -37,7 +37,7 @@ class Sweep(NamedTuple):
     A: Cube  # (1, ndx, ndx) of one step
     B: Cube  # (1, ndx, nu)
     x_next: Matrix  # (1, nx)
-    report: Matrix  # (1, 5)
+    report: Matrix  # (1, 6)
     costate: Matrix  # (2, ndx) out, the first row: dL/dx_0
     inputs: Matrix  # (T, nu) out
     parameters: Vector  # (nparameter,) out

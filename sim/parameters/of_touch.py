@@ -62,6 +62,8 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
     index = {name: i for i, name in enumerate(mech.body_names)}
     for collision in mech.collisions:
         mine = [j for j, touch in enumerate(mech.touches) if touch.collision == collision.name]
+        if not mine:  # of two parts that are fixed to one another
+            continue
         for kind, effect, value in (
             ("friction", Effect.FRICTION, collision.friction),
             ("restitution", Effect.RESTITUTION, collision.restitution),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.elimination import factor, solve
 from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
-from sim.options import Goal
+from sim.options import LINEAR, PLAIN, Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.matrix import free_matrix
@@ -35,7 +35,7 @@ def linearize_step(
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
         free_matrix(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share, near)
+        condense_inequalities(model, work, h, smoothing, share, LINEAR if near else PLAIN)
         sign = factor(model, work)
         if sign >= 0:
             break

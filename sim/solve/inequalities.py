@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from sim import late
 from sim.contacts.contact import (
-    add_contact_matrix,
+    add_contact_law,
+    add_contact_turn,
     add_contact_wrench,
     contact_jacobian,
     contact_kinematics,
@@ -47,7 +48,7 @@ from sim.late import (
     subtract_floors,
 )
 from sim.model import Matrix, Model
-from sim.options import Goal
+from sim.options import SOFT, Goal
 from sim.pose_jacobians import add_slip_jacobian
 from sim.work import Work
 from solvers.jit import kernel
@@ -153,35 +154,38 @@ def apply_limits(model: Model, work: Work) -> None:
 
 
 @kernel
-def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool) -> None:
+def condense_inequalities(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
     """A += contacts, joint_block += limits: their slacks and impulses eliminated.  See `condense_into`."""
-    condense_into(model, work, h, kappa, share, linear, work.A)
+    condense_into(model, work, h, kappa, share, form, work.A)
     add_limit_blocks(model, work, h)
 
 
 @kernel
-def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, linear: bool, out: Matrix) -> None:
+def condense_into(model: Model, work: Work, h: float, kappa: float, share: float, form: int, out: Matrix) -> None:
     """out += contacts, condensed at kappa.  (nbody, 36)
 
     share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
     turning of the arms of the impulses; 1 for the derivative.
-    linear: the law of contacts that stick, see `condense_cone`.
+    form: PLAIN, LINEAR or SOFT, see `condense_contact`.
     """
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
-            condense_contact(model, work, c, kappa, share, linear)
+            condense_contact(model, work, h, c, kappa, share, form)
             fn, f1, f2 = contact_impulse(model, work, c)
-            add_contact_matrix(model, work, c, share * fn, share * f1, share * f2, out)
+            if form != SOFT or work.bounce[c, 1] == 0.0:  # for impacts see restitution_gradient.py
+                add_contact_law(model, work, c, out)
+            add_contact_turn(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
                 add_frame_matrix(model, work, c, share * fn, share * f1, share * f2, out)
-    condense_pairs(model, work, h, kappa, share, linear)
+    condense_pairs(model, work, h, kappa, share, form)
 
 
 @late.add_stiffness.defined()
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
-    condense_into(model, work, h, kappa, 1.0, False, work.A3)
+    work.contact_hard[0] = 0.0
+    condense_into(model, work, h, kappa, 1.0, SOFT, work.A3)
     add_slip_jacobians(model, work, h)
     add_limit_blocks(model, work, h)
 
@@ -191,7 +195,8 @@ def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
     """A2 -= contacts: slips depend on pose 2."""
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            add_slip_jacobian(model, work, h, c)
+            if work.bounce[c, 1] == 0.0:
+                add_slip_jacobian(model, work, h, c)
 
 
 @kernel

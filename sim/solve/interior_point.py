@@ -24,7 +24,7 @@ Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 from __future__ import annotations
 
 from sim import late
-from sim.contacts.far import came_near, choose_far
+from sim.contacts.far import came_near, choose_far, sunk_contact
 from sim.contacts.friction import slip_noise
 from sim.energy_balance import step_gained
 from sim.late import begin_pairs, find_impacts, impacts_gained, overlapping, pairs_gained
@@ -58,6 +58,7 @@ _NO_PROGRESS = int(Status.NO_PROGRESS)
 _SINGULAR = int(Status.SINGULAR)
 _COLLISION_STEP = int(Status.COLLISION_STEP)
 _ENERGY_STEP = int(Status.ENERGY_STEP)
+_CONTACT_SUNK = int(Status.CONTACT_SUNK)
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
 # first attempt whose friction smoothing is led down step by step; before, and late in all from a share of the velocity,
@@ -169,6 +170,8 @@ def interior_point(
     Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
     """
     out = Outcome(_NO_PROGRESS, 0, 1e300, 1e300)
+    if sunk_contact(model) >= 0:
+        return Outcome(_CONTACT_SUNK, 1, 1e300, 0.0)
     work.pair_free[1] = 0  # `find_impacts` chooses elements, too
     begin_pairs(model, work, options)
     choose_far(model, work, options)
