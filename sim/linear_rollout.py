@@ -6,7 +6,8 @@ from sim.late import gradient, step
 from sim.layout import model_view, work_view
 from sim.model import Vector
 from sim.options import Guess
-from sim.rollout import Linearized, begin
+from sim.pace import is_due
+from sim.rollout import Linearized, options_of
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -16,16 +17,16 @@ _SINGULAR = int(Status.SINGULAR)
 
 
 @kernel
-def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized) -> int:
-    """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from line.xs[0]; returns the number of solved steps.
+def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized, first: int) -> int:
+    """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from t = first on; returns the number of solved steps.
 
     line.xs: (T + 1, nx), of which the first row is given; x_next is not used.
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
-    for t in range(line.us.shape[0]):
+    for t in range(first, line.us.shape[0]):
         x = line.xs[t]
         report = line.reports[t]
         guess = Guess(x[nq:], t > 0)
@@ -34,4 +35,6 @@ def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Lineari
         if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], line.A[t], line.B[t]):
             report[0] = _SINGULAR
             return t
+        if is_due(work, report[1] + line.A.shape[1]):
+            return t + 1
     return line.us.shape[0]

@@ -83,6 +83,10 @@ class Rollouts:
                 )
         return out.reshape(*lead, *out.shape[1:])
 
+    def all_states(self, x0: Any, us: Any, theta: Any) -> tuple[Floats]:
+        """`states` as the only result of several."""
+        return (self.states(x0, us, theta),)
+
     def pullback(self, xs: Any, us: Any, theta: Any, by_xs: Any) -> tuple[Floats, Floats, Floats]:
         """Gradients by x0 (..., nx), us (..., T, nu) and theta (..., n) from those by xs (..., T + 1, nx)."""
         paths, inputs, thetas, lead = self._rows(xs, us, theta)
