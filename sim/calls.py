@@ -39,18 +39,18 @@ def interrupted(reports: Floats, knot: int) -> Floats:
     return reports
 
 
-def follow(go_on: Callable[[int], int], settings: Vector, path: Path) -> int:
-    """The number of solved knots of a rollout under a policy, which `go_on` continues from a knot on."""
-    knot = 0
+def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: int) -> int:
+    """The number of solved knots of a rollout under a policy, which `go_on` continues after so many steps."""
+    done, steps = 0, len(path.us) * substeps
     try:
         for _ in pieces(settings):
-            knot = go_on(knot)
-            if knot == len(path.us) or path.report[0] != Status.SOLVED:
+            done = go_on(done)
+            if done == steps or path.report[0] != Status.SOLVED:
                 break
     except KeyboardInterrupt:
-        interrupted(path.report[None], 0 if knot < len(path.us) else 1)
-        raise Interrupted((knot, path)) from None
-    return knot
+        interrupted(path.report[None], 0 if done < steps else 1)
+        raise Interrupted((done // substeps, path)) from None
+    return done // substeps
 
 
 class Calls(StateCalls):
@@ -131,7 +131,7 @@ class Calls(StateCalls):
         def go_on(first: int) -> int:
             return int(closed_loop(model, work, settings, policy, alpha, limits, substeps, path, first))
 
-        knot = follow(go_on, settings, path)
+        knot = follow(go_on, settings, path, substeps)
         if knot < len(policy.us):
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         return knot, path
@@ -155,14 +155,14 @@ class Calls(StateCalls):
         line = rollout.Linearized(xs, us, A, B, x_next, reports)
         model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            work, knot = self._scratch.table(), 0
+            work, step = self._scratch.table(), 0
             for _ in pieces(settings):
-                knot = int(rollout.linearize(model, work, settings, (0, knot, n), substeps, line))
-                if knot == n:
+                step = int(rollout.linearize(model, work, settings, (0, step, n), substeps, line))
+                if step == n * substeps:
                     break
         else:
             works = self._scratch.chunks(n)
-            ends = np.arange(len(works) + 1) * n // len(works)
+            ends = np.arange(len(works) + 1) * n // len(works) * substeps
             done = ends[:-1].copy()
             for _ in pieces(settings):
                 rollout.linearize_knots(model, works, settings, substeps, line, done)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.border import whole
+from sim.calls import interrupted
 from sim.results import Interrupted
 
 if TYPE_CHECKING:
@@ -39,14 +40,16 @@ def roll(sim: Simulator, x: Floats, policy: Feedback, steps: int | None) -> tupl
                 break
             x = xs[1]
     except KeyboardInterrupt:
-        raise Interrupted(_joined(done) if done else None) from None
+        raise Interrupted(_joined(done, stopped=True) if done else None) from None
     return _joined(done)
 
 
-def _joined(done: list[tuple[Floats, Rolled]]) -> tuple[Floats, Rolled]:
-    """Inputs and results of single steps as those of one rollout."""
+def _joined(done: list[tuple[Floats, Rolled]], stopped: bool = False) -> tuple[Floats, Rolled]:
+    """Inputs and results of single steps as those of one rollout; of one that was stopped there is one report more."""
     us, rolled = zip(*done, strict=True)
     solved = sum(knot for knot, *_ in rolled)
     states = np.concatenate([rolled[0][1][:1], *(xs[1:] for _, xs, _, _ in rolled)])
     reports, contacts = (np.concatenate([part[i] for part in rolled]) for i in (2, 3))
+    if stopped:
+        reports = interrupted(np.concatenate([reports, reports[-1:]]), len(reports))
     return np.array(us), (solved, states, reports, contacts)

@@ -83,8 +83,8 @@ def closed_loop(
     path: Path,
     first: int,
 ) -> int:
-    """Rollout from path.xs[0] under the policy of a backward pass, from knot `first` on; returns the number of solved
-    knots.
+    """Rollout from path.xs[0] under the policy of a backward pass, from the step `first` on, that many of all knots
+    before it; returns the number of solved steps.
 
     u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)),   x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1
     """
@@ -96,7 +96,7 @@ def closed_loop(
     ndx = policy.gaps.shape[1]
     dx = work.chain[0][:ndx]
     velocity = work.step_x[1, nq:]
-    for t in range(first, path.us.shape[0]):
+    for t in range(first // substeps, path.us.shape[0]):
         u = path.us[t]
         state_difference(model, policy.xs[t], path.xs[t], dx)
         for j in range(u.shape[0]):
@@ -109,16 +109,20 @@ def closed_loop(
             copy(policy.bounds[t], work.bound)
         known = t > 0 or policy.cones.shape[0] > 0
         b = path.xs[t + 1]
-        copy_vector(path.xs[t], b)
-        effort = 0.0
-        for s in range(substeps):
+        before = max(first - t * substeps, 0)
+        if before == 0:
+            copy_vector(path.xs[t], b)
+        due = False
+        for s in range(before, substeps):
             copy_vector(b, work.step_x[0])
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
             status = step(model, work, options, work.step_x[0], u, guess, b, work.report)
             _keep_report(work.report, path.report)
-            effort += work.report[1]
             if status != _SOLVED:
-                return t
+                return t * substeps + s
+            due = is_due(work, work.report[1])
+            if due and s + 1 < substeps:
+                return t * substeps + s + 1
         if path.cones.shape[0] > 0:
             copy(work.cone, path.cones[t])
             copy(work.bound, path.bounds[t])
@@ -127,6 +131,6 @@ def closed_loop(
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
             copy_vector(b, work.step_x[0])
             integrate_state(model, work.step_x[0], dx, b)
-        if is_due(work, effort):
-            return t + 1
-    return path.us.shape[0]
+        if due:
+            return (t + 1) * substeps
+    return path.us.shape[0] * substeps

@@ -19,6 +19,7 @@ from sim.options import Guess, Options
 from sim.pace import DEADLINE, is_due, start_pace
 from sim.work import Work
 from solvers.clock import seconds
+from solvers.dense import copy_vector
 from solvers.jit import kernel
 from solvers.parallel import parallel_kernel, prange
 from solvers.record import Table
@@ -129,28 +130,27 @@ def linearize(
     substeps: int,
     line: Linearized,
 ) -> int:
-    """Derivatives of the knots up to knots[2], from knots[1] on when those from knots[0] on are done before: products
-    of the derivatives of their steps. Returns the knot that is next.
+    """Derivatives of the knots from knots[0] up to knots[2], products of the derivatives of their steps.
+
+    knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = options_of(work, settings, knots[1] == knots[0])
+    options = options_of(work, settings, knots[1] == knots[0] * substeps)
     nq = work.theta1.shape[0]
     x = work.step_x[0]
-    effort = float(substeps * line.A.shape[1])
-    for t in range(knots[1], knots[2]):
+    for t in range(knots[1] // substeps, knots[2]):
         A = line.A[t]
         B = line.B[t]
         x_next = line.x_next[t]
         report = line.reports[t]
         velocity = work.step_x[1, nq:]
-        for k in range(velocity.shape[0]):
-            velocity[k] = x_next[nq + k]
-        for k in range(x.shape[0]):
-            x_next[k] = line.xs[t, k]
-        for s in range(substeps):
-            for k in range(x.shape[0]):
-                x[k] = x_next[k]
+        before = max(knots[1] - t * substeps, 0)
+        if before == 0:
+            copy_vector(x_next[nq:], velocity)
+            copy_vector(line.xs[t], x_next)
+        for s in range(before, substeps):
+            copy_vector(x_next, x)
             guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
             if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break
@@ -161,9 +161,9 @@ def linearize(
                 break
             if s > 0:
                 _chain(work, A, B)
-        if is_due(work, effort + report[1]):
-            return t + 1
-    return knots[2]
+            if is_due(work, report[1] + A.shape[0]):
+                return t * substeps + s + 1
+    return knots[2] * substeps
 
 
 @parallel_kernel
@@ -175,8 +175,8 @@ def linearize_knots(
     line: Linearized,
     done: Integers,
 ) -> None:
-    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c], done[c] is its next knot,
-    which is that of chunk c + 1 at the end.
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c], done[c] is its next
+    step, the first one of chunk c + 1 in the end.
     """
     n = line.us.shape[0]
     chunks = work_ats.shape[0]

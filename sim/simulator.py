@@ -169,7 +169,7 @@ class Simulator(Derivatives):
     def _trajectory(self, inputs: Floats, rolled: Rolled) -> Trajectory:
         """What came of a rollout under the inputs (T, nu)."""
         knot, xs, reports, contacts = rolled
-        last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(5)
+        last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(5)
         status = Status(int(last[0]))
         error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last, xs[knot])
         return Trajectory(

@@ -148,10 +148,10 @@ class HighOrder(Calls):
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         line = Linearized(xs, us, A, B, x_next, reports)
         model, work, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
-        knot = 0
+        step = 0
         for _ in pieces(settings):
-            knot = int(runge_kutta.linearize(model, work, settings, scheme, substeps, line, tangents, knot))
-            if knot == n:
+            step = int(runge_kutta.linearize(model, work, settings, scheme, substeps, line, tangents, step))
+            if step == n * substeps:
                 break
         unsolved = reports[:, 0] != Status.SOLVED
         for array in (A, B, x_next):
@@ -194,7 +194,7 @@ class HighOrder(Calls):
                 runge_kutta.closed_loop(model, work, settings, scheme, policy, alpha, limits, substeps, path, first)
             )
 
-        return follow(go_on, settings, path), path
+        return follow(go_on, settings, path, substeps), path
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
         """Refused."""

@@ -80,7 +80,7 @@ class Phased(HighOrder):
                 if mean is None:
                     break
         except KeyboardInterrupt as stop:
-            t += stop.result if isinstance(stop, Interrupted) else 0
+            t += stop.result if isinstance(stop, Interrupted) else int(out.near[t:].sum())
             raise Interrupted((t, out.xs, interrupted(out.reports, t), out.contacts)) from None
         self._last.near = bool(t and out.near[t - 1])
         if t < steps:

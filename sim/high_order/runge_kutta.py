@@ -158,21 +158,26 @@ def linearize(
     model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, substeps: int, line: Linearized,
     tangents: Tangents, first: int,
 ) -> int:  # fmt: skip
-    """Derivatives of the knots, of `substeps` steps each, from knot `first` on, carried through every stage; returns
-    the knot that is next.
+    """Derivatives of the knots, of `substeps` steps each, from the step `first` of all on, carried through every stage;
+    returns the step that is next.
     """
     model = model_view(model_at)
     work = work_view(work_at)
     start_pace(work, settings)
-    for t in range(first, line.us.shape[0]):
+    for t in range(first // substeps, line.us.shape[0]):
         x, report = line.x_next[t], line.reports[t]
-        for k in range(x.shape[0]):
-            x[k] = line.xs[t, k]
-        begin(model, work, scheme, x)
-        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
-        for _ in range(substeps):
+        status, before = _SOLVED, max(first - t * substeps, 0)
+        if before == 0:
+            copy_vector(line.xs[t], x)
+            begin(model, work, scheme, x)
+            status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
+        due = False
+        for s in range(before, substeps):
+            if due:
+                return t * substeps + s
             if status == _SOLVED:
                 status = advance(model, work, scheme, settings[0], line.us[t], x, tangents)
+                due = is_due(work, float(scheme.b.shape[0] * work.nu.shape[0]))
         if status == _SOLVED and not last_tangents(model, work, scheme.free, line.us[t], tangents):
             status = _SINGULAR
         report[0], report[1], report[4] = status, substeps * scheme.b.shape[0], -1.0
@@ -182,9 +187,9 @@ def linearize(
                 line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], work.columns[d, k]
             for k in range(line.us.shape[1]):
                 line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], work.columns[d, 2 * nv + k]
-        if is_due(work, report[1] * nv):
-            return t + 1
-    return line.us.shape[0]
+        if due:
+            return (t + 1) * substeps
+    return line.us.shape[0] * substeps
 
 
 @kernel
@@ -199,24 +204,29 @@ def closed_loop(
     ndx = policy.gaps.shape[1]
     dx = work.chain[0][:ndx]
     start_pace(work, settings)
-    for t in range(first, path.us.shape[0]):
+    for t in range(first // substeps, path.us.shape[0]):
         u, b = path.us[t], path.xs[t + 1]
         state_difference(model, policy.xs[t], path.xs[t], dx)
         for j in range(u.shape[0]):
             f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
             u[j] = min(max(f, low[j]), high[j])
-        copy_vector(path.xs[t], b)
-        begin(model, work, scheme, b)
-        for _ in range(substeps):
+        before, due = max(first - t * substeps, 0), False
+        if before == 0:
+            copy_vector(path.xs[t], b)
+            begin(model, work, scheme, b)
+        for s in range(before, substeps):
+            if due:
+                return t * substeps + s
             path.report[0] = advance(model, work, scheme, settings[0], u, b, None)
             path.report[1] += scheme.b.shape[0]
             if path.report[0] != _SOLVED:
-                return t
+                return t * substeps + s
+            due = is_due(work, float(scheme.b.shape[0]))
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
             copy_vector(b, work.step_x[0])
             integrate_state(model, work.step_x[0], dx, b)
-        if is_due(work, float(substeps * scheme.b.shape[0])):
-            return t + 1
-    return path.us.shape[0]
+        if due:
+            return (t + 1) * substeps
+    return path.us.shape[0] * substeps
