@@ -43,7 +43,7 @@ def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: 
     """The number of solved knots of a rollout under a policy, which `go_on` continues after so many steps."""
     done, steps = 0, len(path.us) * substeps
     try:
-        for _ in pieces(settings):
+        for _ in pieces(settings, steps):
             done = go_on(done)
             if done == steps or path.report[0] != Status.SOLVED:
                 break
@@ -90,7 +90,7 @@ class Calls(StateCalls):
         model, work, settings = self._table(bind_step), self._scratch.table(), self.settings.array()
         knot = 0
         try:
-            for _ in pieces(settings):
+            for _ in pieces(settings, steps):
                 knot = int(rollout.roll(model, work, settings, us, xs, reports, contacts, knot))
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
@@ -156,7 +156,7 @@ class Calls(StateCalls):
         model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
             work, step = self._scratch.table(), 0
-            for _ in pieces(settings):
+            for _ in pieces(settings, n * substeps):
                 step = int(rollout.linearize(model, work, settings, (0, step, n), substeps, line))
                 if step == n * substeps:
                     break
@@ -164,7 +164,7 @@ class Calls(StateCalls):
             works = self._scratch.chunks(n)
             ends = np.arange(len(works) + 1) * n // len(works) * substeps
             done = ends[:-1].copy()
-            for _ in pieces(settings):
+            for _ in pieces(settings, n * substeps):
                 rollout.linearize_knots(model, works, settings, substeps, line, done)
                 if np.array_equal(done, ends[1:]):
                     break
@@ -183,7 +183,7 @@ class Calls(StateCalls):
         line = rollout.Linearized(xs, us, A, B, xs, reports)
         model, work, settings = *self.tables(), self.settings.array(kappa)
         knot = 0
-        for _ in pieces(settings):
+        for _ in pieces(settings, n):
             knot = int(linear_rollout.roll_linear(model, work, settings, line, knot))
             if knot == n or reports[knot, 0] != Status.SOLVED:
                 break
@@ -204,7 +204,7 @@ class Calls(StateCalls):
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         model, works, settings = self._table(bind_step), self._scratch.chunks(n), self.settings.array()
         try:
-            for _ in pieces(settings):
+            for _ in pieces(settings, n * steps):
                 rollout.roll_batch(model, works, settings, us, xs, status, knots)
                 if np.all((knots == steps) | (status != Status.SOLVED)):
                     break

@@ -55,7 +55,7 @@ class HighOrder(Calls):
         model, work, settings, scheme = *self._tables(), self._scheme()
         knot = 0
         try:
-            for _ in pieces(settings):
+            for _ in pieces(settings, steps):
                 knot = int(runge_kutta.roll(model, work, settings, scheme, us, xs, reports, knot))
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
@@ -149,7 +149,7 @@ class HighOrder(Calls):
         line = Linearized(xs, us, A, B, x_next, reports)
         model, work, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
         step = 0
-        for _ in pieces(settings):
+        for _ in pieces(settings, n * substeps):
             step = int(runge_kutta.linearize(model, work, settings, scheme, substeps, line, tangents, step))
             if step == n * substeps:
                 break

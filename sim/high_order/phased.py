@@ -93,7 +93,7 @@ class Phased(HighOrder):
         settings, scheme = self.settings.array(kappa), self._scheme()
         taken, why = 0, int(Status.SOLVED)
         try:
-            for _ in pieces(settings):
+            for _ in pieces(settings, len(flight.us)):
                 taken, why = phases.roll_far(model, work, settings, scheme, flight, taken)
                 if taken == len(flight.us) or why != Status.SOLVED:
                     break
@@ -114,7 +114,7 @@ class Phased(HighOrder):
             means[0] = mean
             rows, solved = slice(t, t + count), 0
             line = us[rows], means, out.reports[rows], out.contacts[rows]
-            for _ in pieces(settings):
+            for _ in pieces(settings, count):
                 solved = int(rollout.roll(model, work, settings, *line, solved))
                 if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
                     break

@@ -113,7 +113,7 @@ def adjoint_sweep(
     model, work = calls.tables(*needs[: 2 if plan.size else 0])
     settings, left = calls.settings.array(kappa), len(us)
     line.costate[0] = loss[-1]
-    for _ in pieces(settings):
+    for _ in pieces(settings, left):
         left = int(sweep(model, work, settings, line, plan.terms, plan.weights, left))
         if left == 0 or line.report[0, 0] != Status.SOLVED:
             break

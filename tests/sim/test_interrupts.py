@@ -17,6 +17,7 @@ QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)
 CHAIN = dojo.Simulator(dojo.models.npendulum(5), 0.001, order=6)
 FALLING = dojo.Simulator(dojo.models.block(), 0.001, order=4)
 RESTING = FALLING.neutral()
+PUSH = np.full(6, 1e-3)
 FLYING = FALLING.integrate(RESTING, np.eye(FALLING.ndx)[2] * 1e6)
 
 
@@ -40,22 +41,28 @@ ROLLOUTS = {  # calls of so many steps; enough of them take a second
     "rollout": (lambda n: HOPPER.rollout(HOPPER.neutral(), inputs(HOPPER, n)), 1_000_000),
     "under a policy": (lambda n: HOPPER.rollout(HOPPER.neutral(), lambda t, x: np.zeros(3), steps=n), 100_000),
     "under wrenches": (
-        lambda n: HOPPER.rollout(HOPPER.neutral(), inputs(HOPPER, n), wrenches={"foot": np.full(6, 1e-3)}),
-        1_000_000,
+        lambda n: QUADRUPED.rollout(QUADRUPED.neutral(), inputs(QUADRUPED, n), wrenches={"trunk": PUSH}),
+        150_000,
     ),
-    "closed loop": (lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, n)), 150_000),
+    "closed loop": (
+        lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, n // 10), substeps=10),
+        150_000,
+    ),
     "closed loop under wrenches": (
-        lambda n: HOPPER.closed_loop(
-            HOPPER.neutral(), inputs(HOPPER, n), substeps=2, wrenches={"foot": np.full(6, 1e-3)}
+        lambda n: QUADRUPED.closed_loop(
+            QUADRUPED.neutral(), inputs(QUADRUPED, n // 20), substeps=20, wrenches={"trunk": PUSH}
         ),
-        400_000,
+        150_000,
     ),
     "closed loop with many substeps": (
         lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, 200), substeps=n // 200),
         200_000,
     ),
     "higher order": (lambda n: CHAIN.rollout(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 400_000),
-    "higher order, closed loop": (lambda n: CHAIN.closed_loop(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 400_000),
+    "higher order, closed loop": (
+        lambda n: CHAIN.closed_loop(CHAIN.neutral() + 0.1, inputs(CHAIN, n // 20), substeps=20),
+        400_000,
+    ),
     "higher order, far": (lambda n: FALLING.rollout(FLYING, inputs(FALLING, n)), 600_000),
     "higher order, near": (lambda n: FALLING.rollout(RESTING, inputs(FALLING, n)), 300_000),
     "higher order, near, closed loop": (
@@ -64,7 +71,10 @@ ROLLOUTS = {  # calls of so many steps; enough of them take a second
     ),
 }
 BATCHES = {
-    "many short ones": (lambda n: HOPPER.rollout_batch(rows(HOPPER, n), np.zeros((n, 50, 3))), 20_000),
+    "many short ones": (
+        lambda n: QUADRUPED.rollout_batch(rows(QUADRUPED, n), np.zeros((n, 25, 12))),
+        8_000,
+    ),
     "few long ones": (lambda n: HOPPER.rollout_batch(rows(HOPPER, 3), np.zeros((3, n, 3))), 400_000),
     "higher order": (lambda n: CHAIN.rollout_batch(rows(CHAIN, 4) + 0.1, np.zeros((4, n, CHAIN.nu))), 100_000),
 }
