@@ -35,7 +35,7 @@ _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done 
 
 def interrupted(reports: Floats, knot: int) -> Floats:
     """The reports (T, 5), with that of the step `knot`, if there is one, saying that it was not tried."""
-    reports[knot : knot + 1] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0
+    reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0
     return reports
 
 
@@ -109,7 +109,7 @@ class Calls(StateCalls):
             np.zeros((knots, self.nu)),
             np.zeros((kept, ncontact, CONE)),
             np.zeros((kept, nlimit, BOUND)),
-            np.zeros(REPORT),
+            np.zeros(REPORT + 1),
         )
 
     def closed_loop(

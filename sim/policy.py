@@ -45,7 +45,7 @@ class Path(NamedTuple):
     us: Matrix  # (T, nu)
     cones: Cube  # (T, ncontact, 12) or empty
     bounds: Cube
-    report: Vector  # (5,) of the last step, but for the iterations, which are those of all; zeros at first
+    report: Vector  # (6,) of the last step, and the iterations of all, which are those of the report in the end; zeros
 
 
 @kernel
@@ -62,13 +62,6 @@ def _expected_velocity(policy: Policy, t: int, dx: Vector, u: Vector, out: Vecto
         row = policy.B[t, n + i]
         for j in range(u.shape[0]):
             out[i] += row[j] * (u[j] - policy.us[t, j])
-
-
-@kernel
-def _keep_report(report: Vector, out: Vector) -> None:
-    """out = report, but for the iterations, which are added."""
-    for k in range(report.shape[0]):
-        out[k] = report[k] + out[k] if k == 1 else report[k]
 
 
 @kernel
@@ -116,11 +109,10 @@ def closed_loop(
         for s in range(before, substeps):
             copy_vector(b, work.step_x[0])
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
-            status = step(model, work, options, work.step_x[0], u, guess, b, work.report)
-            _keep_report(work.report, path.report)
-            if status != _SOLVED:
+            if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t * substeps + s
-            due = is_due(work, work.report[1])
+            path.report[5] += path.report[1]
+            due = is_due(work, path.report[1])
             if due and s + 1 < substeps:
                 return t * substeps + s + 1
         if path.cones.shape[0] > 0:
@@ -133,4 +125,5 @@ def closed_loop(
             integrate_state(model, work.step_x[0], dx, b)
         if due:
             return (t + 1) * substeps
+    path.report[1] = path.report[5]
     return path.us.shape[0] * substeps

@@ -164,7 +164,7 @@ class Phased(HighOrder):
             except KeyboardInterrupt:
                 interrupted(path.report[None], 0)
                 raise Interrupted((t, path)) from None
-            path.report[:] = m.reports[min(m.knot, substeps - 1)]
+            path.report[:REPORT] = m.reports[min(m.knot, substeps - 1)]
             if m.knot < substeps:
                 return t, path
             total += m.reports[:, 1].sum()
