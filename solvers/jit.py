@@ -203,6 +203,7 @@ def cached(form: Any, name: str = "entry") -> Any:
 
 
 def registered(kernel: Any) -> Any:
+    """The kernel, which `compiled_signatures` knows from now on."""
     _REGISTRY.append(kernel)
     return kernel
 

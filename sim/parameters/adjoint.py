@@ -15,9 +15,9 @@ from sim.elimination_panel import column_count, solve_panel
 from sim.late import add_height_gradient, solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
+from sim.pace import DEADLINE
 from sim.parameters.columns import clear_columns, fill_columns
 from sim.parameters.effects import At, Effect
-from sim.pace import DEADLINE
 from sim.rollout import Cube, Linearized, linearize
 from sim.rotation import left_jacobian
 from sim.work import Work

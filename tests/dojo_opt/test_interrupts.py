@@ -49,7 +49,7 @@ def test_a_plan_after_interrupted_ones_is_the_same() -> None:
 
 @pytest.mark.slow
 def test_closed_loops_and_studies_keep_what_they_have() -> None:
-    mpc = dojo.tasks.hopper()
+    mpc = dojo.tasks.hopper_mpc()
     plant = dojo.tasks.plant(mpc, 2e-3)
     dojo.closed_loop(mpc, plant, 0.05)
     loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0))
@@ -95,7 +95,9 @@ class Pair(NamedTuple):
 
 
 @pytest.mark.parametrize(
-    "result", [Pair(1.0, 2.0), (1, Pair(1.0, 2.0)), Status.SOLVED, (Status.SOLVED, 1)], ids=["fields", "in", "enum", "both"]
+    "result",
+    [Pair(1.0, 2.0), (1, Pair(1.0, 2.0)), Status.SOLVED, (Status.SOLVED, 1)],
+    ids=["fields", "in", "enum", "both"],
 )
 def test_no_kernel_returns_what_python_has_to_make(result: Any) -> None:
     kind = type(result)
