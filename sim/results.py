@@ -138,6 +138,12 @@ class Shot:
     knot: int  # number of solved knots
     residual: float  # of the last step that was tried
 
+    @classmethod
+    def of(cls, found: tuple[int, Path]) -> Shot:
+        """From (number of solved knots, all of them)."""
+        knot, path = found
+        return cls(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+
 
 @dataclass(frozen=True)
 class Linearization:
@@ -158,6 +164,14 @@ class Batch:
     status: Integers  # (n,) Status
     knot: Integers  # (n,) number of solved steps
 
+    @classmethod
+    def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:
+        """From (states, status, number of solved steps), the rows after the last solved step still to be filled in."""
+        xs, _, knots = rows
+        for x, knot in zip(xs, knots, strict=True):
+            x[knot + 1 :] = x[knot]
+        return cls(*rows)
+
 
 def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
     """What is made of the result of a call; of what Interrupted carries instead, the same is made."""
@@ -166,20 +180,6 @@ def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
     except Interrupted as stop:
         raise Interrupted(None if stop.result is None else made(stop.result)) from None
     return made(result)
-
-
-def batch_of(rows: tuple[Floats, Integers, Integers]) -> Batch:
-    """Rollouts (states, status, number of solved steps), whose rows after the last one are filled in here."""
-    xs, status, knots = rows
-    for x, knot in zip(xs, knots, strict=True):
-        x[knot + 1 :] = x[knot]
-    return Batch(xs, status, knots)
-
-
-def shot_of(found: tuple[int, Path]) -> Shot:
-    """A closed-loop rollout: (number of solved knots, all of them)."""
-    knot, path = found
-    return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:

@@ -19,19 +19,7 @@ from sim.horizon import Horizon
 from sim.mechanism import Mechanism
 from sim.policies import Feedback, Rolled, roll
 from sim.reactions import Reactions
-from sim.results import (
-    Batch,
-    Shot,
-    SimulationError,
-    StepResult,
-    Trajectory,
-    batch_of,
-    carried,
-    contacts_of,
-    error_of,
-    fastest,
-    shot_of,
-)
+from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, carried, contacts_of, error_of, fastest
 from sim.settings import Settings, default_kappa
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
@@ -200,7 +188,7 @@ class Simulator(Derivatives):
         call = "Simulator.rollout_batch"
         inputs = self._border.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._border.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
-        return carried(lambda: self._calls.roll_batch(starts, inputs), batch_of)
+        return carried(lambda: self._calls.roll_batch(starts, inputs), Batch.of)
 
     def closed_loop(  # noqa: PLR0913
         self,
@@ -234,7 +222,7 @@ class Simulator(Derivatives):
         bounds = self._border.limits(name, limits)
         policy = self._border.policy(name, state, inputs, (xs, ks, Ks, gaps))
         count, level = whole(f"{name}(substeps=...)", substeps), self._border.kappa(call, kappa)
-        return carried(lambda: self._calls.closed_loop(state, policy, factor, bounds, count, level), shot_of)
+        return carried(lambda: self._calls.closed_loop(state, policy, factor, bounds, count, level), Shot.of)
 
     def reactions(
         self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world", wrenches: Wrenches | None = None

@@ -91,7 +91,7 @@ def rollout(
 ) -> Trajectory:
     """`Simulator.rollout` under wrenches (T, nbody, 6)."""
     if callable(us):
-        count = whole("Simulator.rollout(steps=...)", steps)
+        count: int | None = whole("Simulator.rollout(steps=...)", steps)
         other, rows = _pushed(sim, "rollout", wrenches, np.zeros((count, sim.nu)))
 
         def policy(time: float, state: Floats) -> Floats:

@@ -32,7 +32,9 @@ _WORD, _INT = ir.IntType(64), ir.IntType(32)
 
 def seconds() -> float:
     """Seconds that have gone by since some moment, the same one for kernels and Python; the clock never goes back."""
-    return _TICKS() * 1e-3 if sys.platform == "win32" else time.clock_gettime(time.CLOCK_MONOTONIC)
+    if sys.platform == "win32":
+        return float(_TICKS() * 1e-3)
+    return time.clock_gettime(time.CLOCK_MONOTONIC)
 
 
 def _ticks(builder: Any) -> Any:

@@ -126,15 +126,12 @@ class _Form(CPUDispatcher):
         super().__init__(func, targetoptions=options, pipeline_class=compiler)
 
     def compile(self, sig: Any) -> Any:
-        """Compile or load; what returns a NamedTuple or an enum to Python is refused.
-
-        Numba makes those by running their Python constructors, and does not look whether that failed: where Ctrl-C
-        comes during the call, that is where it is heard, and the process crashes (numba 0.68).
+        """Compile or load; what returns a NamedTuple or an enum to Python is refused: Numba 0.68 runs Python to make
+        one, does not look whether that failed, and crashes where Ctrl-C, which came during the call, is heard there.
         """
         compiled = super().compile(sig)
         for found in () if self.targetoptions.get("no_cpython_wrapper") else self.overloads.values():
-            kind = found.signature.return_type
-            if not _is_plain(kind):
+            if not _is_plain(kind := found.signature.return_type):
                 name = self.py_func.__qualname__
                 raise TypeError(f"kernel {name}: expected to return numbers and plain tuples to Python, got {kind}")
         return compiled
