@@ -91,8 +91,8 @@ def rollout(
 ) -> Trajectory:
     """`Simulator.rollout` under wrenches (T, nbody, 6)."""
     if callable(us):
-        count: int | None = whole("Simulator.rollout(steps=...)", steps)
-        other, rows = _pushed(sim, "rollout", wrenches, np.zeros((count, sim.nu)))
+        steps = whole("Simulator.rollout(steps=...)", steps)
+        other, rows = _pushed(sim, "rollout", wrenches, np.zeros((steps, sim.nu)))
 
         def policy(time: float, state: Floats) -> Floats:
             more = rows[round(time / sim.time_step), sim.nu :]
@@ -101,7 +101,7 @@ def rollout(
         inputs: Any = policy
     else:
         other, rows = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
-        count, inputs = steps, rows
+        inputs = rows
     table = _table(sim, "Simulator.rollout(wrenches=...)", wrenches, len(rows))
 
     def own(found: Trajectory) -> Trajectory:
@@ -111,7 +111,7 @@ def rollout(
             given[:, sim.mechanism.body_names.index(name)] = wrench[: found.knot]
         return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]), wrenches=given)
 
-    return carried(lambda: other.rollout(x, inputs, steps=count, throw=throw), own)
+    return carried(lambda: other.rollout(x, inputs, steps=steps, throw=throw), own)
 
 
 def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches, **options: Any) -> Shot:
