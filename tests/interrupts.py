@@ -34,13 +34,13 @@ def interrupt(call: Callable[[], Any], after: float) -> Heard:
     try:
         timer.start()
         call()
-        if not sent:
-            timer.cancel()
+        timer.cancel()
         timer.join()
         time.sleep(0.01)  # a signal that came this late is heard here
     except KeyboardInterrupt as error:
         stop, end = error, time.perf_counter()
     finally:
+        timer.cancel()
         signal.signal(signal.SIGINT, before)
     return Heard(stop, end - sent[0] if stop else 0.0)
 

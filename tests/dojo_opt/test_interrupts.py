@@ -58,7 +58,7 @@ def test_closed_loops_and_studies_keep_what_they_have() -> None:
     assert len(loop.x) == len(loop.u) + 1 == len(loop.time) == len(loop.contacts.gap) + 1 > 1
     expected = dojo.closed_loop(mpc, plant, loop.duration)
     np.testing.assert_array_equal(expected.x, loop.x)
-    study = heard(lambda: dojo.plant.monte_carlo(mpc, plant, lambda rng: dojo.Perturbation(), 0.02, runs=100_000))
+    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=100_000))
     assert len(study.outcomes) > 0
 
 
