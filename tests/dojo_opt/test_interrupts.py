@@ -52,13 +52,13 @@ def test_closed_loops_and_studies_keep_what_they_have() -> None:
     mpc = dojo.tasks.hopper_mpc()
     plant = dojo.tasks.plant(mpc, 2e-3)
     dojo.closed_loop(mpc, plant, 0.05)
-    loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0))
+    loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0), 2.0)
     assert loop.message == "Ctrl-C ended it before it was done."
     assert not loop.survived
     assert len(loop.x) == len(loop.u) + 1 == len(loop.time) == len(loop.contacts.gap) + 1 > 1
     expected = dojo.closed_loop(mpc, plant, loop.duration)
     np.testing.assert_array_equal(expected.x, loop.x)
-    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=100_000))
+    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=2_000), 2.0)
     assert len(study.outcomes) > 0
 
 
