@@ -26,6 +26,7 @@ measure() {  # NAME COMMAND...: what it prints goes to NAME.txt
 }
 
 measure report "$python" -m dojo_opt report all $quick --out "$out"
+measure chaos "$python" "$here/benchmarks/chaos.py" $quick --out "$out"  # on all cores: loops over them are a part
 export NUMBA_NUM_THREADS=1  # one core, as the tables say
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
 measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"

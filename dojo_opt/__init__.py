@@ -30,6 +30,7 @@ __all__ = [
     "Gear",
     "HalfSpace",
     "Input",
+    "Interrupted",
     "Joint",
     "Linearization",
     "MPC",
@@ -93,6 +94,7 @@ _HOME: dict[str, str | None] = {
     "Gear": "sim.gear",
     "HalfSpace": "sim.shapes",
     "Input": "sim.parts",
+    "Interrupted": "sim.results",
     "Joint": "sim.parts",
     "Linearization": "sim.results",
     "MPC": "dojo_opt.mpc.controller",
@@ -168,7 +170,7 @@ if TYPE_CHECKING:
     from sim.parts import Body, Contact, Input, Joint
     from sim.polytope import Polytope
     from sim.reactions import Reactions
-    from sim.results import Linearization, SimulationError, StepResult, Trajectory
+    from sim.results import Interrupted, Linearization, SimulationError, StepResult, Trajectory
     from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
     from sim.simulator import Simulator
     from sim.terrain.terrain import Terrain

@@ -248,3 +248,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, TypeError, OSError, ImportError) as error:
         print(f"dojo-opt {args.command}: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt from None  # as such it ends the process by SIGINT, which stops a script around it, too

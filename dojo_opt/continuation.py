@@ -58,6 +58,7 @@ class Continuation:
     def reset(self) -> None:
         """Forget the last solve and start the clock."""
         self.journal.reset()
+        vars(self).pop("now", None)
         self._shooting.reset()
 
     def start(self, now: Iterate, kappa: float | None) -> None:

@@ -24,6 +24,7 @@ from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
 from dojo_opt.shooting import Shooting
 from sim import checks
+from sim.results import Interrupted
 from solvers.status import MESSAGES, Status
 
 __all__ = ["Solver", "ilqr"]
@@ -51,6 +52,8 @@ def ilqr(
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
     is one of the finer problem then, and its history is that of both.
+
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the Plan of the last iteration, INTERRUPTED.
     """
     checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
     if options is not None and not isinstance(options, Options):
@@ -96,6 +99,14 @@ class Solver:
         self, controls: ArrayLike | None = None, states: ArrayLike | None = None, warm_start: Plan | None = None
     ) -> Plan:
         """Plan from a guess; see `ilqr`."""
+        try:
+            return self._solve(controls, states, warm_start)
+        except KeyboardInterrupt:
+            known = hasattr(self.continuation, "now")
+            raise Interrupted(self._plan(Status.INTERRUPTED, "") if known else None) from None
+
+    def _solve(self, controls: ArrayLike | None, states: ArrayLike | None, warm_start: Plan | None) -> Plan:
+        """As `solve`."""
         self.continuation.reset()
         self.descent.reset()
         if warm_start is None:
@@ -182,7 +193,7 @@ class Solver:
     def _plan(self, status: Status, detail: str) -> Plan:
         """What was reached, made consistent at the last smoothing, with the gains that belong to it."""
         continuation, journal, options = self.continuation, self.continuation.journal, self.options
-        if status != Status.SIMULATION_FAILED:
+        if status not in (Status.SIMULATION_FAILED, Status.INTERRUPTED):
             continuation.finish(options.stages[-1])
         now, stride = continuation.now, self.descent.stride
         if stride is not None and status == Status.SOLVED and not self.descent.repeat(now):

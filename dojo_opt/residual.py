@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.manifold import displace
+from sim.pace import rows
 from solvers.jit import CompilationError, users_kernel
 
 Matrix = NDArray[np.float64]
@@ -138,7 +139,8 @@ class ResidualKernels:
     def values(self, xs: Matrix, us: Matrix, knots: Integers, out: Matrix) -> None:
         """out[i] = r(x, u) at knots[i]."""
         with self._named():
-            self._values(xs, us, self._idle, knots, out)
+            for part in rows(len(knots)):
+                self._values(xs, us, self._idle, knots[part], out[part])
 
     def jacobians(self, layout: Integers, xs: Matrix, us: Matrix, knots: Integers, d: int) -> Stack:
         """(m, d, ndx + nu) derivative by tangent state and control; overwritten by the next call."""
@@ -146,11 +148,12 @@ class ResidualKernels:
             self._out = np.zeros((knots.size, d, layout.size + us.shape[1]))
             self._scratch = np.empty((4, max(xs.shape[1], us.shape[1], d)))
         with self._named():
-            if self._exact is not None:
-                self._exact(xs, us, self._idle, knots, self._out)
-            else:
-                assert self._differences is not None
-                self._differences(layout, xs, us, self._idle, knots, self._scratch, self._out)
+            for part in rows(len(knots)):
+                if self._exact is not None:
+                    self._exact(xs, us, self._idle, knots[part], self._out[part])
+                else:
+                    assert self._differences is not None
+                    self._differences(layout, xs, us, self._idle, knots[part], self._scratch, self._out[part])
         return self._out
 
     @contextmanager

@@ -1,15 +1,17 @@
 """Calls: where Python enters the compiled steps, rollouts and derivatives, with all buffers that cross the border.
 
-settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
+settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
 report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
            accuracy of derivatives, 0 where there are none
 contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
+
+Calls that may take long are made in pieces (sim/pace.py); those that Ctrl-C ends between two of them raise Interrupted
+with what they would have returned, as far as they came.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,9 @@ from sim import linear_rollout, rollout
 from sim.bind import bind_gradient, bind_step
 from sim.layout import work_view
 from sim.model import Integers, Model, Vector
+from sim.pace import pieces
 from sim.policy import Path, Policy, closed_loop
+from sim.results import Interrupted
 from sim.settings import Settings
 from sim.state_calls import StateCalls
 from sim.work import Work
@@ -27,28 +31,27 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
-_SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
 
-def finite_rows(array: Floats) -> NDArray[np.bool_]:
-    """Which rows (along the first axis) are finite throughout."""
-    return np.asarray(np.isfinite(array).reshape(len(array), -1).all(axis=1))
+def interrupted(reports: Floats, knot: int) -> Floats:
+    """The reports (T, 5), with that of the step `knot`, if there is one, saying that it was not tried."""
+    reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0, 0.0
+    return reports
 
 
-def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
-    """The first of `count` steps with a row that is not finite, whose status says so then; `count` where there is none.
-
-    A sum is looked at first, which takes a tenth of the time; small ones by `dot`, which has less to set up.
-    """
-    if all(isfinite(flat.dot(flat) if flat.size < _SMALL else flat.sum()) for flat in [a.ravel() for a in arrays]):
-        return count
-    good = np.logical_and.reduce([finite_rows(a) for a in arrays])
-    if good.all():
-        return count
-    first = int(good.argmin())
-    reports[first, 0] = Status.NOT_FINITE
-    return first
+def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: int) -> int:
+    """The number of solved knots of a rollout under a policy, which `go_on` continues after so many steps."""
+    done, steps = 0, len(path.us) * substeps
+    try:
+        for _ in pieces(settings, steps):
+            done = go_on(done)
+            if done == steps or path.report[0] != Status.SOLVED:
+                break
+    except KeyboardInterrupt:
+        interrupted(path.report[None], 0 if done < steps else 1)
+        raise Interrupted((done // substeps, path)) from None
+    return done // substeps
 
 
 class Calls(StateCalls):
@@ -84,12 +87,19 @@ class Calls(StateCalls):
         xs = np.zeros((steps + 1, self.nx))
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
-        settings = self.settings.array()
-        knot = rollout.roll(self._table(bind_step), self._scratch.table(), settings, x, us, xs, reports, contacts)
-        knot = refuse(reports, knot, contacts[:knot])
+        xs[0] = x
+        model, work, settings = self._table(bind_step), self._scratch.table(), self.settings.array()
+        knot = 0
+        try:
+            for _ in pieces(settings, steps):
+                knot = int(rollout.roll(model, work, settings, us, xs, reports, contacts, knot))
+                if knot == steps or reports[knot, 0] != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted((knot, xs, interrupted(reports, knot), contacts)) from None
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
-        return int(knot), xs, reports, contacts
+        return knot, xs, reports, contacts
 
     def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
         """What a rollout of so many knots fills in; without `cones`, there is nothing of contacts and limits in it."""
@@ -100,7 +110,7 @@ class Calls(StateCalls):
             np.zeros((knots, self.nu)),
             np.zeros((kept, ncontact, CONE)),
             np.zeros((kept, nlimit, BOUND)),
-            np.zeros(REPORT),
+            np.zeros(REPORT + 1),
         )
 
     def closed_loop(
@@ -116,11 +126,16 @@ class Calls(StateCalls):
     ) -> tuple[int, Path]:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
         path = self._path(len(policy.us), keep=keep)
-        model, settings = self._table(bind_step), self.settings.array(kappa)
-        knot = closed_loop(model, self._scratch.table(), settings, x, policy, alpha, limits, substeps, path)
+        path.xs[0] = x
+        model, work, settings = self._table(bind_step), self._scratch.table(), self.settings.array(kappa)
+
+        def go_on(first: int) -> int:
+            return int(closed_loop(model, work, settings, policy, alpha, limits, substeps, path, first))
+
+        knot = follow(go_on, settings, path, substeps)
         if knot < len(policy.us):
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
-        return int(knot), path
+        return knot, path
 
     def linearize(
         self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
@@ -141,11 +156,20 @@ class Calls(StateCalls):
         line = rollout.Linearized(xs, us, A, B, x_next, reports)
         model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            rollout.linearize(model, self._scratch.table(), settings, (0, n), substeps, line)
+            work, step = self._scratch.table(), 0
+            for _ in pieces(settings, n * substeps):
+                step = int(rollout.linearize(model, work, settings, (0, step, n), substeps, line))
+                if step == n * substeps:
+                    break
         else:
-            rollout.linearize_knots(model, self._scratch.chunks(n), settings, substeps, line)
-        if reports[:, 0].any() or refuse(reports, n, A, B) < n:
-            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
+            works = self._scratch.chunks(n)
+            ends = np.arange(len(works) + 1) * n // len(works) * substeps
+            done = ends[:-1].copy()
+            for _ in pieces(settings, n * substeps):
+                rollout.linearize_knots(model, works, settings, substeps, line, done)
+                if np.array_equal(done, ends[1:]):
+                    break
+        if reports[:, 0].any():
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
@@ -158,12 +182,15 @@ class Calls(StateCalls):
         A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
         xs[0] = x
         line = rollout.Linearized(xs, us, A, B, xs, reports)
-        model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
-        knot = linear_rollout.roll_linear(model, self._scratch.table(), settings, line)
-        knot = refuse(reports, knot, A[:knot], B[:knot])
+        model, work, settings = *self.tables(), self.settings.array(kappa)
+        knot = 0
+        for _ in pieces(settings, n):
+            knot = int(linear_rollout.roll_linear(model, work, settings, line, knot))
+            if knot == n or reports[knot, 0] != Status.SOLVED:
+                break
         if knot < n:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
-        return int(knot), xs, A, B, reports
+        return knot, xs, A, B, reports
 
     def linearize_one(self, x: Vector, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector, Vector]:
         """(A, B, next state, report) of one step."""
@@ -174,9 +201,17 @@ class Calls(StateCalls):
         """(states, status and number of solved steps of every rollout), in parallel."""
         n, steps = us.shape[:2]
         xs = np.zeros((n, steps + 1, self.nx))
+        xs[:, 0] = x0s
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        settings, works = self.settings.array(), self._scratch.chunks(n)
-        rollout.roll_batch(self._table(bind_step), works, settings, x0s, us, xs, status, knots)
+        model, works, settings = self._table(bind_step), self._scratch.chunks(n), self.settings.array()
+        try:
+            for _ in pieces(settings, n * steps):
+                rollout.roll_batch(model, works, settings, us, xs, status, knots)
+                if np.all((knots == steps) | (status != Status.SOLVED)):
+                    break
+        except KeyboardInterrupt:
+            status[(knots < steps) & (status == Status.SOLVED)] = Status.INTERRUPTED
+            raise Interrupted((xs, status, knots)) from None
         return xs, status, knots
 
     def far(self) -> NDArray[np.bool_]:

@@ -6,26 +6,29 @@ from sim.late import gradient, step
 from sim.layout import model_view, work_view
 from sim.model import Vector
 from sim.options import Guess
-from sim.rollout import ACCURACY, Linearized, begin
+from sim.pace import is_due
+from sim.rollout import ACCURACY, Linearized, options_of
+from solvers.dense import is_finite
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
+_NOT_FINITE = int(Status.NOT_FINITE)
 
 
 @kernel
-def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized) -> int:
-    """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from line.xs[0]; returns the number of solved steps.
+def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Linearized, first: int) -> int:
+    """xs[t + 1] = step(xs[t], us[t]) and A[t], B[t], from t = first on; returns the number of solved steps.
 
     line.xs: (T + 1, nx), of which the first row is given; x_next is not used.
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
-    for t in range(line.us.shape[0]):
+    for t in range(first, line.us.shape[0]):
         x = line.xs[t]
         report = line.reports[t]
         guess = Guess(x[nq:], t > 0)
@@ -35,4 +38,9 @@ def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Lineari
             report[0] = _SINGULAR
             return t
         report[5] = ACCURACY * work.contact_hard[0]
+        if not (is_finite(line.A[t]) and is_finite(line.B[t])):
+            report[0] = _NOT_FINITE
+            return t
+        if is_due(work, report[1] + line.A.shape[1]):
+            return t + 1
     return line.us.shape[0]

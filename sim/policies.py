@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.border import whole
+from sim.calls import interrupted
+from sim.results import Interrupted
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator
@@ -27,15 +29,27 @@ def roll(sim: Simulator, x: Floats, policy: Feedback, steps: int | None) -> tupl
     Every step is solved afresh: states differ within the tolerance from those of one rollout of the same inputs.
     """
     count = whole("Simulator.rollout(steps=...)", steps)
-    us, rolled = [], []
-    for k in range(count):
-        u = policy(k * sim.time_step, x.copy())
-        us.append(checks.array(f"Simulator.rollout: u of the policy at step {k}", u, (sim.nu,)))
-        rolled.append(sim._calls.roll(x, us[-1][None]))
-        if rolled[-1][0] == 0:
-            break
-        x = rolled[-1][1][1]
+    done: list[tuple[Floats, Rolled]] = []
+    try:
+        for k in range(count):
+            name = f"Simulator.rollout: u of the policy at step {k}"
+            u = checks.array(name, policy(k * sim.time_step, x.copy()), (sim.nu,))
+            done.append((u, sim._calls.roll(x, u[None])))
+            knot, xs, *_ = done[-1][1]
+            if knot == 0:
+                break
+            x = xs[1]
+    except KeyboardInterrupt:
+        raise Interrupted(_joined(done, stopped=True) if done else None) from None
+    return _joined(done)
+
+
+def _joined(done: list[tuple[Floats, Rolled]], stopped: bool = False) -> tuple[Floats, Rolled]:
+    """Inputs and results of single steps as those of one rollout; of one that was stopped there is one report more."""
+    us, rolled = zip(*done, strict=True)
     solved = sum(knot for knot, *_ in rolled)
     states = np.concatenate([rolled[0][1][:1], *(xs[1:] for _, xs, _, _ in rolled)])
     reports, contacts = (np.concatenate([part[i] for part in rolled]) for i in (2, 3))
+    if stopped:
+        reports = interrupted(np.concatenate([reports, reports[-1:]]), len(reports))
     return np.array(us), (solved, states, reports, contacts)

@@ -13,7 +13,8 @@ from sim.late import step
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Vector
 from sim.options import Guess
-from sim.rollout import Cube, begin
+from sim.pace import is_due
+from sim.rollout import Cube, options_of
 from sim.state import integrate_state, state_difference
 from solvers.dense import copy, copy_vector, dot
 from solvers.jit import kernel
@@ -44,7 +45,7 @@ class Path(NamedTuple):
     us: Matrix  # (T, nu)
     cones: Cube  # (T, ncontact, 12) or empty
     bounds: Cube
-    report: Vector  # (6,) of the last step, but for the iterations, which are those of all
+    report: Vector  # (7,) of the last step, and the iterations of all, which are those of the report in the end; zeros
 
 
 @kernel
@@ -68,28 +69,27 @@ def closed_loop(
     model_at: Table,
     work_at: Table,
     settings: Vector,
-    x: Vector,
     policy: Policy,
     alpha: float,
     limits: tuple[Vector, Vector],
     substeps: int,
     path: Path,
+    first: int,
 ) -> int:
-    """Rollout under the policy of a backward pass; returns the number of solved knots.
+    """Rollout from path.xs[0] under the policy of a backward pass, from the step `first` on, that many of all knots
+    before it; returns the number of solved steps.
 
     u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)),   x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
     low, high = limits
     ndx = policy.gaps.shape[1]
     dx = work.chain[0][:ndx]
     velocity = work.step_x[1, nq:]
-    total = 0.0
-    copy_vector(x, path.xs[0])
-    for t in range(path.us.shape[0]):
+    for t in range(first // substeps, path.us.shape[0]):
         u = path.us[t]
         state_difference(model, policy.xs[t], path.xs[t], dx)
         for j in range(u.shape[0]):
@@ -102,13 +102,19 @@ def closed_loop(
             copy(policy.bounds[t], work.bound)
         known = t > 0 or policy.cones.shape[0] > 0
         b = path.xs[t + 1]
-        copy_vector(path.xs[t], b)
-        for s in range(substeps):
+        before = max(first - t * substeps, 0)
+        if before == 0:
+            copy_vector(path.xs[t], b)
+        due = False
+        for s in range(before, substeps):
             copy_vector(b, work.step_x[0])
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
             if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
-                return t
-            total += path.report[1]
+                return t * substeps + s
+            path.report[6] += path.report[1]
+            due = is_due(work, path.report[1])
+            if due and s + 1 < substeps:
+                return t * substeps + s + 1
         if path.cones.shape[0] > 0:
             copy(work.cone, path.cones[t])
             copy(work.bound, path.bounds[t])
@@ -117,5 +123,7 @@ def closed_loop(
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
             copy_vector(b, work.step_x[0])
             integrate_state(model, work.step_x[0], dx, b)
-    path.report[1] = total
-    return path.us.shape[0]
+        if due:
+            return (t + 1) * substeps
+    path.report[1] = path.report[6]
+    return path.us.shape[0] * substeps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism import Mechanism
+from sim.policy import Path
 from solvers.status import MESSAGES, Status
 
 if TYPE_CHECKING:
@@ -25,6 +26,22 @@ class SimulationError(RuntimeError):
     def __init__(self, message: str, status: Status) -> None:
         super().__init__(message)
         self.status = status
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a long call, which is heard within a fifth of a second; `result` is what was done until then.
+
+    result    as the call would have returned, as far as it came: the Trajectory, Shot or Batch of a rollout with the
+              steps that were solved, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
+              `closed_loop`; None where nothing was done yet. Calls that only differentiate raise KeyboardInterrupt
+    """
+
+    def __init__(self, result: Any = None) -> None:
+        super().__init__()
+        self.result = result
+
+    def __str__(self) -> str:
+        return "" if self.result is None else f"so far: {self.result!r}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -121,6 +138,12 @@ class Shot:
     knot: int  # number of solved knots
     residual: float  # of the last step that was tried
 
+    @classmethod
+    def of(cls, found: tuple[int, Path]) -> Shot:
+        """From (number of solved knots, all of them)."""
+        knot, path = found
+        return cls(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+
 
 @dataclass(frozen=True)
 class Linearization:
@@ -142,6 +165,23 @@ class Batch:
     x: Floats  # (n, T + 1, nx)
     status: Integers  # (n,) Status
     knot: Integers  # (n,) number of solved steps
+
+    @classmethod
+    def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:
+        """From (states, status, number of solved steps), the rows after the last solved step still to be filled in."""
+        xs, _, knots = rows
+        for x, knot in zip(xs, knots, strict=True):
+            x[knot + 1 :] = x[knot]
+        return cls(*rows)
+
+
+def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
+    """What is made of the result of a call; of what Interrupted carries instead, the same is made."""
+    try:
+        result = call()
+    except Interrupted as stop:
+        raise Interrupted(None if stop.result is None else made(stop.result)) from None
+    return made(result)
 
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:

@@ -1,12 +1,12 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
-    settings   (4,) time step [s], kappa [N s m], tolerance, largest number of iterations
+    settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
     report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
-not SOLVED.
+not SOLVED, and after the first one that ends behind the deadline: sim/pace.py says how it goes on.
 """
 
 from __future__ import annotations
@@ -17,13 +17,18 @@ from sim.late import gradient, report_contacts, step
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Vector
 from sim.options import Guess, Options
+from sim.pace import DEADLINE, is_due, start_pace
 from sim.work import Work
-from solvers.jit import kernel, parallel_kernel, prange
+from solvers.clock import seconds
+from solvers.dense import copy_vector, is_finite
+from solvers.jit import kernel
+from solvers.parallel import parallel_kernel, prange
 from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
+_NOT_FINITE = int(Status.NOT_FINITE)
 ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
 Cube = Matrix  # (n, rows, columns)
 
@@ -40,8 +45,17 @@ class Linearized(NamedTuple):
 
 
 @kernel
-def begin(work: Work, settings: Vector) -> Options:
-    """Settings of a motion that begins here."""
+def options_of(work: Work, settings: Vector, begins: bool) -> Options:
+    """Options of the steps of a motion that begins here, or goes on after a pause."""
+    start_pace(work, settings)
+    if begins:
+        begin(work)
+    return Options(settings[0], settings[1], settings[2], int(settings[3]))
+
+
+@kernel
+def begin(work: Work) -> None:
+    """Forget the motion before."""
     work.counts[3] = 0
     # what is known of far contacts (contacts/far.py), forces of loops and last directions belong to another motion
     work.far_law[0] = 0.0
@@ -52,7 +66,6 @@ def begin(work: Work, settings: Vector) -> Options:
             work.cone_step[c, k] = 0.0
     for k in range(work.bound_step.shape[0]):
         work.bound_step[k, 0] = work.bound_step[k, 1] = 0.0
-    return Options(settings[0], settings[1], settings[2], int(settings[3]))
 
 
 @kernel
@@ -60,26 +73,29 @@ def roll(
     model_at: Table,
     work_at: Table,
     settings: Vector,
-    x: Vector,
     us: Matrix,
     xs: Matrix,
     reports: Matrix,
     contacts: Cube,
+    first: int,
 ) -> int:
-    """xs[t + 1] = step(xs[t], us[t]) from xs[0] = x; returns the number of solved steps.
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 6); contacts: (T, ncontact, 11).
+    us: (T, nu); xs: (T + 1, nx), of which xs[0] is given; reports: (T, 6); contacts: (T, ncontact, 11).
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
-    for k in range(x.shape[0]):
-        xs[0, k] = x[k]
-    for t in range(us.shape[0]):
+    for t in range(first, us.shape[0]):
         if step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t]) != _SOLVED:
             return t
         report_contacts(model, work, options.h, contacts[t])
+        if not is_finite(contacts[t]):
+            reports[t, 0] = _NOT_FINITE
+            return t
+        if is_due(work, reports[t, 1]):
+            return t + 1
     return us.shape[0]
 
 
@@ -116,29 +132,31 @@ def linearize(
     model_at: Table,
     work_at: Table,
     settings: Vector,
-    knots: tuple[int, int],
+    knots: tuple[int, int, int],
     substeps: int,
     line: Linearized,
-) -> None:
-    """Derivatives of the knots from knots[0] up to knots[1]: products of the derivatives of their steps."""
+) -> int:
+    """Derivatives of the knots from knots[0] up to knots[2], products of the derivatives of their steps.
+
+    knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
+    """
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, knots[1] == knots[0] * substeps)
     nq = work.theta1.shape[0]
     x = work.step_x[0]
-    for t in range(knots[0], knots[1]):
+    for t in range(knots[1] // substeps, knots[2]):
         A = line.A[t]
         B = line.B[t]
         x_next = line.x_next[t]
         report = line.reports[t]
         velocity = work.step_x[1, nq:]
-        for k in range(velocity.shape[0]):
-            velocity[k] = x_next[nq + k]
-        for k in range(x.shape[0]):
-            x_next[k] = line.xs[t, k]
-        for s in range(substeps):
-            for k in range(x.shape[0]):
-                x[k] = x_next[k]
+        before = max(knots[1] - t * substeps, 0)
+        if before == 0:
+            copy_vector(x_next[nq:], velocity)
+            copy_vector(line.xs[t], x_next)
+        for s in range(before, substeps):
+            copy_vector(x_next, x)
             guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
             if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break
@@ -150,6 +168,12 @@ def linearize(
             report[5] = max(report[5], ACCURACY * work.contact_hard[0])
             if s > 0:
                 _chain(work, A, B)
+            if not (is_finite(A) and is_finite(B)):
+                report[0] = _NOT_FINITE
+                break
+            if is_due(work, report[1] + A.shape[0]):
+                return t * substeps + s + 1
+    return knots[2] * substeps
 
 
 @parallel_kernel
@@ -159,13 +183,17 @@ def linearize_knots(
     settings: Vector,
     substeps: int,
     line: Linearized,
+    done: Integers,
 ) -> None:
-    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c]."""
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c], done[c] is its next
+    step, the first one of chunk c + 1 in the end.
+    """
     n = line.us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
-        knots = (c * n // chunks, (c + 1) * n // chunks)
-        linearize(model_at, work_ats[c], settings, knots, substeps, line)
+        if seconds() < settings[DEADLINE]:
+            knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
+            done[c] = linearize(model_at, work_ats[c], settings, knots, substeps, line)
 
 
 @kernel
@@ -173,22 +201,43 @@ def _roll_one(
     model_at: Table,
     work_at: Table,
     settings: Vector,
-    x0: Vector,
     us: Matrix,
     xs: Matrix,
+    first: int,
 ) -> tuple[int, int]:
-    """A rollout that keeps its states only: (status, number of solved steps)."""
+    """As `roll`, but keeps its states only: (status, number of solved steps)."""
     model = model_view(model_at)
     work = work_view(work_at)
-    options = begin(work, settings)
+    options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
-    for k in range(x0.shape[0]):
-        xs[0, k] = x0[k]
-    for t in range(us.shape[0]):
+    for t in range(first, us.shape[0]):
         status = step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report)
         if status != _SOLVED:
             return status, t
+        if is_due(work, work.report[1]):
+            return _SOLVED, t + 1
     return _SOLVED, us.shape[0]
+
+
+@kernel
+def _roll_rows(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    rows: tuple[int, int],
+    us: Cube,
+    xs: Cube,
+    status: Integers,
+    knots: Integers,
+) -> None:
+    """Rollouts rows[0] up to rows[1], as far as they are not done, until the deadline."""
+    for i in range(rows[0], rows[1]):
+        if status[i] == _SOLVED and knots[i] < us.shape[1]:
+            if seconds() > settings[DEADLINE]:
+                return
+            status[i], knots[i] = _roll_one(model_at, work_at, settings, us[i], xs[i], knots[i])
+            if status[i] == _SOLVED and knots[i] < us.shape[1]:
+                return
 
 
 @parallel_kernel
@@ -196,15 +245,14 @@ def roll_batch(
     model_at: Table,
     work_ats: Table,
     settings: Vector,
-    x0s: Matrix,
     us: Cube,
     xs: Cube,
     status: Integers,
     knots: Integers,
 ) -> None:
-    """Rollouts from x0s[i] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,)."""
+    """Rollouts from xs[i, 0] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,), zeros."""
     n = us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
-        for i in range(c * n // chunks, (c + 1) * n // chunks):
-            status[i], knots[i] = _roll_one(model_at, work_ats[c], settings, x0s[i], us[i], xs[i])
+        rows = (c * n // chunks, (c + 1) * n // chunks)
+        _roll_rows(model_at, work_ats[c], settings, rows, us, xs, status, knots)

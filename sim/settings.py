@@ -27,8 +27,11 @@ class Settings(NamedTuple):
     order: int = 2  # of a step
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given; without the order, which chooses the kernels."""
-        return np.array((self if kappa is None else self._replace(kappa=kappa))[:4], dtype=np.float64)
+        """As kernels read it, at another kappa when given, with room for a deadline (sim/pace.py); without the order,
+        which chooses the kernels.
+        """
+        level = self.kappa if kappa is None else kappa
+        return np.array((self.time_step, level, self.tolerance, self.max_iterations, np.inf), dtype=np.float64)
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

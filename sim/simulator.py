@@ -18,9 +18,9 @@ from sim.derivatives import Derivatives
 from sim.describe import describe
 from sim.horizon import Horizon
 from sim.mechanism import Mechanism
-from sim.policies import Feedback, roll
+from sim.policies import Feedback, Rolled, roll
 from sim.reactions import Reactions
-from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, contacts_of, error_of, fastest
+from sim.results import Batch, Shot, SimulationError, StepResult, Trajectory, carried, contacts_of, error_of, fastest
 from sim.settings import Settings, default_kappa
 from sim.wrenches import Wrenches
 from solvers.status import MESSAGES, Status
@@ -147,15 +147,20 @@ class Simulator(Derivatives):
             return pushed.rollout(self, x, us, wrenches, throw, steps)
         state = self._border.state("rollout", x)
         if callable(us):
-            inputs, (knot, xs, reports, contacts) = roll(self, state, us, steps)
+            found = carried(lambda: roll(self, state, us, steps), lambda pair: self._trajectory(*pair))
         else:
             inputs = self._border.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
-            knot, xs, reports, contacts = self._calls.roll(state, inputs)
-        last = reports[min(knot, len(inputs) - 1)] if len(inputs) else np.zeros(REPORT)
+            found = carried(lambda: self._calls.roll(state, inputs), lambda rolled: self._trajectory(inputs, rolled))
+        if throw and not found.success:
+            raise SimulationError(found.message, found.status)
+        return found
+
+    def _trajectory(self, inputs: Floats, rolled: Rolled) -> Trajectory:
+        """What came of a rollout under the inputs (T, nu)."""
+        knot, xs, reports, contacts = rolled
+        last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
         status = Status(int(last[0]))
         error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last, xs[knot])
-        if error and throw:
-            raise error
         return Trajectory(
             simulator=self,
             x=xs[: knot + 1],
@@ -184,10 +189,7 @@ class Simulator(Derivatives):
         call = "Simulator.rollout_batch"
         inputs = self._border.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._border.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
-        xs, status, knots = self._calls.roll_batch(starts, inputs)
-        for x, knot in zip(xs, knots, strict=True):
-            x[knot + 1 :] = x[knot]
-        return Batch(xs, status, knots)
+        return carried(lambda: self._calls.roll_batch(starts, inputs), Batch.of)
 
     def closed_loop(  # noqa: PLR0913
         self,
@@ -218,15 +220,10 @@ class Simulator(Derivatives):
         state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, ("T", self.nu))
         name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
-        knot, path = self._calls.closed_loop(
-            state,
-            self._border.policy(name, state, inputs, (xs, ks, Ks, gaps)),
-            factor,
-            self._border.limits(name, limits),
-            whole(f"{name}(substeps=...)", substeps),
-            self._border.kappa(call, kappa),
-        )
-        return Shot(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
+        bounds = self._border.limits(name, limits)
+        policy = self._border.policy(name, state, inputs, (xs, ks, Ks, gaps))
+        count, level = whole(f"{name}(substeps=...)", substeps), self._border.kappa(call, kappa)
+        return carried(lambda: self._calls.closed_loop(state, policy, factor, bounds, count, level), Shot.of)
 
     def reactions(
         self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world", wrenches: Wrenches | None = None

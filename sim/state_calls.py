@@ -11,6 +11,7 @@ from sim import coordinates, coordinates_jacobian, energy, start, state, velocit
 from sim.bind import bind_nodes, bind_poses
 from sim.layout import sizes_of, table
 from sim.model import Model, Vector
+from sim.pace import rows
 from sim.results import SimulationError
 from sim.scratch import Scratch
 from sim.settings import Settings
@@ -57,43 +58,55 @@ class StateCalls:
     def node_velocities(self, xs: Floats) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""
         out = np.zeros((len(xs), self.sizes.nv))
-        velocity.node_velocities(self._table(bind_nodes), self._scratch.table(), self.settings.time_step, xs, out)
+        model, work, h = self._table(bind_nodes), self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            velocity.node_velocities(model, work, h, xs[part], out[part])
         return out
 
     def bodies(self, xs: Floats) -> Floats:
         """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
         nbody = self.sizes.nbody
-        out = np.zeros((len(xs) * nbody, 13))
-        velocity.body_states(self._model, self._scratch.table(), xs, out)
-        return out.reshape(len(xs), nbody, 13)
+        out = np.zeros((len(xs), nbody, 13))
+        for part in rows(len(xs)):
+            velocity.body_states(self._model, self._scratch.table(), xs[part], out[part].reshape(-1, 13))
+        return out
 
     def integrate(self, xs: Floats, dxs: Floats) -> Floats:
         """x (+) dx of every row."""
         out = np.zeros_like(xs)
-        state.integrate_states(self._model, xs, dxs, out)
+        for part in rows(len(xs)):
+            state.integrate_states(self._model, xs[part], dxs[part], out[part])
         return out
 
     def difference(self, x0s: Floats, x1s: Floats) -> Floats:
         """x1 (-) x0 of every row."""
         out = np.zeros((len(x0s), self.ndx))
-        state.state_differences(self._model, x0s, x1s, out)
+        for part in rows(len(x0s)):
+            state.state_differences(self._model, x0s[part], x1s[part], out[part])
         return out
 
     def normalise(self, xs: Floats, tolerance: float) -> int:
         """Normalise quaternions in place; see `normalise_quaternions`."""
-        return int(state.normalise_quaternions(self._model, xs, tolerance))
+        for part in rows(len(xs)):
+            found = int(state.normalise_quaternions(self._model, xs[part], tolerance))
+            if found >= 0:
+                return part.start * self.sizes.nbody + found
+        return -1
 
     def maximal(self, xs: Floats, nbody: int) -> Floats:
         """z of every row, (n, nbody, 13)."""
-        out = np.zeros((len(xs) * nbody, 13))
-        coordinates.maximal_states(self._model, self._scratch.table(), self.settings.time_step, xs, out)
-        return out.reshape(len(xs), nbody, 13)
+        out = np.zeros((len(xs), nbody, 13))
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            coordinates.maximal_states(self._model, work, h, xs[part], out[part].reshape(-1, 13))
+        return out
 
     def minimal(self, zs: Floats) -> Floats:
         """x of every z, (n, nbody, 13)."""
         out = np.zeros((len(zs), self.nx))
-        flat = zs.reshape(-1, 13)
-        coordinates.minimal_states(self._model, self._scratch.table(), self.settings.time_step, flat, out)
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(zs)):
+            coordinates.minimal_states(self._model, work, h, zs[part].reshape(-1, 13), out[part])
         return out
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
@@ -113,11 +126,15 @@ class StateCalls:
     def energies(self, xs: Floats) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        energy.energies(self._table(bind_nodes), self._scratch.table(), self.settings.time_step, xs, out)
+        model, work, h = self._table(bind_nodes), self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            energy.energies(model, work, h, xs[part], out[part])
         return out
 
     def momenta(self, xs: Floats) -> Floats:
         """(linear, angular) momentum of every row."""
         out = np.zeros((len(xs), 6))
-        energy.momenta(self._model, self._scratch.table(), self.settings.time_step, xs, out)
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            energy.momenta(self._model, work, h, xs[part], out[part])
         return out

@@ -165,3 +165,4 @@ class Work(NamedTuple):
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
     step_x: Matrix  # (2, nq + nv) states inside a knot
     report: Vector  # (6,) of a step nobody asks about
+    pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/pace.py

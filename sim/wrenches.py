@@ -19,7 +19,7 @@ from sim.parts import Input
 from sim.policies import Feedback
 from sim.reactions import Reactions
 from sim.reactions import reactions as transmitted
-from sim.results import Linearization, Shot, StepResult, Trajectory
+from sim.results import Linearization, Shot, StepResult, Trajectory, carried
 
 if TYPE_CHECKING:
     from sim.simulator import Simulator
@@ -91,21 +91,27 @@ def rollout(
 ) -> Trajectory:
     """`Simulator.rollout` under wrenches (T, nbody, 6)."""
     if callable(us):
-        count = whole("Simulator.rollout(steps=...)", steps)
-        other, rows = _pushed(sim, "rollout", wrenches, np.zeros((count, sim.nu)))
+        steps = whole("Simulator.rollout(steps=...)", steps)
+        other, rows = _pushed(sim, "rollout", wrenches, np.zeros((steps, sim.nu)))
 
         def policy(time: float, state: Floats) -> Floats:
             more = rows[round(time / sim.time_step), sim.nu :]
             return np.concatenate([np.asarray(us(time, state), dtype=np.float64), more])
 
-        found = other.rollout(x, policy, steps=count, throw=throw)
+        inputs: Any = policy
     else:
         other, rows = _pushed(sim, "rollout", wrenches, _inputs(sim, "rollout", "us", us))
-        found = other.rollout(x, rows, steps=steps, throw=throw)
-    given = np.zeros((found.knot, sim.nbody, 6))
-    for name, wrench in _table(sim, "Simulator.rollout(wrenches=...)", wrenches, len(rows)).items():
-        given[:, sim.mechanism.body_names.index(name)] = wrench[: found.knot]
-    return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]), wrenches=given)
+        inputs = rows
+    table = _table(sim, "Simulator.rollout(wrenches=...)", wrenches, len(rows))
+
+    def own(found: Trajectory) -> Trajectory:
+        """Without the six inputs more, but with the wrenches that they were."""
+        given = np.zeros((found.knot, sim.nbody, 6))
+        for name, wrench in table.items():
+            given[:, sim.mechanism.body_names.index(name)] = wrench[: found.knot]
+        return replace(found, simulator=sim, u=np.ascontiguousarray(found.u[:, : sim.nu]), wrenches=given)
+
+    return carried(lambda: other.rollout(x, inputs, steps=steps, throw=throw), own)
 
 
 def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches, **options: Any) -> Shot:
@@ -121,8 +127,10 @@ def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches
         free = np.full(more, np.inf)
         low, high = (np.broadcast_to(np.asarray(b, dtype=np.float64), (sim.nu,)) for b in options["limits"])
         options["limits"] = np.concatenate([low, -free]), np.concatenate([high, free])
-    found = other.closed_loop(x0, inputs, **options)
-    return replace(found, u=np.ascontiguousarray(found.u[:, : sim.nu]))
+    return carried(
+        lambda: other.closed_loop(x0, inputs, **options),
+        lambda found: replace(found, u=np.ascontiguousarray(found.u[:, : sim.nu])),
+    )
 
 
 def linearize(

@@ -13,6 +13,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+_SOLVED, _SINGULAR, _UNFINISHED = int(Status.SOLVED), int(Status.SINGULAR), int(Status.MAX_ITERATIONS)
 _MAX_ITERATIONS = 50
 _ARMIJO = 0.1
 _MIN_STEP = 1e-10
@@ -91,7 +92,7 @@ def _newton_step(gradient: Vector, free: Integers, nfree: int, factor: Vector, p
 
 
 @kernel
-def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Integers, work: Vector) -> tuple[Status, int]:
+def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Integers, work: Vector) -> tuple[int, int]:
     """min 1/2 x^T H x + g^T x  subject to  lo <= x <= hi.
 
     x: (n,) start, overwritten by the solution; free: (n,) its leading entries become the indices not held by a bound.
@@ -110,7 +111,7 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
         nfree, same = _find_free(H, g, lo, hi, x, gradient, free)
         if nfree != nfactored or not same:
             if not factor_free(H, free, nfree, sub, work):
-                return Status.SINGULAR, nfree
+                return _SINGULAR, nfree
             nfactored = nfree
         size, scale = 0.0, 0.0
         for i in range(nfree):
@@ -121,8 +122,8 @@ def box_qp(H: Matrix, g: Vector, lo: Vector, hi: Vector, x: Vector, free: Intege
                 terms += abs(H[f, j] * x[j])
             scale = max(scale, terms)
         if size <= _TOLERANCE * scale:
-            return Status.SOLVED, nfree
+            return _SOLVED, nfree
         slope = _newton_step(gradient, free, nfree, work, trial, step)
         if not _search(H, gradient, lo, hi, slope, x, step, trial):
-            return Status.SOLVED, nfree  # rounding: no representable decrease is left
-    return Status.MAX_ITERATIONS, nfree
+            return _SOLVED, nfree  # rounding: no representable decrease is left
+    return _UNFINISHED, nfree

@@ -1,18 +1,17 @@
 """`@kernel`: Numba, its flags, and compiled code on disk, of cache.py. (Numba is imported here, in cache.py, code.py,
-lowering.py, arithmetic.py, lanes.py, late.py and record.py only.)
+lowering.py, arithmetic.py, lanes.py, late.py, record.py, clock.py and parallel.py only.)
 """
 
 from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from typing import Any, TypeVar, cast
 
 import numba
-from numba import prange
+from numba import types
 from numba.core.errors import NumbaError as CompilationError
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.serialize import custom_reduce
@@ -22,23 +21,23 @@ from solvers.cache import STORE, KernelCache, cache_folder
 from solvers.code import EntryCompiler, InnerCompiler
 
 __all__ = [
+    "FLAGS",
     "CompilationError",
     "cache_folder",
+    "cached",
     "compiled_signatures",
     "inlined",
     "inner_kernel",
     "kernel",
     "local_kernel",
-    "parallel_kernel",
-    "prange",
-    "threads",
+    "registered",
     "users_kernel",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # "contract": products and sums are fused where the processor can; nothing is assumed of infinities and NaN
-_FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
+FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}}
 _REGISTRY: list[Any] = []
 
 
@@ -48,12 +47,30 @@ _REGISTRY: list[Any] = []
 cpu_target.typing_context.refresh()
 
 
+def _is_plain(kind: Any) -> bool:
+    """Whether Numba makes a Python object of this type without running Python."""
+    if isinstance(kind, types.Tuple | types.UniTuple):
+        return all(map(_is_plain, kind))
+    return isinstance(kind, types.Integer | types.Float | types.Boolean | types.NoneType)
+
+
 class _Form(CPUDispatcher):
     """One of the two forms of a kernel."""
 
     def __init__(self, func: Callable[..., Any], compiler: Any, **flags: Any) -> None:
-        options = {"nopython": True, "boundscheck": None, **_FLAGS, "_nrt": False, "no_cfunc_wrapper": True, **flags}
+        options = {"nopython": True, "boundscheck": None, **FLAGS, "_nrt": False, "no_cfunc_wrapper": True, **flags}
         super().__init__(func, targetoptions=options, pipeline_class=compiler)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile or load; what returns a NamedTuple or an enum to Python is refused: Numba 0.68 runs Python to make
+        one, does not look whether that failed, and crashes where Ctrl-C, which came during the call, is heard there.
+        """
+        compiled = super().compile(sig)
+        for found in () if self.targetoptions.get("no_cpython_wrapper") else self.overloads.values():
+            if not _is_plain(kind := found.signature.return_type):
+                name = self.py_func.__qualname__
+                raise TypeError(f"kernel {name}: expected to return numbers and plain tuples to Python, got {kind}")
+        return compiled
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """How kernels see it: a constant argument is a number like any other, not a reason to compile anew."""
@@ -88,13 +105,13 @@ class Kernel:
     def entry(self) -> _Form:
         """The form with a way in for Python."""
         form = _Form(self.py_func, EntryCompiler)
-        return _cached(form) if self.keep else form
+        return cached(form) if self.keep else form
 
     @cached_property
     def inner(self) -> _Form:
         """The form without."""
         form = _Form(self.py_func, InnerCompiler, no_cpython_wrapper=True, **self.targetoptions)
-        return _cached(form, "inner") if self.keep else form
+        return cached(form, "inner") if self.keep else form
 
     @property
     def _numba_type_(self) -> Any:
@@ -106,14 +123,15 @@ class Kernel:
         return {s for form in ("entry", "inner") if form in vars(self) for s in vars(self)[form].overloads}
 
 
-def _cached(form: Any, name: str = "entry") -> Any:
+def cached(form: Any, name: str = "entry") -> Any:
     """The form, with its compiled code on disk; that of a function without a file is in memory."""
     if STORE.wanted and os.path.isfile(inspect.getfile(form.py_func)):
         form._cache = KernelCache(form.py_func, name)
     return form
 
 
-def _registered(kernel: Any) -> Any:
+def registered(kernel: Any) -> Any:
+    """The kernel, which `compiled_signatures` knows from now on."""
     _REGISTRY.append(kernel)
     return kernel
 
@@ -124,7 +142,7 @@ def kernel(func: F) -> F:
     A kernel cannot allocate: it fails to compile if it tries. That removes the reference counting of every array in
     every call (`_nrt=False`; in a prototype, one step of a 13-body tree went from 103 to 61 us).
     """
-    return func if numba.config.DISABLE_JIT else cast(F, _registered(Kernel(func)))
+    return func if numba.config.DISABLE_JIT else cast(F, registered(Kernel(func)))
 
 
 def inlined(func: F) -> F:
@@ -137,14 +155,14 @@ inner_kernel = kernel  # where only kernels call it
 
 def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
     """`func` compiled, or loaded, for arguments of these types, to be called by its address: Numba's result."""
-    form = _registered(_cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
+    form = registered(cached(_Form(func, EntryCompiler, no_cpython_wrapper=True)))
     form.compile(signature)
     return form.overloads[signature]
 
 
 def local_kernel(func: F) -> F:
     """A kernel made inside a function: Numba never finds such a closure in its cache, so it leaves no file there."""
-    return cast(F, _registered(Kernel(func, keep=False)))
+    return cast(F, registered(Kernel(func, keep=False)))
 
 
 def users_kernel(func: F) -> F:
@@ -154,28 +172,10 @@ def users_kernel(func: F) -> F:
     """
     if numba.config.DISABLE_JIT or isinstance(func, CPUDispatcher | Kernel):
         return func
-    return cast(F, numba.njit(**_FLAGS)(func))
-
-
-def parallel_kernel(func: F) -> F:
-    """Compile `func` with `prange` over the cores; allowed to allocate. Only for loops over whole knots or rollouts."""
-    if numba.config.DISABLE_JIT:
-        return func
-    return cast(F, _registered(_cached(numba.njit(parallel=True, **_FLAGS)(func))))
+    return cast(F, numba.njit(**FLAGS)(func))
 
 
 def compiled_signatures() -> dict[str, int]:
     """Kernels compiled or loaded so far in this process, by qualified name, with their number of signatures."""
     counts = {f"{k.py_func.__module__}.{k.py_func.__name__}": len(k.signatures) for k in _REGISTRY}
     return {name: count for name, count in counts.items() if count}
-
-
-@contextmanager
-def threads(count: int) -> Iterator[None]:
-    """Run `parallel_kernel` loops on `count` threads inside the block."""
-    before = numba.get_num_threads()
-    numba.set_num_threads(count)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(before)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
+from solvers.clock import PAUSE, seconds
 from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
 from solvers.jit import inlined, kernel
 from solvers.status import Status
@@ -24,6 +25,9 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+_SOLVED, _NOT_FINITE = int(Status.SOLVED), int(Status.NOT_FINITE)
+_LOOK = 16  # knots between two looks at the clock
 
 
 class Quadratic(NamedTuple):
@@ -183,11 +187,29 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vec
     return d0, d1
 
 
-@kernel
 def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
     """Gains K (T, m, n), k (T, m) of the regularised model, and what the full step promises.
 
-    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),).
+    k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),). The horizon is gone
+    through in pieces, with Python between them, which hears Ctrl-C there.
+    """
+    left, gradient = len(K), 0.0
+    while True:
+        until = (left, gradient, seconds() + PAUSE)
+        status, left, d0, d1, gradient = backward_knots(quad, reg, K, k, free, buffer, until)
+        if left == 0 or status != _SOLVED:
+            return Promise(Status(status), max(left - 1, 0), d0, d1, gradient)
+
+
+@kernel
+def backward_knots(
+    quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector,
+    until: tuple[int, float, float],
+) -> tuple[int, int, float, float, float]:  # fmt: skip
+    """`backward` for the first so many knots, those after them done; until: their number, the gradient so far, and the
+    moment to pause [s].
+
+    Returns the fields of the Promise, with the number of knots that are left in the place of the knot.
     """
     T, m, n = K.shape
     p = n + m
@@ -203,21 +225,24 @@ def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: In
     Huu, v, dx = buffer[e:f].reshape((m, m)), buffer[f : f + n], buffer[f + n : h]
     q, z, y = buffer[h : h + p], buffer[h + p : h + 2 * p], buffer[h + 2 * p : h + 3 * p]
     w, box = buffer[h + 3 * p : h + 3 * p + m], buffer[h + 3 * p + m :]
-    for i in range(n):
-        v[i] = quad.g[T, i]
-        for j in range(n):
-            V[i, j] = quad.H[T, i, j]
-    gradient = 0.0
-    for t in range(T - 1, -1, -1):
+    left, gradient, deadline = until
+    if left == T:
+        for i in range(n):
+            v[i] = quad.g[T, i]
+            for j in range(n):
+                V[i, j] = quad.H[T, i, j]
+    for t in range(left - 1, -1, -1):
         _action_value(quad, t, V, v, FV, Q, q)
         _regularize(reg, FV[0], Q, Huu, Z)
         status, nfree = box_qp(Huu, q[n:], quad.lo[t], quad.hi[t], k[t], free, box)
-        if status != Status.SOLVED:
-            return Promise(status, t, 0.0, 0.0, gradient)
+        if status != _SOLVED:
+            return status, t + 1, 0.0, 0.0, gradient
         for i in range(nfree):
             gradient = max(gradient, abs(q[n + free[i]]))
         _gains(Z, free, nfree, box, K[t])
         _value(K[t], k[t], Q, q, CD, Huu, w, V, v)
+        if t % _LOOK == _LOOK - 1 and seconds() > deadline:
+            return _SOLVED, t, 0.0, 0.0, gradient
     d0, d1 = _predict(quad, K, k, z, y, dx)
     finite = abs(d0) < np.inf and abs(d1) < np.inf
-    return Promise(Status.SOLVED if finite else Status.NOT_FINITE, 0, d0, d1, gradient)
+    return _SOLVED if finite else _NOT_FINITE, 0, d0, d1, gradient

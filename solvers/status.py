@@ -8,7 +8,7 @@ __all__ = ["MESSAGES", "Status"]
 
 
 class Status(IntEnum):
-    """Exit of a time step (below 10) or of the planner (10 and above); `IntEnum`, so kernels return it."""
+    """Exit of a time step (below 10), of the planner (10 and above), or of both; `IntEnum`, so kernels return it."""
 
     SOLVED = 0
     MAX_ITERATIONS = 1
@@ -27,6 +27,7 @@ class Status(IntEnum):
     SIMULATION_FAILED = 13
     INFEASIBLE = 14
     STOPPED = 15
+    INTERRUPTED = 16
 
     def __str__(self) -> str:
         """The name, where an IntEnum prints its number."""
@@ -50,4 +51,5 @@ MESSAGES: dict[Status, str] = {
     Status.SIMULATION_FAILED: "The simulator could not step along the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
+    Status.INTERRUPTED: "Ctrl-C ended it before it was done.",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from dojo_opt.bridges.jax_call import called
 from dojo_opt.bridges.rollouts import Functions, Rollouts
 from dojo_opt.parameter_space import ParameterSpace
 from sim.simulator import Simulator
@@ -69,13 +70,9 @@ def _states(jax: Any, core: Rollouts) -> Any:
     """`core.states` of arrays of JAX, with its pullback."""
     nx = core.sim.nx
 
-    def array(*shape: int) -> Any:
-        return jax.ShapeDtypeStruct(shape, "float64")
-
     @jax.custom_vjp
     def states(x0: Any, us: Any, theta: Any) -> Any:
-        xs = array(us.shape[0] + 1, nx)
-        return jax.pure_callback(core.states, xs, x0, us, theta, vmap_method="broadcast_all")
+        return called(core.all_states, ((us.shape[0] + 1, nx),), x0, us, theta)[0]
 
     def forward(x0: Any, us: Any, theta: Any) -> Any:
         xs = states(x0, us, theta)
@@ -83,8 +80,7 @@ def _states(jax: Any, core: Rollouts) -> Any:
 
     def backward(kept: Any, by_xs: Any) -> Any:
         xs, us, theta = kept
-        gradients = (array(nx), array(*us.shape), array(*theta.shape))
-        return jax.pure_callback(core.pullback, gradients, xs, us, theta, by_xs, vmap_method="broadcast_all")
+        return called(core.pullback, ((nx,), us.shape, theta.shape), xs, us, theta, by_xs)
 
     states.defvjp(forward, backward)
     return states

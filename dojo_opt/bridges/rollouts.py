@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,8 +21,12 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 _KEPT = 64  # simulators of other parameters, from a rollout to its gradient
-# frameworks call from threads of their own; the loops of Numba over cores may be entered by one of them at a time
-_ONE_AT_A_TIME = threading.Lock()
+
+
+@lru_cache(1)
+def _threads(process: int) -> ThreadPoolExecutor:
+    """One per core; a forked process has none of those of its parent."""
+    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="dojo-opt bridge")
 
 
 class Functions(NamedTuple):
@@ -71,17 +74,18 @@ class Rollouts:
         """xs (..., T + 1, nx). An unsolved step raises SimulationError."""
         x0s, inputs, thetas, lead = self._rows(x0, us, theta)
         out = np.empty((len(x0s), inputs.shape[1] + 1, self.sim.nx))
-        with _ONE_AT_A_TIME:
-            if len(x0s) > 1 and thetas.shape[1] == 0:
-                batch = self.sim.rollout_batch(x0s, inputs)
-                out[:] = batch.x
-                for row in np.flatnonzero(batch.status != Status.SOLVED)[:1]:
-                    self._roll(x0s[row], inputs[row], thetas[row], f"row {row}: ")
-            else:
-                self._each(
-                    len(x0s), lambda i: np.copyto(out[i], self._roll(x0s[i], inputs[i], thetas[i], f"row {i}: "))
-                )
+        if len(x0s) > 1 and thetas.shape[1] == 0:
+            batch = self.sim.rollout_batch(x0s, inputs)
+            out[:] = batch.x
+            for row in np.flatnonzero(batch.status != Status.SOLVED)[:1]:
+                self._roll(x0s[row], inputs[row], thetas[row], f"row {row}: ")
+        else:
+            self._each(len(x0s), lambda i: np.copyto(out[i], self._roll(x0s[i], inputs[i], thetas[i], f"row {i}: ")))
         return out.reshape(*lead, *out.shape[1:])
+
+    def all_states(self, x0: Any, us: Any, theta: Any) -> tuple[Floats]:
+        """`states` as the only result of several."""
+        return (self.states(x0, us, theta),)
 
     def pullback(self, xs: Any, us: Any, theta: Any, by_xs: Any) -> tuple[Floats, Floats, Floats]:
         """Gradients by x0 (..., nx), us (..., T, nu) and theta (..., n) from those by xs (..., T + 1, nx)."""
@@ -94,8 +98,7 @@ class Rollouts:
         def one(i: int) -> None:
             by_dx0[i], by_us[i], by_theta[i] = self._gradient(paths[i], inputs[i], thetas[i], losses[i])
 
-        with _ONE_AT_A_TIME:
-            self._each(len(paths), one)
+        self._each(len(paths), one)
         by_x0 = self._cotangents.ambient(paths[:, 0], by_dx0)
         return (
             by_x0.reshape(*lead, self.sim.nx),
@@ -121,11 +124,7 @@ class Rollouts:
         if count > 0:
             work(0)
         if count > 1:
-            list(self._threads.map(work, range(1, count)))
-
-    @cached_property
-    def _threads(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="dojo-opt bridge")
+            list(_threads(os.getpid()).map(work, range(1, count)))
 
     def _made(self, theta: bytes) -> Simulator:
         assert self._space is not None

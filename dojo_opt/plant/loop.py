@@ -13,7 +13,7 @@ from dojo_opt.mpc.tick import Tick
 from dojo_opt.names import chosen_components
 from dojo_opt.plant.plant import Plant
 from sim import checks
-from sim.results import Contacts
+from sim.results import Contacts, Interrupted
 from sim.simulator import Simulator
 from solvers.status import MESSAGES, Status
 
@@ -85,6 +85,8 @@ def closed_loop(
                   the plant, its answer held in between
     reference     times (n,) -> states (n, nx) for the error; that of the controller by default
     fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
+
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
     """
     if not isinstance(plant, Plant):
         raise TypeError(f"closed_loop(plant): expected a Plant, as Plant(simulator), got {plant!r}")
@@ -100,16 +102,27 @@ def closed_loop(
     plant.reset()
     if hasattr(controller, "reset"):
         controller.reset()
-    run = _drive(controller, plant, steps, every, plant.fallen if fallen is None else fallen)
+    run = _Run([plant.x])
     if reference is None:
         reference = getattr(getattr(controller, "references", None), "state", None)
+    try:
+        _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen)
+    except KeyboardInterrupt:
+        run.survived, run.message = False, MESSAGES[Status.INTERRUPTED]
+        raise Interrupted(_closed_loop(run, controller, plant, reference)) from None
+    return _closed_loop(run, controller, plant, reference)
+
+
+def _closed_loop(run: _Run, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
+    """What was kept of the steps, as arrays."""
+    h, count = plant.sim.time_step, len(run.u)
     return ClosedLoop(
         simulator=plant.simulator,
-        time=h * np.arange(len(run.x), dtype=np.float64),
-        x=np.array(run.x),
-        u=np.array(run.u).reshape(len(run.u), plant.simulator.nu),
+        time=h * np.arange(count + 1.0),
+        x=np.array(run.x[: count + 1]),
+        u=np.array(run.u).reshape(count, plant.simulator.nu),
         status=np.array(run.status, dtype=np.int64),
-        contacts=_stacked(plant.simulator, run.contacts),
+        contacts=_stacked(plant.simulator, run.contacts[:count]),
         survived=run.survived,
         message=run.message,
         softened=plant.softened,
@@ -130,9 +143,11 @@ class _Run:
     message: str = "Ran to the end."
 
 
-def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]) -> _Run:
+def _drive(
+    run: _Run, controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]
+) -> None:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
-    run, command = _Run([plant.x]), np.zeros(plant.sim.nu)
+    command = np.zeros(plant.sim.nu)
     for k in range(steps):
         if k % every == 0:
             command = checks.array(
@@ -143,13 +158,12 @@ def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: C
         if result.status != Status.SOLVED:
             run.message, run.survived = f"Plant, step {k}: {MESSAGES[result.status]}", False
             break
-        run.x.append(plant.x)
-        run.u.append(u)
         run.contacts.append(result.contacts)
+        run.x.append(plant.x)
+        run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
         if lies(plant.x):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
-    return run
 
 
 def _stacked(sim: Simulator, steps: Sequence[Contacts]) -> Contacts:

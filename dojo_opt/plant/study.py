@@ -18,6 +18,7 @@ from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim import checks
 from sim.border import whole
+from sim.results import Interrupted
 
 Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]
@@ -95,11 +96,13 @@ def monte_carlo(
 
     controller  an `MPC`, or a function of (time, x) without memory
     sampler     generator -> Perturbation; with an executor that uses processes, a function or object they can import
-    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
-                context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
+    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor, Dask's
+                `client.get_executor()`, Ray's or MPI's pools
 
     Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
     number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
+
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the Study of the runs that are done.
     """
     count = whole("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):
@@ -113,10 +116,17 @@ def monte_carlo(
     checks.number("monte_carlo(duration)", duration, above=0.0)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), control_step, child) for child in children]
-    if executor is None:
-        return Study([_run(*task) for task in tasks], float(duration), seed)
-    futures = [executor.submit(_run, *task) for task in tasks]
-    return Study([future.result() for future in futures], float(duration), seed)
+    futures: list[Any] = []
+    outcomes: list[Outcome] = []
+    try:
+        futures += [] if executor is None else [executor.submit(_run, *task) for task in tasks]
+        for i, task in enumerate(tasks):
+            outcomes.append(futures[i].result() if futures else _run(*task))
+    except KeyboardInterrupt:
+        for future in futures:
+            future.cancel()
+        raise Interrupted(Study(outcomes, float(duration), seed) if outcomes else None) from None
+    return Study(outcomes, float(duration), seed)
 
 
 def _run(

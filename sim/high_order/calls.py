@@ -8,14 +8,16 @@ import numpy as np
 
 from sim import bodies, coordinates
 from sim.bind import bind_smooth
-from sim.calls import CONTACT, REPORT, Calls, Floats
+from sim.calls import CONTACT, REPORT, Calls, Floats, follow, interrupted
 from sim.high_order import runge_kutta
 from sim.high_order.hamilton_gradient import Slopes
 from sim.high_order.tableau import stable, tableau
 from sim.high_order.tangents import Tangents
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
+from sim.pace import pieces
 from sim.policy import Path, Policy
+from sim.results import Interrupted
 from sim.rollout import Linearized
 from sim.settings import Settings
 from solvers.status import Status
@@ -40,23 +42,41 @@ class HighOrder(Calls):
         scratch = (*(np.zeros(nv) for _ in range(3)), *(np.zeros((s, nv)) for _ in range(2)))
         return runge_kutta.Scheme(a, b, free_roots(self.model), *scratch)
 
+    def _tables(self) -> tuple[Integers, Integers, Vector]:
+        """Tables of the Model and of this thread's first Work, and settings."""
+        return self._table(bind_smooth), self._scratch.table(), self.settings.array()
+
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """As Calls.roll; without contacts."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
+        contacts = np.zeros((steps, 0, CONTACT))
         xs[0] = x
-        knot = runge_kutta.roll(
-            self._table(bind_smooth), self._scratch.table(), self.settings.time_step, self._scheme(), us, xs, reports
-        )
-        return int(knot), xs, reports, np.zeros((steps, 0, CONTACT))
+        model, work, settings, scheme = *self._tables(), self._scheme()
+        knot = 0
+        try:
+            for _ in pieces(settings, steps):
+                knot = int(runge_kutta.roll(model, work, settings, scheme, us, xs, reports, knot))
+                if knot == steps or reports[knot, 0] != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted((knot, xs, interrupted(reports, knot), contacts)) from None
+        return knot, xs, reports, contacts
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
         """As Calls.roll_batch, on one core."""
         n, steps = us.shape[:2]
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+        xs[:, 0] = x0s
         for i in range(n):
-            knots[i], xs[i], reports, _ = self.roll(x0s[i], us[i])
+            try:
+                knots[i], xs[i], reports, _ = self.roll(x0s[i], us[i])
+            except KeyboardInterrupt as stop:
+                status[i:] = Status.INTERRUPTED
+                if isinstance(stop, Interrupted):
+                    knots[i], xs[i], *_ = stop.result
+                raise Interrupted((xs, status, knots)) from None
             status[i] = reports[min(knots[i], steps - 1), 0] if steps else Status.SOLVED
         return xs, status, knots
 
@@ -127,8 +147,12 @@ class HighOrder(Calls):
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         line = Linearized(xs, us, A, B, x_next, reports)
-        h = self.settings.time_step
-        runge_kutta.linearize(self._model, self._scratch.table(), h, self._scheme(), substeps, line, self._tangents())
+        model, work, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
+        step = 0
+        for _ in pieces(settings, n * substeps):
+            step = int(runge_kutta.linearize(model, work, settings, scheme, substeps, line, tangents, step))
+            if step == n * substeps:
+                break
         unsolved = reports[:, 0] != Status.SOLVED
         for array in (A, B, x_next):
             array[unsolved] = 0.0
@@ -162,11 +186,15 @@ class HighOrder(Calls):
     ) -> tuple[int, Path]:
         """As Calls.closed_loop."""
         path = self._path(len(policy.us), keep=keep)
-        h = self.settings.time_step
-        knot = runge_kutta.closed_loop(
-            self._table(bind_smooth), self._scratch.table(), h, self._scheme(), x, policy, alpha, limits, substeps, path
-        )
-        return int(knot), path
+        path.xs[0] = x
+        model, work, settings, scheme = *self._tables(), self._scheme()
+
+        def go_on(first: int) -> int:
+            return int(
+                runge_kutta.closed_loop(model, work, settings, scheme, policy, alpha, limits, substeps, path, first)
+            )
+
+        return follow(go_on, settings, path, substeps), path
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
         """Refused."""

@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 
 from sim import rollout
 from sim.bind import bind_smooth, bind_step
-from sim.calls import CONTACT, REPORT, Calls, Floats
+from sim.calls import CONTACT, REPORT, Calls, Floats, interrupted
 from sim.high_order import legendre, phases
 from sim.high_order.calls import HighOrder
 from sim.high_order.hamilton_gradient import Slopes
 from sim.model import Integers, Model, Vector
+from sim.pace import pieces
 from sim.policy import Path, Policy
+from sim.results import Interrupted
 from sim.settings import Settings
 from solvers.status import Status
 
@@ -61,26 +63,43 @@ class Phased(HighOrder):
             np.zeros(steps, dtype=bool),
         )
         out.xs[0] = x
-        tables = self._table(bind_smooth, bind_step), self._scratch.table(), self.settings.array(kappa)
-        scheme, t, mean = self._scheme(), 0, None
-        while t < steps:
-            taken, why = phases.roll_far(*tables, scheme, us[t:], out.xs[t:], out.reports[t:], out.contacts[t:])
-            t += taken
-            if why != phases.NEAR:
-                break
-            if taken or mean is None:
-                status, mean = self._second.start(out.xs[t, : self.sizes.nq], out.xs[t, self.sizes.nq :])
-                if status != Status.SOLVED:
-                    out.reports[t] = status, 0.0, np.inf, 0.0, -1.0
+        t, mean = 0, None
+        try:
+            while t < steps:
+                taken, why = self._fly(phases.Flight(us[t:], out.xs[t:], out.reports[t:], out.contacts[t:]), kappa)
+                t += taken
+                if why != phases.NEAR:
                     break
-            taken, mean = self._stay(out, t, us, mean, kappa)
-            t += taken
-            if mean is None:
-                break
+                if taken or mean is None:
+                    status, mean = self._second.start(out.xs[t, : self.sizes.nq], out.xs[t, self.sizes.nq :])
+                    if status != Status.SOLVED:
+                        out.reports[t] = status, 0.0, np.inf, 0.0, -1.0
+                        break
+                taken, mean = self._stay(out, t, us, mean, kappa)
+                t += taken
+                if mean is None:
+                    break
+        except KeyboardInterrupt as stop:
+            t += stop.result if isinstance(stop, Interrupted) else int(out.near[t:].sum())
+            raise Interrupted((t, out.xs, interrupted(out.reports, t), out.contacts)) from None
         self._last.near = bool(t and out.near[t - 1])
         if t < steps:
             np.nan_to_num(out.reports[t], copy=False, nan=np.inf, posinf=np.inf)
         return out._replace(knot=t)
+
+    def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
+        """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
+        model, work = self._table(bind_smooth, bind_step), self._scratch.table()
+        settings, scheme = self.settings.array(kappa), self._scheme()
+        taken, why = 0, int(Status.SOLVED)
+        try:
+            for _ in pieces(settings, len(flight.us)):
+                taken, why = phases.roll_far(model, work, settings, scheme, flight, taken)
+                if taken == len(flight.us) or why != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted(taken) from None
+        return int(taken), int(why)
 
     def _stay(self, out: March, first: int, us: Floats, mean: Vector, kappa: float | None) -> tuple[int, Vector | None]:
         """Steps of order 2 from the state `mean` at step `first` until all is far: their number, and the last state.
@@ -92,10 +111,13 @@ class Phased(HighOrder):
         while t < len(us):
             count = min(piece, len(us) - t)
             means = np.zeros((count + 1, self.nx))
-            rows = slice(t, t + count)
-            solved = int(
-                rollout.roll(model, work, settings, mean, us[rows], means, out.reports[rows], out.contacts[rows])
-            )
+            means[0] = mean
+            rows, solved = slice(t, t + count), 0
+            line = us[rows], means, out.reports[rows], out.contacts[rows]
+            for _ in pieces(settings, count):
+                solved = int(rollout.roll(model, work, settings, *line, solved))
+                if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
+                    break
             nodes = means[1 : solved + 1].copy()
             nodes[:, nq:] = self._second.node_velocities(nodes)
             far = phases.first_far(self._model, self._scratch.table(), settings, self._scheme(), nodes)
@@ -135,10 +157,14 @@ class Phased(HighOrder):
         path.xs[0] = x
         total = 0.0
         for t in range(knots):
-            dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
-            path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
-            m = self.march(path.xs[t], np.repeat(path.us[t : t + 1], substeps, axis=0), kappa)
-            path.report[:] = m.reports[min(m.knot, substeps - 1)]
+            try:
+                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
+                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
+                m = self.march(path.xs[t], np.repeat(path.us[t : t + 1], substeps, axis=0), kappa)
+            except KeyboardInterrupt:
+                interrupted(path.report[None], 0)
+                raise Interrupted((t, path)) from None
+            path.report[:REPORT] = m.reports[min(m.knot, substeps - 1)]
             if m.knot < substeps:
                 return t, path
             total += m.reports[:, 1].sum()

@@ -14,6 +14,7 @@ Columns of `far` here, at the first contact of a cluster:  0 gap, 1 speed, of th
 from __future__ import annotations
 
 from math import cos, sin, sqrt
+from typing import NamedTuple
 
 from sim.contacts.confined import IDLE
 from sim.contacts.far import cluster_gap, highest
@@ -21,10 +22,11 @@ from sim.high_order.runge_kutta import Scheme, advance, begin
 from sim.late import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
+from sim.pace import is_due, start_pace
 from sim.rollout import Cube
 from sim.rotation import cross, quat_matrix, quat_turn
 from sim.work import Work
-from solvers.dense import copy
+from solvers.dense import copy, copy_vector
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -145,25 +147,35 @@ def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
     copy(work.quat3, work.quat2)
 
 
+class Flight(NamedTuple):
+    """Steps while all is far."""
+
+    us: Matrix  # (T, nu) in
+    xs: Matrix  # (T + 1, nx), of which xs[0] is given
+    reports: Matrix  # (T, 5)
+    contacts: Cube  # (T, ncontact, 11)
+
+
 @kernel
 def roll_far(
-    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, us: Matrix, xs: Matrix, reports: Matrix,
-    contacts: Cube,
-) -> tuple[int, int]:  # fmt: skip
-    """xs[t + 1] = step(xs[t], us[t]) from xs[0] while all is far.
+    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
+) -> tuple[int, int]:
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is far.
 
-    Returns how many steps were taken, and why no more: SOLVED at the end of us, NEAR, or the Status of the next.
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 6); contacts: (T, ncontact, 11).
+    Returns how many steps were taken, and why no more: SOLVED at the end of us or after the deadline, NEAR, or the
+    Status of the next.
     """
     model = model_view(model_at)
     work = work_view(work_at)
     nq = work.theta1.shape[0]
     h, kappa = settings[0], settings[1]
-    begin(model, work, scheme, xs[0])
-    for t in range(us.shape[0]):
+    us, xs, reports = flight.us, flight.xs, flight.reports
+    start_pace(work, settings)
+    if first == 0:
+        begin(model, work, scheme, xs[0])
+    for t in range(first, us.shape[0]):
         x = xs[t + 1]
-        for k in range(x.shape[0]):
-            x[k] = xs[t, k]
+        copy_vector(xs[t], x)
         allowed = _allowed(scheme, settings[2])
         if left_out(model, work, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
@@ -174,5 +186,7 @@ def roll_far(
             return t, status
         if left_out(model, work, kappa, x[nq:], h) > allowed:
             return t, NEAR
-        _report(model, work, h, contacts[t])
+        _report(model, work, h, flight.contacts[t])
+        if is_due(work, reports[t, 1]):
+            return t + 1, _SOLVED
     return us.shape[0], _SOLVED

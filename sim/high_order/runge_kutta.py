@@ -29,11 +29,12 @@ from sim.high_order.tangents import Tangents, first_tangents, keep_tangents, las
 from sim.kinematics import displace
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Model, Vector
+from sim.pace import is_due, start_pace
 from sim.policy import Path, Policy
 from sim.rollout import Linearized
 from sim.state import integrate_state, state_difference
 from sim.work import Work
-from solvers.dense import dot
+from solvers.dense import copy_vector, dot
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -147,43 +148,57 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
 
 @kernel
 def roll(
-    model_at: Table, work_at: Table, h: float, scheme: Scheme, us: Matrix, xs: Matrix, reports: Matrix
+    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, us: Matrix, xs: Matrix, reports: Matrix,
+    first: int,
 ) -> int:  # fmt: skip
-    """xs[t + 1] = step(xs[t], us[t]) from xs[0]; returns the number of steps that were possible.
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of steps that were possible.
 
     us: (T, nu); xs: (T + 1, nx); reports: (T, 6).
     """
     model = model_view(model_at)
     work = work_view(work_at)
-    begin(model, work, scheme, xs[0])
-    for t in range(us.shape[0]):
+    start_pace(work, settings)
+    if first == 0:
+        begin(model, work, scheme, xs[0])
+    for t in range(first, us.shape[0]):
         for k in range(xs.shape[1]):
             xs[t + 1, k] = xs[t, k]
-        status = advance(model, work, scheme, h, us[t], xs[t + 1], None)
+        status = advance(model, work, scheme, settings[0], us[t], xs[t + 1], None)
         reports[t, 0] = status
         reports[t, 1] = scheme.b.shape[0]
         reports[t, 4] = -1.0
         if status != _SOLVED:
             return t
+        if is_due(work, reports[t, 1]):
+            return t + 1
     return us.shape[0]
 
 
 @kernel
 def linearize(
-    model_at: Table, work_at: Table, h: float, scheme: Scheme, substeps: int, line: Linearized, tangents: Tangents
-) -> None:
-    """Derivatives of all knots of `substeps` steps each, carried through every stage."""
+    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, substeps: int, line: Linearized,
+    tangents: Tangents, first: int,
+) -> int:  # fmt: skip
+    """Derivatives of the knots, of `substeps` steps each, from the step `first` of all on, carried through every stage;
+    returns the step that is next.
+    """
     model = model_view(model_at)
     work = work_view(work_at)
-    for t in range(line.us.shape[0]):
+    start_pace(work, settings)
+    for t in range(first // substeps, line.us.shape[0]):
         x, report = line.x_next[t], line.reports[t]
-        for k in range(x.shape[0]):
-            x[k] = line.xs[t, k]
-        begin(model, work, scheme, x)
-        status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
-        for _ in range(substeps):
+        status, before = _SOLVED, max(first - t * substeps, 0)
+        if before == 0:
+            copy_vector(line.xs[t], x)
+            begin(model, work, scheme, x)
+            status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
+        due = False
+        for s in range(before, substeps):
+            if due:
+                return t * substeps + s
             if status == _SOLVED:
-                status = advance(model, work, scheme, h, line.us[t], x, tangents)
+                status = advance(model, work, scheme, settings[0], line.us[t], x, tangents)
+                due = is_due(work, float(scheme.b.shape[0] * work.nu.shape[0]))
         if status == _SOLVED and not last_tangents(model, work, scheme.free, line.us[t], tangents):
             status = _SINGULAR
         report[0], report[1], report[4] = status, substeps * scheme.b.shape[0], -1.0
@@ -193,12 +208,15 @@ def linearize(
                 line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], work.columns[d, k]
             for k in range(line.us.shape[1]):
                 line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], work.columns[d, 2 * nv + k]
+        if due:
+            return (t + 1) * substeps
+    return line.us.shape[0] * substeps
 
 
 @kernel
 def closed_loop(
-    model_at: Table, work_at: Table, h: float, scheme: Scheme, x: Vector, policy: Policy, alpha: float,
-    limits: tuple[Vector, Vector], substeps: int, path: Path,
+    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, policy: Policy, alpha: float,
+    limits: tuple[Vector, Vector], substeps: int, path: Path, first: int,
 ) -> int:  # fmt: skip
     """As sim/policy.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
     model = model_view(model_at)
@@ -206,26 +224,30 @@ def closed_loop(
     low, high = limits
     ndx = policy.gaps.shape[1]
     dx = work.chain[0][:ndx]
-    for k in range(x.shape[0]):
-        path.xs[0, k] = x[k]
-    for t in range(path.us.shape[0]):
+    start_pace(work, settings)
+    for t in range(first // substeps, path.us.shape[0]):
         u, b = path.us[t], path.xs[t + 1]
         state_difference(model, policy.xs[t], path.xs[t], dx)
         for j in range(u.shape[0]):
             f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
             u[j] = min(max(f, low[j]), high[j])
-        for k in range(x.shape[0]):
-            b[k] = path.xs[t, k]
-        begin(model, work, scheme, b)
-        for _ in range(substeps):
-            path.report[0] = advance(model, work, scheme, h, u, b, None)
+        before, due = max(first - t * substeps, 0), False
+        if before == 0:
+            copy_vector(path.xs[t], b)
+            begin(model, work, scheme, b)
+        for s in range(before, substeps):
+            if due:
+                return t * substeps + s
+            path.report[0] = advance(model, work, scheme, settings[0], u, b, None)
             path.report[1] += scheme.b.shape[0]
             if path.report[0] != _SOLVED:
-                return t
+                return t * substeps + s
+            due = is_due(work, float(scheme.b.shape[0]))
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
-            for k in range(x.shape[0]):
-                work.step_x[0, k] = b[k]
+            copy_vector(b, work.step_x[0])
             integrate_state(model, work.step_x[0], dx, b)
-    return path.us.shape[0]
+        if due:
+            return (t + 1) * substeps
+    return path.us.shape[0] * substeps

@@ -15,11 +15,13 @@ from sim.elimination_panel import column_count, solve_panel
 from sim.late import add_height_gradient, solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
+from sim.pace import DEADLINE
 from sim.parameters.columns import clear_columns, fill_columns
 from sim.parameters.effects import At, Effect
 from sim.rollout import Cube, Linearized, linearize
 from sim.rotation import left_jacobian
 from sim.work import Work
+from solvers.clock import seconds
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -37,8 +39,8 @@ class Sweep(NamedTuple):
     A: Cube  # (1, ndx, ndx) of one step
     B: Cube  # (1, ndx, nu)
     x_next: Matrix  # (1, nx)
-    report: Matrix  # (1, 6)
-    costate: Matrix  # (2, ndx) out, the first row: dL/dx_0
+    report: Matrix  # (1, 6) of the last step that was tried; zeros at first
+    costate: Matrix  # (2, ndx) in and out, the first row: dL/dx_T at first, dL/dx_0 in the end
     inputs: Matrix  # (T, nu) out
     parameters: Vector  # (nparameter,) out
     w: Vector  # (nv,) gradient by v25
@@ -57,23 +59,24 @@ def sweep(
     line: Sweep,
     terms: IntegerMatrix,
     weights: Vector,
+    left: int,
 ) -> int:
-    """Gradients of the loss; returns the step that was not solved, -1 when all were."""
+    """Gradients of the loss by the first `left` steps; returns how many are still left.
+
+    Without the report of an unsolved step, which is the last of those left, that is none, or the deadline is over.
+    """
     model = model_view(model_at)
     work = work_view(work_at)
     n = line.costate.shape[1]
     nq = line.xs.shape[1] - n // 2
     costate, before = line.costate[0], line.costate[1]
-    steps = line.us.shape[0]
-    for k in range(n):
-        costate[k] = line.loss[steps, k]
-    for t in range(steps - 1, -1, -1):
+    for t in range(left - 1, -1, -1):
         for k in range(line.xs.shape[1]):
             line.x_next[0, k] = line.xs[t + 1, k]
         one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], line.A, line.B, line.x_next, line.report)
-        linearize(model_at, work_at, settings, (0, 1), 1, one)
+        linearize(model_at, work_at, settings, (0, 0, 1), 1, one)
         if line.report[0, 0] != _SOLVED:
-            return t
+            return t + 1
         if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
             at = At(settings[0], line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
             _add_parameters(model, work, at, line, terms, weights)
@@ -89,7 +92,9 @@ def sweep(
                 before[j] += line.A[0, i, j] * costate[i]
         for j in range(n):
             costate[j] = before[j]
-    return -1
+        if seconds() > settings[DEADLINE]:
+            return t
+    return 0
 
 
 @kernel

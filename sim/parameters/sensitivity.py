@@ -9,6 +9,7 @@ from sim.bind import bind_heights, bind_parameters
 from sim.calls import REPORT, Calls
 from sim.mechanism import Mechanism
 from sim.model import Vector
+from sim.pace import pieces
 from sim.parameters.adjoint import Sweep, sweep
 from sim.parameters.effects import At
 from sim.parameters.gradients import parameter_jacobian
@@ -110,8 +111,12 @@ def adjoint_sweep(
         return adjoint_products(calls, line, kappa), line
     needs = (bind_parameters, bind_heights) if len(plan.heights) else (bind_parameters,)
     model, work = calls.tables(*needs[: 2 if plan.size else 0])
-    settings = calls.settings.array(kappa)
-    knot = int(sweep(model, work, settings, line, plan.terms, plan.weights))
+    settings, left = calls.settings.array(kappa), len(us)
+    line.costate[0] = loss[-1]
+    for _ in pieces(settings, left):
+        left = int(sweep(model, work, settings, line, plan.terms, plan.weights, left))
+        if left == 0 or line.report[0, 0] != Status.SOLVED:
+            break
     if len(plan.heights):
         _add_heights(mech, plan, line.heights, line.parameters[None])
-    return knot, line
+    return left - 1, line

@@ -1,0 +1,112 @@
+"""Ctrl-C during plans, closed loops and studies: the process goes on, and has what was done until then."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from interrupts import heard
+from programs import HOME
+
+import dojo_opt as dojo
+from solvers.jit import local_kernel
+from solvers.status import Status
+
+TROT = dojo.problems.trot(cycles=30)
+ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [0.02, 0.1, 0.2, 0.5, 1.0])
+def test_a_plan_that_ctrl_c_ends_is_the_one_of_its_last_iteration(after: float) -> None:
+    dojo.ilqr(dojo.problems.trot(), max_iterations=2)
+    plan = heard(lambda: dojo.ilqr(TROT, **ENDLESS), after)
+    if plan is None:  # while the first iterate was made
+        assert after < 0.2
+        return
+    assert plan.status == dojo.Status.INTERRUPTED
+    assert not plan.success
+    assert "Ctrl-C" in plan.message
+    assert plan.x.shape == (TROT.horizon + 1, TROT.sim.nx)
+    again = dojo.ilqr(TROT, warm_start=plan, max_iterations=1)
+    assert np.isfinite(again.fun)
+
+
+@pytest.mark.slow
+def test_a_plan_after_interrupted_ones_is_the_same() -> None:
+    problem = dojo.problems.hop()
+    expected = dojo.ilqr(problem)
+    long = dojo.problems.trot(cycles=10)
+    for after in (0.01, 0.03, 0.1):
+        heard(lambda: dojo.ilqr(long, **ENDLESS), after)
+    np.testing.assert_array_equal(dojo.ilqr(problem).x, expected.x)
+
+
+@pytest.mark.slow
+def test_closed_loops_and_studies_keep_what_they_have() -> None:
+    mpc = dojo.tasks.hopper_mpc()
+    plant = dojo.tasks.plant(mpc, 2e-3)
+    dojo.closed_loop(mpc, plant, 0.05)
+    loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0), 2.0)
+    assert loop.message == "Ctrl-C ended it before it was done."
+    assert not loop.survived
+    assert len(loop.x) == len(loop.u) + 1 == len(loop.time) == len(loop.contacts.gap) + 1 > 1
+    expected = dojo.closed_loop(mpc, plant, loop.duration)
+    np.testing.assert_array_equal(expected.x, loop.x)
+    study = heard(lambda: mpc.monte_carlo(plant, lambda rng: dojo.Perturbation(), 0.02, runs=2_000), 2.0)
+    assert len(study.outcomes) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
+def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
+    program = (
+        "import dojo_opt as dojo\nproblem = dojo.problems.trot(cycles=30)\ndojo.ilqr(problem, max_iterations=1)\n"
+        "print('start', flush=True)\n"
+        "try:\n    dojo.ilqr(problem, tolerance=1e-12, violation=1e-14)\n"
+        "except KeyboardInterrupt as stop:\n    print(type(stop).__name__, stop.result.status.name)\n"
+    )
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        child = subprocess.Popen(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONPATH": str(HOME)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert child.stdout is not None
+        assert child.stdout.readline() == "start\n"
+        try:
+            child.wait(0.5 + rng.random())
+        except subprocess.TimeoutExpired:
+            child.send_signal(signal.SIGINT)
+        out, _ = child.communicate(timeout=30)
+        assert (child.returncode, out) == (0, "Interrupted INTERRUPTED\n")
+
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+
+UNSAFE = {
+    "fields": lambda x: Pair(x, 2.0),
+    "fields inside": lambda x: (1, Pair(x, 2.0)),
+    "enum": lambda x: Status.SOLVED,
+    "enum inside": lambda x: (Status.SOLVED, x),
+}
+
+
+@pytest.mark.parametrize("name", UNSAFE)
+def test_no_kernel_returns_what_python_has_to_make(name: str) -> None:
+    with pytest.raises(TypeError, match="expected to return numbers and plain tuples to Python"):
+        local_kernel(UNSAFE[name])(1.0)
+
+
+def test_plain_results_are_returned() -> None:
+    assert local_kernel(lambda x: (x, (1, True), None))(1.0) == (1.0, (1, True), None)

@@ -1,0 +1,175 @@
+"""Ctrl-C during every call that loops over steps or rows: heard soon, and what was done until then is at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from interrupts import heard
+
+import dojo_opt as dojo
+from sim import pace
+
+HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
+QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)
+CHAIN = dojo.Simulator(dojo.models.npendulum(5), 0.001, order=6)
+FALLING = dojo.Simulator(dojo.models.block(), 0.001, order=4)
+RESTING = FALLING.neutral()
+PUSH = np.full(6, 1e-3)
+FLYING = FALLING.integrate(RESTING, np.eye(FALLING.ndx)[2] * 1e6)
+
+
+def inputs(sim: Any, steps: int) -> Any:
+    return np.zeros((steps, sim.nu))
+
+
+def standing(sim: Any, steps: int) -> Any:
+    return np.tile(sim.neutral(), (steps + 1, 1)), inputs(sim, steps)
+
+
+def gradient(sim: Any, steps: int, wrt: tuple[str, ...]) -> Any:
+    return sim.vjp(standing(sim, steps), np.zeros((steps + 1, sim.ndx)), wrt=wrt)
+
+
+def rows(sim: Any, count: int) -> Any:
+    return np.tile(sim.neutral(), (count, 1))
+
+
+ROLLOUTS = {  # calls of so many steps; enough of them take a second
+    "rollout": (lambda n: HOPPER.rollout(HOPPER.neutral(), inputs(HOPPER, n)), 1_000_000),
+    "under a policy": (lambda n: HOPPER.rollout(HOPPER.neutral(), lambda t, x: np.zeros(3), steps=n), 100_000),
+    "under wrenches": (
+        lambda n: QUADRUPED.rollout(QUADRUPED.neutral(), inputs(QUADRUPED, n), wrenches={"trunk": PUSH}),
+        150_000,
+    ),
+    "closed loop": (
+        lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, n // 10), substeps=10),
+        150_000,
+    ),
+    "closed loop under wrenches": (
+        lambda n: QUADRUPED.closed_loop(
+            QUADRUPED.neutral(), inputs(QUADRUPED, n // 20), substeps=20, wrenches={"trunk": PUSH}
+        ),
+        150_000,
+    ),
+    "closed loop with many substeps": (
+        lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, 200), substeps=n // 200),
+        200_000,
+    ),
+    "higher order": (lambda n: CHAIN.rollout(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 400_000),
+    "higher order, closed loop": (
+        lambda n: CHAIN.closed_loop(CHAIN.neutral() + 0.1, inputs(CHAIN, n // 20), substeps=20),
+        400_000,
+    ),
+    "higher order, far": (lambda n: FALLING.rollout(FLYING, inputs(FALLING, n)), 600_000),
+    "higher order, near": (lambda n: FALLING.rollout(RESTING, inputs(FALLING, n)), 300_000),
+    "higher order, near, closed loop": (
+        lambda n: FALLING.closed_loop(RESTING, inputs(FALLING, n // 100), substeps=100),
+        300_000,
+    ),
+}
+BATCHES = {
+    "many short ones": (
+        lambda n: QUADRUPED.rollout_batch(rows(QUADRUPED, n), np.zeros((n, 25, 12))),
+        8_000,
+    ),
+    "few long ones": (lambda n: HOPPER.rollout_batch(rows(HOPPER, 3), np.zeros((3, n, 3))), 400_000),
+    "higher order": (lambda n: CHAIN.rollout_batch(rows(CHAIN, 4) + 0.1, np.zeros((4, n, CHAIN.nu))), 100_000),
+}
+DERIVATIVES = {
+    "trajectory": (lambda n: QUADRUPED.linearize_trajectory(*standing(QUADRUPED, n)), 60_000),
+    "with substeps": (lambda n: QUADRUPED.linearize_trajectory(*standing(QUADRUPED, n), substeps=20), 3_000),
+    "few knots with many substeps": (
+        lambda n: HOPPER.linearize_trajectory(*standing(HOPPER, 1), substeps=n),
+        400_000,
+    ),
+    "rollout": (lambda n: QUADRUPED.linearize_rollout(QUADRUPED.neutral(), inputs(QUADRUPED, n)), 50_000),
+    "rollout by parameters": (
+        lambda n: HOPPER.linearize_rollout(HOPPER.neutral(), inputs(HOPPER, n), wrt=("mass:foot",)),
+        40_000,
+    ),
+    "gradient": (lambda n: gradient(QUADRUPED, n, ("state", "input")), 60_000),
+    "gradient by parameters": (lambda n: gradient(QUADRUPED, n, ("mass", "friction")), 40_000),
+    "higher order": (lambda n: CHAIN.linearize_trajectory(*standing(CHAIN, n)), 60_000),
+    "higher order, many substeps": (lambda n: CHAIN.linearize_trajectory(*standing(CHAIN, 1), substeps=n), 60_000),
+    "higher order, rollout": (lambda n: CHAIN.linearize_rollout(CHAIN.neutral() + 0.1, inputs(CHAIN, n)), 60_000),
+    "higher order, gradient": (lambda n: gradient(CHAIN, n, ("state", "input")), 60_000),
+    "higher order, near": (lambda n: FALLING.linearize_trajectory(*standing(FALLING, n)), 20_000),
+}
+STATES = {
+    "velocity": (lambda n: HOPPER.velocity(rows(HOPPER, n)), 1_500_000),
+    "bodies": (lambda n: HOPPER.bodies(*np.split(rows(HOPPER, n), [HOPPER.nq], axis=1)), 2_000_000),
+    "integrate": (lambda n: QUADRUPED.integrate(rows(QUADRUPED, n), np.zeros((n, QUADRUPED.ndx))), 1_000_000),
+    "difference": (lambda n: QUADRUPED.difference(rows(QUADRUPED, n), rows(QUADRUPED, n)), 1_000_000),
+    "maximal": (lambda n: HOPPER.maximal(rows(HOPPER, n)), 1_500_000),
+    "minimal": (lambda n: HOPPER.minimal(np.tile(HOPPER.maximal(HOPPER.neutral()), (n, 1, 1))), 1_000_000),
+    "energy": (lambda n: HOPPER.energy(rows(HOPPER, n)), 1_500_000),
+    "momentum": (lambda n: HOPPER.momentum(rows(HOPPER, n)), 1_500_000),
+    "reactions": (lambda n: HOPPER.reactions(*(part[:n] for part in standing(HOPPER, n))), 50_000),
+}
+
+
+def stopped(call: Callable[[int], Any], enough: int) -> Any:
+    """What Ctrl-C leaves of a call that is long enough; what it needs is compiled before."""
+    call(2_000)
+    return heard(lambda: call(enough))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROLLOUTS)
+def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
+    found = stopped(*ROLLOUTS[name])
+    assert found.status == dojo.Status.INTERRUPTED
+    assert found.knot > 0
+    assert found.x.shape[0] == found.knot + 1 == len(found.u) + 1
+    assert np.isfinite(found.x).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BATCHES)
+def test_batches_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
+    found = stopped(*BATCHES[name])
+    steps = found.x.shape[1] - 1
+    done = found.knot == steps
+    assert 0 < found.knot.sum() < done.size * steps
+    np.testing.assert_array_equal(found.status, np.where(done, dojo.Status.SOLVED, dojo.Status.INTERRUPTED))
+    for x, knot in zip(found.x[::97], found.knot[::97], strict=True):
+        np.testing.assert_array_equal(x[knot:], np.tile(x[knot], (steps + 1 - knot, 1)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DERIVATIVES)
+def test_derivatives_hear_ctrl_c(name: str) -> None:
+    stopped(*DERIVATIVES[name])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STATES)
+def test_calls_about_many_states_hear_ctrl_c(name: str) -> None:
+    stopped(*STATES[name])
+
+
+def rocking(sim: Any, steps: int) -> Any:
+    return np.random.default_rng(0).normal(size=(steps, sim.nu))
+
+
+@pytest.mark.parametrize("sim", [HOPPER, QUADRUPED, CHAIN, FALLING], ids=["hopper", "quadruped", "chain", "falling"])
+def test_pieces_change_no_bit(sim: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    us = rocking(sim, 60)
+    x = sim.integrate(sim.neutral(), 0.01 * np.ones(sim.ndx))
+    batch = np.tile(us, (5, 1, 1)) * np.arange(5.0)[:, None, None]
+
+    def results() -> list[Any]:
+        t, b, c = sim.rollout(x, us), sim.rollout_batch(np.tile(x, (5, 1)), batch), sim.closed_loop(x, us, substeps=2)
+        lines = sim.linearize_trajectory(t.x, us), sim.linearize_rollout(x, us)[1]
+        blocks = sim.vjp(t, np.ones((61, sim.ndx)), wrt=("state", "input"))
+        rest = [sim.velocity(t.x), sim.maximal(t.x), sim.energy(t.x), *blocks.values()]
+        return [t.x, t.contacts.impulse, t.iterations, b.x, b.knot, c.x, *(a for k in lines for a in (k.A, k.B)), *rest]
+
+    whole = results()
+    monkeypatch.setattr(pace, "PAUSE", 3e-5)  # a few steps
+    monkeypatch.setattr(pace, "_ROWS", 1)
+    for found, expected in zip(results(), whole, strict=True):
+        np.testing.assert_array_equal(found, expected)
