@@ -23,11 +23,12 @@ HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".f
 
 
 def table_line(record: dict[str, Any]) -> str:
-    """One aligned line of the table of iterations; alpha is "-" when the line search failed."""
+    """One aligned line of the table of iterations, below its note; alpha is "-" when the line search failed."""
     r = record
+    note = f"     {r['note']}\n" if "note" in r else ""
     alpha = f"{r['alpha']:8.2g}" if r["alpha"] > 0.0 else f"{'-':>8}"
     return (
-        f"{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
+        f"{note}{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
         f"{r['kappa_grad']:7.0e} {r['mu']:7.0e} {alpha} {r['gap']:7.0e} {r['violation']:7.0e} {r['milliseconds']:6.2f}"
     )
 
