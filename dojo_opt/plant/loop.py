@@ -38,8 +38,9 @@ class ClosedLoop:
     survived: bool
     message: str
     softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
-    log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
+    log: Sequence[Tick] = field(default=(), repr=False)  # every tick of the controller, when it has ticks
     reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
+    tracked: Integers | None = None  # numbers of the coordinates that were, of an MPC those with a weight; None: all
 
     def __repr__(self) -> str:
         return (
@@ -58,16 +59,22 @@ class ClosedLoop:
         sim = self.simulator
         return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
 
-    def rms(self, components: Any = (0, 1)) -> float:
-        """Root of the mean square of the distance from the reference in these coordinates, the first two by default.
+    def rms(self, components: Any = None) -> float:
+        """Root of the mean square of the distance from the reference in these coordinates, by default all `tracked`.
 
-        components: numbers below nv, or names as in `Mechanism.components`. The first two of a floating base are x and
-        y [m].
+        components: numbers below nv, or names as in `Mechanism.components`. Of several coordinates, squares of lengths
+        [m] and of angles [rad] are added up; `by_coordinate` has each of them by itself.
         """
         error = self.error()
-        call = "ClosedLoop.rms(components)"
-        chosen = chosen_components(call, components if error.shape[1] > 1 else None, self.simulator)
+        chosen = self.tracked
+        if components is not None or chosen is None:
+            chosen = chosen_components("ClosedLoop.rms(components)", components, self.simulator)
         return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
+
+    def by_coordinate(self) -> dict[str, float]:
+        """Name of each tracked coordinate: root of the mean square of its distance from the reference [m or rad]."""
+        each, names = np.sqrt(np.mean(self.error() ** 2, axis=0)), self.simulator.mechanism.dof_names
+        return {names[i]: float(each[i]) for i in (range(len(each)) if self.tracked is None else self.tracked)}
 
 
 def closed_loop(
@@ -83,7 +90,8 @@ def closed_loop(
 
     controller    an `MPC`, which is reset, or any function; asked every control_step [s], by default every time step of
                   the plant, its answer held in between
-    reference     times (n,) -> states (n, nx) for the error; that of the controller by default
+    reference     times (n,) -> states (n, nx) for the error; that of the controller by default, moved to the height of
+                  the ground as far as the controller has learnt it by then
     fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
     """
     if not isinstance(plant, Plant):
@@ -101,8 +109,9 @@ def closed_loop(
     if hasattr(controller, "reset"):
         controller.reset()
     run = _drive(controller, plant, steps, every, plant.fallen if fallen is None else fallen)
-    if reference is None:
-        reference = getattr(getattr(controller, "references", None), "state", None)
+    own, tracked = getattr(controller, "references", None), None
+    if reference is None and own is not None and own.state is not None:
+        reference, tracked = Raised(own.state, h * np.arange(float(len(run.rise))), np.array(run.rise)), own.tracked
     return ClosedLoop(
         simulator=plant.simulator,
         time=h * np.arange(len(run.x), dtype=np.float64),
@@ -113,9 +122,26 @@ def closed_loop(
         survived=run.survived,
         message=run.message,
         softened=plant.softened,
-        log=tuple(getattr(controller, "log", ())),
+        log=tuple(run.log),
         reference=reference,
+        tracked=tracked,
     )
+
+
+class Raised:
+    """States over time, the third coordinate raised by what was learnt of the ground since the time of each row."""
+
+    def __init__(self, level: Any, time: Vector, rise: Vector) -> None:
+        self._level, self._time, self._rise = level, time, rise
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """(n, nx) at the times (n,) [s]."""
+        x = np.asarray(self._level(times))
+        if not self._rise.any():
+            return x
+        x = x.copy()
+        x[:, 2] += self._rise[np.maximum(np.searchsorted(self._time, np.asarray(times) + 1e-9) - 1, 0)]
+        return x
 
 
 @dataclass
@@ -126,6 +152,8 @@ class _Run:
     u: list[Vector] = field(default_factory=list)
     contacts: list[Contacts] = field(default_factory=list)
     status: list[int] = field(default_factory=list)
+    log: list[Tick] = field(default_factory=list)
+    rise: list[float] = field(default_factory=list)  # of the reference [m]
     survived: bool = True
     message: str = "Ran to the end."
 
@@ -133,11 +161,15 @@ class _Run:
 def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]) -> _Run:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
     run, command = _Run([plant.x]), np.zeros(plant.sim.nu)
+    own = getattr(controller, "references", None)
     for k in range(steps):
         if k % every == 0:
             command = checks.array(
                 "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
             )
+            last = getattr(controller, "log", ())[-1:]
+            run.log += last if not run.log or last[0] is not run.log[-1] else []
+        run.rise.append(0.0 if own is None else own.rise)
         u, result = plant.step(command)
         run.status.append(int(result.status))
         if result.status != Status.SOLVED:

@@ -32,7 +32,7 @@ class Outcome:
     survived: bool
     message: str
     duration: float  # [s]
-    rms: float  # distance from the reference in x and y over time [m]; NaN without a reference
+    rms: float  # `ClosedLoop.rms` of all that is tracked [m, rad]; NaN without a reference
     x: Vector  # (nx,) last state
     log: Sequence[Tick]
     perturbation: Perturbation
@@ -64,7 +64,7 @@ class Study:
 
     @property
     def rms(self) -> Vector:
-        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m]."""
+        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m, rad]."""
         return np.array([o.rms if o.survived else np.nan for o in self.outcomes])
 
     def summary(self) -> str:
@@ -73,7 +73,7 @@ class Study:
         text = f"{self.survived} of {len(self.outcomes)} survive {self.duration:g} s (95 %: {lo:.3f} to {hi:.3f})"
         ms, lasted = self.milliseconds, self.rms[np.isfinite(self.rms)]
         if lasted.size:
-            text += f", rms xy median {np.median(lasted):.3f} m, largest {lasted.max():.3f} m"
+            text += f", rms median {np.median(lasted):.3f}, largest {lasted.max():.3f} (m, rad)"
         if ms.size:
             fallbacks = sum(tick.fallback for o in self.outcomes for tick in o.log)
             text += f"; tick median {np.median(ms):.2f} ms, 99 % {np.percentile(ms, 99):.2f} ms, {fallbacks} fallbacks"
