@@ -16,6 +16,7 @@ from dojo_opt.names import input_weight, state_weight
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
 from sim import checks
+from sim.brief import brief_repr
 
 Integers = NDArray[np.int64]
 
@@ -52,6 +53,8 @@ class Tracking:
     knots: Any = None
     scale: float = 1.0
 
+    __repr__ = brief_repr
+
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
         reference = state_table("Tracking(reference=...)", self.reference, knots.size, sim.nx, layout)
@@ -70,6 +73,8 @@ class Effort:
     weight: ArrayLike | Mapping[str, float]
     reference: ArrayLike = 0.0
     scale: float = 1.0
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
@@ -98,6 +103,8 @@ class ResidualCost:
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
     scale: float = 1.0
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sim import checks
+
 __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
@@ -74,8 +76,8 @@ class Options:
         stages = self._stages()
         object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
         for stage in self.stages:
-            if not (stage.kappa_eval > 0.0 and stage.kappa_grad > 0.0):
-                raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
+            for kappa in (stage.kappa_eval, stage.kappa_grad):
+                checks.number("ilqr(stages=...): kappa", kappa, above=0.0)
 
     def _stages(self) -> tuple[Stage, ...]:
         """The stages as such; a user may give plain tuples."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.border import whole
+from sim.brief import brief_table
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -20,6 +21,12 @@ __all__ = ["Plan"]
 
 COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha", "gap", "viol", "ms")
 HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
+
+
+RECORDED = (
+    *("iteration", "cost", "merit", "gradient", "kappa_eval", "kappa_grad"),
+    *("mu", "alpha", "gap", "violation", "milliseconds"),
+)
 
 
 def table_line(record: dict[str, Any]) -> str:
@@ -66,6 +73,10 @@ class Plan:
         return (
             f"Plan({self.status.name}, {self.nit} iterations, cost {self.fun:.6g}, x {self.x.shape}, u {self.u.shape})"
         )
+
+    def _repr_html_(self) -> str:
+        rows = [[r[name] for name in RECORDED] for r in self.history]
+        return brief_table(self.closing_line(), COLUMNS, rows)
 
     @property
     def time(self) -> Matrix:

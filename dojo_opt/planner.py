@@ -151,7 +151,9 @@ class Solver:
                 self._forget(warm_start)
                 continuation.start(guess, None)
             elif first:
-                journal.note(f"k_eval {', '.join(kappas[:first])} skipped: the guess of states fits {kappas[first]} best")
+                journal.note(
+                    f"k_eval {', '.join(kappas[:first])} skipped: the guess of states fits {kappas[first]} best"
+                )
             status = self._descend(first)
             ends.append(Attempt.ended(status, *parts))
             if status not in FAILED or ends[-1].mismatch <= self.options.violation:

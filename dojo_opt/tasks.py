@@ -99,7 +99,7 @@ def hopper_mpc(
 ) -> MPC:
     """Raibert's hopper hops `height` [m] at a velocity [m/s]: 20 knots of 50 ms, each of `substeps` steps of the model.
 
-    Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 1, the others .01, impulses
+    Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 4, the others .01, impulses
     .001 per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
 
     What a push in flight costs grows until the foot is down: a light leg weight lets it reach down early. The weight on
@@ -110,7 +110,7 @@ def hopper_mpc(
     substeps = whole("tasks.hopper_mpc(substeps=...)", substeps)
     sim = Simulator(models.raiberthopper(), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
-    weight = np.array([100.0, 100.0, 100.0, 20.0, 20.0, 1.0, 15.0, 1.0, 1.0] + [0.01] * 5)
+    weight = np.array([100.0, 100.0, 100.0, 20.0, 20.0, 1.0, 15.0, 4.0, 4.0] + [0.01] * 5)
     limits = np.array([50.0, 50.0, 500.0])
     problem = Problem(
         sim,

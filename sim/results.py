@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.mechanism import Mechanism
 from solvers.status import MESSAGES, Status
 
@@ -73,6 +74,8 @@ class StepResult:
     violation: float  # largest |product - kappa| of the complementary pairs
     contacts: Contacts
 
+    __repr__ = brief_repr
+
     @property
     def success(self) -> bool:
         """Whether the step reached its tolerance."""
@@ -121,6 +124,8 @@ class Shot:
     knot: int  # number of solved knots
     residual: float  # of the last step that was tried
 
+    __repr__ = brief_repr
+
 
 @dataclass(frozen=True)
 class Linearization:
@@ -132,6 +137,8 @@ class Linearization:
     status: Integers  # (T,) Status of each knot; what belongs to an unsolved knot is zero
     parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
 
+    __repr__ = brief_repr
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -140,6 +147,8 @@ class Batch:
     x: Floats  # (n, T + 1, nx)
     status: Integers  # (n,) Status
     knot: Integers  # (n,) number of solved steps
+
+    __repr__ = brief_repr
 
 
 def contacts_of(mech: Mechanism, time_step: float, rows: Floats) -> Contacts:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dojo_opt.options import Options, Stage
 from sim import checks
 from sim.border import whole
+from sim.brief import brief_repr
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -80,6 +81,8 @@ class Tick:
     error: Vector = field(repr=False)  # (nv,) coordinates of x (-) reference [m, rad]; empty without a reference
     x: Vector = field(repr=False)  # (nx,) start of the plan: measured, as the model means it, after the delay
     first: bool = False  # the plan from which the others are warm-started
+
+    __repr__ = brief_repr
 
 
 def milliseconds(log: Sequence[Tick], cpu: bool = False) -> Vector:

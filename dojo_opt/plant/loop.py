@@ -13,6 +13,7 @@ from dojo_opt.mpc.tick import Tick
 from dojo_opt.names import chosen_components
 from dojo_opt.plant.plant import Plant
 from sim import checks
+from sim.brief import brief_table
 from sim.results import Contacts
 from sim.simulator import Simulator
 from solvers.status import MESSAGES, Status
@@ -46,6 +47,10 @@ class ClosedLoop:
         return (
             f"ClosedLoop({self.duration:g} s, {self.message} x {self.x.shape}, u {self.u.shape}, {len(self.log)} ticks)"
         )
+
+    def _repr_html_(self) -> str:
+        rows = [] if self.reference is None else list(self.by_coordinate().items())
+        return brief_table(repr(self), ("coordinate", "rms off the reference [m or rad]"), rows)
 
     @property
     def duration(self) -> float:
