@@ -24,7 +24,7 @@ def fingerprint(func: Callable[..., Any]) -> Hashable:
 def _outside(text: FunctionType, above: tuple[FunctionType, ...]) -> Hashable:
     """Names and values of what a function takes from around it, and its defaults."""
     around = getclosurevars(text)
-    found = sorted((around.globals | around.nonlocals).items())
+    found = sorted({**around.globals, **around.nonlocals}.items())
     return _value(text.__defaults__, above), tuple((name, _value(value, above)) for name, value in found)
 
 

@@ -145,11 +145,8 @@ def _run_loop(args: argparse.Namespace) -> int:
         print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) over {loop.duration:.2f} s of all that is tracked:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
         if ms.size:
-            print(
-                "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back".format(
-                    **numbers
-                )
-            )
+            times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back"
+            print(times.format(**numbers))
     return 0 if loop.survived else 1
 
 

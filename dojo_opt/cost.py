@@ -94,7 +94,7 @@ class ResidualCost:
 
     jacobian(x, u, out) with out (dimension, ndx + nu) is optional; without it the derivative is a central difference on
     the manifold. Either way the loop over the knots is compiled once per process (about a second), because Numba cannot
-    cache a loop around a function that it is given. At the final knot u is zero.
+    cache a loop around a function that it is given. At the final knot u is zero. x and u are read-only.
     """
 
     function: Callable[..., Any]

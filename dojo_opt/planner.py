@@ -50,6 +50,10 @@ def ilqr(
     with more damping, say: what fails directly is often planned by way of it. settings: fields of
     `dojo.Options` by name.
 
+    A guess of states begins at the stage that it fits best, so that a good one is not led away by smooth contact; one
+    in which something rests that has to move begins at the smoothest. Where that fails, the planner begins again at
+    another, within `max_iterations`. The table of iterations says so.
+
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
     is one of the finer problem then, and its history is that of both.
     """
@@ -151,9 +155,8 @@ class Solver:
                 self._forget(warm_start)
                 continuation.start(guess, None)
             elif first:
-                journal.note(
-                    f"k_eval {', '.join(kappas[:first])} skipped: the guess of states fits {kappas[first]} best"
-                )
+                skipped = ", ".join(kappas[:first])
+                journal.note(f"k_eval {skipped} skipped: the guess of states fits {kappas[first]} best")
             status = self._descend(first)
             ends.append(Attempt.ended(status, *parts))
             if status not in FAILED or ends[-1].mismatch <= self.options.violation:

@@ -231,7 +231,7 @@ class UsersKernel(Kernel):
         return custom_reduce(UsersKernel, {"func": self.py_func, "flags": self.flags})
 
     @classmethod
-    def _rebuild(cls, func: Callable[..., Any], flags: dict[str, Any]) -> Any:
+    def _rebuild(cls, func: Callable[..., Any], flags: dict[str, Any]) -> Any:  # type: ignore[override]
         return cls(func, **flags)
 
     @cached_property

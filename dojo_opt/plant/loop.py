@@ -166,14 +166,12 @@ class _Run:
 def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]) -> _Run:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
     run, command = _Run([plant.x]), np.zeros(plant.sim.nu)
-    own = getattr(controller, "references", None)
+    own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
         if k % every == 0:
-            command = checks.array(
-                "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
-            )
-            last = getattr(controller, "log", ())[-1:]
-            run.log += last if not run.log or last[0] is not run.log[-1] else []
+            asked = controller(plant.time, plant.measure().copy())  # a controller may write into what it gets
+            command = checks.array("closed_loop: controller's u", asked, (plant.sim.nu,))
+            run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
         run.rise.append(0.0 if own is None else own.rise)
         u, result = plant.step(command)
         run.status.append(int(result.status))
@@ -183,7 +181,7 @@ def _drive(controller: Controller, plant: Plant, steps: int, every: int, lies: C
         run.x.append(plant.x)
         run.u.append(u)
         run.contacts.append(result.contacts)
-        if lies(plant.x):
+        if lies(plant.x.copy()):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
     return run

@@ -42,7 +42,8 @@ class Parameters(NamedTuple):
     values: Floats  # (n,)
     rows: dict[str, slice]
 
-    __repr__ = brief_repr
+    def __repr__(self) -> str:
+        return brief_repr(self)
 
     def __getitem__(self, name: str) -> Floats:  # type: ignore[override]
         """Values of one name of the selection."""
