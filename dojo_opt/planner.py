@@ -141,10 +141,7 @@ class Solver:
         return Status.SOLVED, ""
 
     def _run(self, warm_start: Plan | None) -> tuple[Status, str]:
-        """Attempts from the guess, one for each stage it may begin with, until one meets the constraints.
-
-        Where none does, the plan is that of the attempt that violates them least.
-        """
+        """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation."""
         continuation, journal, guess = self.continuation, self.continuation.journal, self.continuation.now
         parts = (continuation, self.descent, self.objective)
         kappas = [f"{stage.kappa_eval:.0e}" for stage in self.options.stages]
