@@ -76,8 +76,9 @@ class Options:
         stages = self._stages()
         object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
         for stage in self.stages:
-            for kappa in (stage.kappa_eval, stage.kappa_grad):
-                checks.number("ilqr(stages=...): kappa", kappa, above=0.0)
+            kappas = [checks.number("ilqr(stages=...): kappa", k) for k in (stage.kappa_eval, stage.kappa_grad)]
+            if not min(kappas) > 0.0:
+                raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
 
     def _stages(self) -> tuple[Stage, ...]:
         """The stages as such; a user may give plain tuples."""
