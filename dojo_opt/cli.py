@@ -136,18 +136,17 @@ def _run_loop(args: argparse.Namespace) -> int:
         dojo.viewer.save_html(loop, args.html)
     ms, fallbacks = milliseconds(loop.log), sum(tick.fallback for tick in loop.log)
     numbers = {"task": args.name, "survived": loop.survived, "message": loop.message, "seconds": loop.duration}
-    numbers |= {"rms_xy": loop.rms(), "ticks": len(loop.log), "fallbacks": fallbacks}
+    numbers |= {"rms": loop.rms(), "rms_by_coordinate": (each := loop.by_coordinate())}
+    numbers |= {"ticks": len(loop.log), "fallbacks": fallbacks}
     numbers |= {"tick_median_ms": float(np.median(ms)), "tick_99_ms": float(np.percentile(ms, 99))} if ms.size else {}
     if args.json:
         print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
     else:
-        print(f"{loop.message}  rms xy {loop.rms():.3f} m over {loop.duration:.2f} s")
+        print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) over {loop.duration:.2f} s of all that is tracked:")
+        print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
         if ms.size:
-            print(
-                "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back".format(
-                    **numbers
-                )
-            )
+            times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back"
+            print(times.format(**numbers))
     return 0 if loop.survived else 1
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import chosen_components, chosen_inputs, component_name
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, numbers, state_table
+from sim.brief import brief_repr
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
@@ -29,6 +30,8 @@ class Goal:
     target: ArrayLike
     components: Any = None
     knots: Any = -1
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Goal(knots=...)", self.knots, horizon, last=True)
@@ -69,6 +72,8 @@ class StateBounds:
     components: Any = None
     knots: Any = None
 
+    __repr__ = brief_repr
+
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("StateBounds(knots=...)", self.knots, horizon, last=True)
         knots = knots[knots > 0] if self.knots is None else knots
@@ -97,6 +102,8 @@ class ControlBounds:
     components: Any = None
     knots: Any = None
 
+    __repr__ = brief_repr
+
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
         knots = knot_list("ControlBounds(knots=...)", self.knots, horizon, last=False)
@@ -115,6 +122,8 @@ class ResidualConstraint:
     equality: bool = True
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualConstraint", self.function, self.dimension, self.jacobian, sim)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.descent import Descent
-from dojo_opt.fit import first_fit
+from dojo_opt.fit import fit
 from dojo_opt.journal import Journal
 from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
@@ -59,22 +59,22 @@ class Continuation:
         """Forget the last solve and start the clock."""
         self.journal.reset()
         vars(self).pop("now", None)
-        self._shooting.reset()
 
     def start(self, now: Iterate, kappa: float | None) -> None:
         """Begin at `now`, a rollout at `kappa`, or states whose gaps are not known yet (None)."""
+        self._shooting.reset()
         self.now = now
         self.kappa = kappa
         self._kappa_grad = 0.0
         self._fresh = False  # the quadratic model belongs to `now`
         self._known: tuple[float, Any] | None = None  # derivatives at the first iterate, and their smoothing
 
-    def first_stage(self, stages: tuple[Stage, ...]) -> int:
-        """Which stage the first iterate begins with."""
-        if self.kappa is not None or len(stages) == 1:
-            return 0
-        chosen, self._known = first_fit(self._horizon, self.now, stages)
-        return chosen
+    def first_stages(self, sim: Any) -> tuple[int, ...]:
+        """Which stage the first iterate begins with, and then those for where the ones before fail."""
+        if self.kappa is not None:
+            return (0,)
+        firsts, self._known = fit(self._horizon, self._objective, sim, self.now, self._options.stages)
+        return firsts
 
     def remeasure(self) -> None:
         """The multipliers have changed: the merit and the model of the objective are out of date."""

@@ -16,6 +16,7 @@ from dojo_opt.names import input_weight, state_weight
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
 from sim import checks
+from sim.brief import brief_repr
 
 Integers = NDArray[np.int64]
 
@@ -52,6 +53,8 @@ class Tracking:
     knots: Any = None
     scale: float = 1.0
 
+    __repr__ = brief_repr
+
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         knots = knot_list("Tracking(knots=...)", self.knots, horizon, last=True)
         reference = state_table("Tracking(reference=...)", self.reference, knots.size, sim.nx, layout)
@@ -71,6 +74,8 @@ class Effort:
     reference: ArrayLike = 0.0
     scale: float = 1.0
 
+    __repr__ = brief_repr
+
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         del layout
         knots = np.arange(horizon)
@@ -89,7 +94,7 @@ class ResidualCost:
 
     jacobian(x, u, out) with out (dimension, ndx + nu) is optional; without it the derivative is a central difference on
     the manifold. Either way the loop over the knots is compiled once per process (about a second), because Numba cannot
-    cache a loop around a function that it is given. At the final knot u is zero.
+    cache a loop around a function that it is given. At the final knot u is zero. x and u are read-only.
     """
 
     function: Callable[..., Any]
@@ -98,6 +103,8 @@ class ResidualCost:
     jacobian: Callable[..., Any] | None = None
     knots: Any = None
     scale: float = 1.0
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         check_residual("ResidualCost", self.function, self.dimension, self.jacobian, sim)

@@ -21,6 +21,8 @@ class Journal:
         """Forget the last solve and start the clock."""
         self.begin = self._tick = time.perf_counter()
         self.records: list[dict[str, Any]] = []
+        self._note = ""
+        self._headed = False
 
     def budget(self) -> Status:
         """SOLVED while there is some left."""
@@ -30,16 +32,26 @@ class Journal:
             return Status.TIME_LIMIT
         return Status.SOLVED
 
+    def note(self, text: str) -> None:
+        """Put a line of text into the table, before the next iteration."""
+        self._note = text
+        self._say(f"     {text}")
+
+    def _say(self, line: str) -> None:
+        """Print a line of the table, the first one below the header."""
+        if not self._headed:
+            self._options.say(HEADER)
+        self._headed = True
+        self._options.say(line)
+
     def add(self, **record: Any) -> bool:
         """Record an iteration, print it, call back; True when the callback wants to stop."""
         tock = time.perf_counter()
         record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
         self._tick = tock
-        self.records.append(record)
-        if self._options.verbose:
-            if len(self.records) == 1:
-                self._options.say(HEADER)
-            self._options.say(table_line(record))
+        self._say(table_line(record))
+        self.records.append(record | {"note": self._note} if self._note else record)
+        self._note = ""
         if self._options.callback is not None:
             try:
                 self._options.callback(record)

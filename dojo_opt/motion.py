@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.brief import brief_repr
 from sim.mechanism import Mechanism
 from sim.model import Vector
 from sim.shapes import rotation_matrix
@@ -28,6 +29,8 @@ class Motion:
     contact_time: Array  # (N,) end of each simulation step [s]
     normal_force: Array  # (N, ncontact) mean over the step [N]
     friction_force: Array  # (N, ncontact) likewise, its size
+
+    __repr__ = brief_repr
 
     def points(self, body: int, point: Any) -> Array:
         """Path (T + 1, 3) of a point given in the axes of a body, from its centre of mass [m]."""

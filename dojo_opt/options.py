@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sim import checks
+
 __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
@@ -74,7 +76,8 @@ class Options:
         stages = self._stages()
         object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
         for stage in self.stages:
-            if not (stage.kappa_eval > 0.0 and stage.kappa_grad > 0.0):
+            kappas = [checks.number("ilqr(stages=...): kappa", k) for k in (stage.kappa_eval, stage.kappa_grad)]
+            if not min(kappas) > 0.0:
                 raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
 
     def _stages(self) -> tuple[Stage, ...]:

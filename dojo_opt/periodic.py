@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import chosen_components
 from dojo_opt.penalty import penalty_derivatives
 from dojo_opt.term import StateTerm, Term, table
+from sim.brief import brief_repr
 from sim.rotation import inverse_right_jacobian
 
 Array = NDArray[np.float64]
@@ -28,6 +29,8 @@ class Periodic:
 
     shift: ArrayLike = 0.0
     components: Any = None
+
+    __repr__ = brief_repr
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
         shift = table("Periodic(shift=...)", self.shift, 1, sim.ndx)[0]

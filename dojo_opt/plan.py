@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.border import whole
+from sim.brief import brief_table
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -22,12 +23,19 @@ COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha",
 HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
 
 
+RECORDED = (
+    *("iteration", "cost", "merit", "gradient", "kappa_eval", "kappa_grad"),
+    *("mu", "alpha", "gap", "violation", "milliseconds"),
+)
+
+
 def table_line(record: dict[str, Any]) -> str:
-    """One aligned line of the table of iterations; alpha is "-" when the line search failed."""
+    """One aligned line of the table of iterations, below its note; alpha is "-" when the line search failed."""
     r = record
+    note = f"     {r['note']}\n" if "note" in r else ""
     alpha = f"{r['alpha']:8.2g}" if r["alpha"] > 0.0 else f"{'-':>8}"
     return (
-        f"{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
+        f"{note}{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
         f"{r['kappa_grad']:7.0e} {r['mu']:7.0e} {alpha} {r['gap']:7.0e} {r['violation']:7.0e} {r['milliseconds']:6.2f}"
     )
 
@@ -65,6 +73,10 @@ class Plan:
         return (
             f"Plan({self.status.name}, {self.nit} iterations, cost {self.fun:.6g}, x {self.x.shape}, u {self.u.shape})"
         )
+
+    def _repr_html_(self) -> str:
+        rows = [[r[name] for name in RECORDED] for r in self.history]
+        return brief_table(self.closing_line(), COLUMNS, rows)
 
     @property
     def time(self) -> Matrix:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dojo_opt.attempt import FAILED, Attempt
 from dojo_opt.continuation import Continuation
 from dojo_opt.descent import Descent
 from dojo_opt.line_search import Iterate, LineSearch
@@ -49,6 +50,10 @@ def ilqr(
     same problem, whose trajectory, multipliers and penalties are taken over. It may be a plan of an easier variant,
     with more damping, say: what fails directly is often planned by way of it. settings: fields of
     `dojo.Options` by name.
+
+    A guess of states begins at the stage that it fits best, so that a good one is not led away by smooth contact; one
+    in which something rests that has to move begins at the smoothest. Where that fails, the planner begins again at
+    another, within `max_iterations`. The table of iterations says so.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones; the plan
     is one of the finer problem then, and its history is that of both.
@@ -108,18 +113,22 @@ class Solver:
     def _solve(self, controls: ArrayLike | None, states: ArrayLike | None, warm_start: Plan | None) -> Plan:
         """As `solve`."""
         self.continuation.reset()
+        self._forget(warm_start)
+        if warm_start is not None:
+            controls = warm_start.u if controls is None else controls
+            states = warm_start.x if states is None else states
+        status, detail = self._guess(controls, states)
+        if status == Status.SOLVED:
+            status, detail = self._run(warm_start)
+        return self._plan(status, detail)
+
+    def _forget(self, warm_start: Plan | None) -> None:
+        """Regularisation, gains, multipliers and penalties as before the first iteration."""
         self.descent.reset()
         if warm_start is None:
             self.objective.reset()
         else:
-            controls = warm_start.u if controls is None else controls
-            states = warm_start.x if states is None else states
             self.objective.reset(warm_start.multipliers, warm_start.penalties)
-        status, detail = self._guess(controls, states)
-        if status == Status.SOLVED:
-            status = self._run()
-            detail = "" if status == Status.SOLVED else self.descent.detail
-        return self._plan(status, detail)
 
     def _guess(self, controls: ArrayLike | None, states: ArrayLike | None) -> tuple[Status, str]:
         """First iterate: the rollout of the controls, or the given states with their gaps still to be opened."""
@@ -142,15 +151,38 @@ class Solver:
         self.continuation.start(search.accept(shot, None), kappa)
         return Status.SOLVED, ""
 
-    def _run(self) -> Status:
+    def _run(self, warm_start: Plan | None) -> tuple[Status, str]:
+        """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation."""
+        continuation, journal, guess = self.continuation, self.continuation.journal, self.continuation.now
+        parts = (continuation, self.descent, self.objective)
+        kappas = [f"{stage.kappa_eval:.0e}" for stage in self.options.stages]
+        ends: list[Attempt] = []
+        for first in continuation.first_stages(self.problem.sim):
+            if ends:
+                journal.note(f"{ends[-1].status.name}; again from the guess, beginning at k_eval {kappas[first]}")
+                self._forget(warm_start)
+                continuation.start(guess, None)
+            elif first:
+                skipped = ", ".join(kappas[:first])
+                journal.note(f"k_eval {skipped} skipped: the guess of states fits {kappas[first]} best")
+            status = self._descend(first)
+            ends.append(Attempt.ended(status, *parts))
+            if status not in FAILED or ends[-1].mismatch <= self.options.violation:
+                return status, "" if status == Status.SOLVED else self.descent.detail
+        best = min(ends, key=lambda end: end.mismatch)
+        if best is not ends[-1]:
+            best.restore(*parts)
+        return best.status, best.detail
+
+    def _descend(self, first: int) -> Status:
         """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
 
         Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
-        few times; after that the solve ends. It ends, too, when updates in a row do not bring the violation down.
+        few times; after that the attempt ends. It ends, too, when updates in a row do not bring the violation down.
         """
         options = self.options
         last = len(options.stages) - 1
-        index, softened = self.continuation.first_stage(options.stages), 0
+        index, softened = first, 0
         least, stalled = np.inf, 0
         for _ in range(last + options.max_updates + 1):
             status = self._stage(options.stages[index], options.bisections)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -48,6 +49,14 @@ def _components(call: str, chosen: Any, sim: Any) -> Any:
     return np.unique(chosen_components(call, None if chosen is True else chosen, sim))
 
 
+def _memory() -> float:
+    """Bytes of the machine, infinite where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+
+
 def _terms(given: Any) -> tuple[Spec, ...]:
     """One term, or several, as a tuple."""
     return tuple(given) if isinstance(given, Iterable) else (given,)
@@ -88,6 +97,7 @@ class Problem:
         self.substeps = whole("Problem(substeps=...)", substeps)
         self.refinement = 1
         self.refined_constraints: tuple[Spec, ...] = ()
+        self._check_memory()
         start = numbers("Problem(start=...)", start)
         if start.shape != (sim.nx,):
             raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
@@ -110,6 +120,16 @@ class Problem:
         terms = [type(spec).__name__ for spec in (*self.specs[0], *self.specs[1])]
         name = getattr(self.sim.mechanism, "name", type(self.sim).__name__)
         return f"Problem({name}, {knots}, {', '.join(terms) or 'no terms'})"
+
+    def _check_memory(self) -> None:
+        """Refuse a horizon whose derivatives alone are larger than the memory of the machine."""
+        size = self.sim.ndx + self.sim.nu
+        needed = 8.0 * (self.horizon + 1) * (2 * self.sim.ndx * size + 2 * size**2)  # A, B, twice; H, and its copy
+        if needed > (memory := _memory()):
+            raise ValueError(
+                f"Problem(horizon=...): derivatives at {self.horizon} knots with {size} numbers each take "
+                f"{needed / 2**30:.3g} GiB of memory, and this machine has {memory / 2**30:.3g} GiB"
+            )
 
     def refined(self, count: int = 5) -> Problem:
         """The same problem with every time step cut into `count`: same knots, inputs, terms; `refined_constraints` too.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.feet import Feet
+from sim import checks
 from sim.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -120,7 +121,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
     mech = sim.mechanism
     feet, B = Feet(sim, mech.contact_names), input_map(sim)
-    state = np.array(sim.neutral() if x is None else x, dtype=float)
+    state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
     state[sim.nq :] = 0.0
     free = np.asarray(~B.any(axis=1))
     weight = float(np.abs(potential_gradient(sim, state)).max())

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.manifold import state_residual
 from dojo_opt.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
 from dojo_opt.residual import ResidualKernels
+from sim import checks
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -140,10 +141,7 @@ class ResidualTerm(Term):
 
 def numbers(call: str, value: ArrayLike) -> Matrix:
     """`value` as an array of floats; anything else is refused by a ValueError that names the call."""
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{call}: expected numbers, got {value!r}") from None
+    return checks.floats(call, value)
 
 
 def table(call: str, value: ArrayLike, rows: int, columns: int) -> Matrix:

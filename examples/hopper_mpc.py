@@ -26,11 +26,12 @@ for case in cases:
     ticks = np.array([tick.milliseconds for tick in loop.log if not tick.first])
     foot = mpc.sim.maximal(loop.x)[:, 1, 2] - 0.05
     print(
-        f"{case}: {loop.message} {loop.rms():.3f} m off its path, the foot rises to {foot.max():.2f} m; "
+        f"{case}: {loop.message} {loop.rms((0, 1, 2)):.3f} m off its path, the foot rises to {foot.max():.2f} m; "
         f"tick {np.median(ticks):.1f} ms, {sum(tick.fallback for tick in loop.log)} fell back"
     )
     assert loop.survived, loop.message
-    assert loop.rms() < 0.08, loop.rms()
+    print("    rms: " + ", ".join(f"{name} {value:.3f}" for name, value in loop.by_coordinate().items()))
+    assert loop.rms((0, 1, 2)) < 0.08, loop.by_coordinate()
     assert foot.max() > 0.08, "it does not hop"
 
 finish(dojo.plots.closed_loop(loops[cases[0]]), __file__)

@@ -31,9 +31,9 @@ def main():
     for case in cases:
         loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 2e-3, **CASES[case]), seconds)
         ticks = np.array([tick.milliseconds for tick in loop.log if not tick.first])
-        print(f"{case}: {loop.message} {loop.rms():.3f} m off its path; tick {np.median(ticks):.1f} ms")
+        print(f"{case}: {loop.message} {loop.rms((0, 1, 2)):.3f} m off its path; tick {np.median(ticks):.1f} ms")
         assert loop.survived, loop.message
-        assert loop.rms() < 0.08, loop.rms()
+        assert loop.rms((0, 1, 2)) < 0.08, loop.by_coordinate()
         if case == cases[0]:
             finish(dojo.plots.closed_loop(loop), __file__)
             dojo.viewer.save_html(loop, "quadruped_mpc.html")

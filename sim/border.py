@@ -93,7 +93,7 @@ class Border:
         if limits is None:
             return np.full(self.nu, -np.inf), np.full(self.nu, np.inf)
         try:
-            lo, hi = (np.array(np.broadcast_to(np.asarray(b, dtype=np.float64), (self.nu,))) for b in limits)
+            lo, hi = (np.array(np.broadcast_to(checks.floats(call, b), (self.nu,))) for b in limits)
         except (TypeError, ValueError):
             raise ValueError(f"{call}(limits=...): expected (lower, upper), each as wide as u ({self.nu})") from None
         if not np.all(lo <= hi):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def _floats(call: str, value: Any) -> Floats:
+def floats(call: str, value: Any) -> Floats:
     """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused.
 
     One that must not be written to is copied: compiled code would take it for another type, and be compiled again.
@@ -38,7 +38,7 @@ def finite(values: Floats) -> bool:
 
 def array(call: str, value: Any, shape: tuple[int | str | None, ...]) -> Floats:
     """`value` as a finite float64 array of the given shape; None or a letter stands for any length."""
-    out = _floats(call, value)
+    out = floats(call, value)
     fits = out.ndim == len(shape) and all(
         not isinstance(n, int) or n == m for n, m in zip(shape, out.shape, strict=True)
     )

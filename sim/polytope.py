@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.brief import brief_repr
 from sim.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,8 @@ class Polytope(Solid):
     """
 
     vertices: ArrayLike
+
+    __repr__ = brief_repr
 
     def __post_init__(self) -> None:
         from scipy.spatial import ConvexHull, QhullError

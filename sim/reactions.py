@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.brief import brief_repr
 from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.model import Model
@@ -54,6 +55,8 @@ class Reactions:
     torque: Floats  # (..., n, 3) [N m]
     constraint_force: Floats  # (..., n, 3) of which the constraint gives [N]
     constraint_torque: Floats  # (..., n, 3) [N m]
+
+    __repr__ = brief_repr
 
     @property
     def active_force(self) -> Floats:

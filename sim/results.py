@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.mechanism import Mechanism
 from sim.policy import Path
 from solvers.status import MESSAGES, Status
@@ -90,6 +91,8 @@ class StepResult:
     violation: float  # largest |product - kappa| of the complementary pairs
     contacts: Contacts
 
+    __repr__ = brief_repr
+
     @property
     def success(self) -> bool:
         """Whether the step reached its tolerance."""
@@ -138,6 +141,8 @@ class Shot:
     knot: int  # number of solved knots
     residual: float  # of the last step that was tried
 
+    __repr__ = brief_repr
+
     @classmethod
     def of(cls, found: tuple[int, Path]) -> Shot:
         """From (number of solved knots, all of them)."""
@@ -157,6 +162,8 @@ class Linearization:
     # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
 
+    __repr__ = brief_repr
+
 
 @dataclass(frozen=True)
 class Batch:
@@ -165,6 +172,8 @@ class Batch:
     x: Floats  # (n, T + 1, nx)
     status: Integers  # (n,) Status
     knot: Integers  # (n,) number of solved steps
+
+    __repr__ = brief_repr
 
     @classmethod
     def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:

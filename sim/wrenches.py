@@ -96,7 +96,7 @@ def rollout(
 
         def policy(time: float, state: Floats) -> Floats:
             more = rows[round(time / sim.time_step), sim.nu :]
-            return np.concatenate([np.asarray(us(time, state), dtype=np.float64), more])
+            return np.concatenate([checks.floats("Simulator.rollout(us)", us(time, state)), more])
 
         inputs: Any = policy
     else:
@@ -120,12 +120,12 @@ def closed_loop(sim: Simulator, x0: ArrayLike, us: ArrayLike, wrenches: Wrenches
     more = other.nu - sim.nu
     for name, axis in (("ks", 1), ("Ks", 1)):
         if options.get(name) is not None:
-            part = np.asarray(options[name], dtype=np.float64)
+            part = checks.floats(f"Simulator.closed_loop({name}=...)", options[name])
             pad = [(0, more if k == axis else 0) for k in range(part.ndim)]
             options[name] = np.pad(part, pad)
     if options.get("limits") is not None:
         free = np.full(more, np.inf)
-        low, high = (np.broadcast_to(np.asarray(b, dtype=np.float64), (sim.nu,)) for b in options["limits"])
+        low, high = sim._border.limits("Simulator.closed_loop", options["limits"])
         options["limits"] = np.concatenate([low, -free]), np.concatenate([high, free])
     return carried(
         lambda: other.closed_loop(x0, inputs, **options),
@@ -190,11 +190,11 @@ def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, wrenches: Wrenc
     """`Simulator.reactions` under wrenches, if any: (nbody, 6) or, of a trajectory, (T, nbody, 6)."""
     if wrenches is None:
         return transmitted(sim, x, u, frame)
-    states = np.asarray(x, dtype=np.float64)
+    states = checks.floats("Simulator.reactions(x)", x)
     if states.ndim > 2:
         raise ValueError(f"Simulator.reactions(wrenches=...): expected x of shape (nx,) or (T, nx), got {states.shape}")
     rows = np.atleast_2d(states)
-    us = np.zeros((len(rows), sim.nu)) if u is None else np.asarray(u, dtype=np.float64).reshape(-1, sim.nu)
+    us = np.zeros((len(rows), sim.nu)) if u is None else checks.floats("Simulator.reactions(u)", u).reshape(-1, sim.nu)
     other, inputs = _pushed(sim, "reactions", wrenches, checks.array("Simulator.reactions(u)", us, (len(rows), sim.nu)))
     return transmitted(other, states, inputs if states.ndim == 2 else inputs[0], frame)
 

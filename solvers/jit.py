@@ -32,6 +32,7 @@ __all__ = [
     "local_kernel",
     "registered",
     "users_kernel",
+    "users_loop",
 ]
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -162,17 +163,55 @@ def entry(func: Callable[..., Any], signature: tuple[Any, ...]) -> Any:
 
 def local_kernel(func: F) -> F:
     """A kernel made inside a function: Numba never finds such a closure in its cache, so it leaves no file there."""
-    return cast(F, registered(Kernel(func, keep=False)))
+    return func if numba.config.DISABLE_JIT else cast(F, registered(Kernel(func, keep=False)))
 
 
-def users_kernel(func: F) -> F:
-    """Compile a function of the user, or a loop around one, which may allocate: once per process, as `local_kernel`.
+class UsersKernel(Kernel):
+    """A function of the user, or a loop around one: it may allocate, and is compiled once per process.
 
-    A function that is compiled already stays as it is.
+    Numba never frees the code of a function. Without the ways in that it has no use for, there is a third of it.
     """
-    if numba.config.DISABLE_JIT or isinstance(func, CPUDispatcher | Kernel):
+
+    def __init__(self, func: Callable[..., Any], **flags: Any) -> None:
+        super().__init__(func, keep=False)
+        self.flags = {**FLAGS, **flags, "no_cfunc_wrapper": True}
+
+    def __reduce__(self) -> Any:
+        return custom_reduce(UsersKernel, {"func": self.py_func, "flags": self.flags})
+
+    @classmethod
+    def _rebuild(cls, func: Callable[..., Any], flags: dict[str, Any]) -> Any:  # type: ignore[override]
+        return cls(func, **flags)
+
+    @cached_property
+    def entry(self) -> Any:
+        """The form with a way in for Python."""
+        return numba.jit(nopython=True, **self.flags)(self.py_func)
+
+    @cached_property
+    def inner(self) -> Any:
+        """The form without."""
+        return numba.jit(nopython=True, no_cpython_wrapper=True, **self.flags)(self.py_func)
+
+
+def users_kernel(func: F, boundscheck: bool = True) -> F:
+    """Compile a function of the user, with a look at the bounds of arrays at every index unless boundscheck=False.
+
+    One that Numba has compiled for the user is compiled again, with its own flags, and looks at bounds unless these say
+    boundscheck=False; a kernel stays as it is.
+    """
+    if numba.config.DISABLE_JIT or isinstance(func, Kernel):
         return func
-    return cast(F, numba.njit(**FLAGS)(func))
+    flags: dict[str, Any] = {"boundscheck": boundscheck}
+    if isinstance(func, CPUDispatcher):
+        own = {name: value for name, value in func.targetoptions.items() if name != "nopython" and value is not None}
+        return cast(F, UsersKernel(func.py_func, **flags, **own) if "boundscheck" not in own else func)
+    return cast(F, UsersKernel(func, **flags))
+
+
+def users_loop(func: F) -> F:
+    """Compile a loop around a function of the user."""
+    return func if numba.config.DISABLE_JIT else cast(F, UsersKernel(func))
 
 
 def compiled_signatures() -> dict[str, int]:

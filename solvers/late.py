@@ -27,6 +27,7 @@ from importlib import import_module
 from types import GenericAlias
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -74,6 +75,9 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
     return types.BaseTuple.from_types(parts)
 
 
+_UNCOMPILED: list[LateKernel] = []  # asked for an address with NUMBA_DISABLE_JIT=1
+
+
 class LateKernel:
     """A kernel at an address; imported, and compiled, when it is first asked for."""
 
@@ -104,7 +108,13 @@ class LateKernel:
         return self._func
 
     def __call__(self, *args: Any) -> Any:
-        raise TypeError(f"{self.home} is called from kernels only")
+        """What compiled code does at a call, for kernels that run uncompiled."""
+        if not numba.config.DISABLE_JIT:
+            raise TypeError(f"{self.home} is called from kernels only")
+        number = int(args[0].late[self.index])
+        if number:
+            return _UNCOMPILED[number - 1].func(*args)
+        return _nothing(self.signature().return_type) if self.otherwise is None else self.otherwise
 
     @property
     def compiled(self) -> bool:
@@ -117,7 +127,11 @@ class LateKernel:
         return result(*arguments)
 
     def address(self) -> int:
-        """Where the compiled kernel is, in this process."""
+        """Where the compiled kernel is, in this process; uncompiled, its number, from 1."""
+        if numba.config.DISABLE_JIT:
+            if self not in _UNCOMPILED:
+                _UNCOMPILED.append(self)
+            return _UNCOMPILED.index(self) + 1
         if self._code is None:
             declared = self.signature()
             code = entry(self.func, declared.args)
@@ -136,6 +150,14 @@ class LateKernel:
     @property
     def _numba_type_(self) -> Any:
         return cpu_target.typing_context.resolve_value_type(self._call)
+
+
+def _nothing(kind: types.Type) -> Any:
+    """What a call stands for where it is said of neither the kernel nor its address: zeros of its type."""
+    if isinstance(kind, types.BaseTuple):
+        parts = [_nothing(part) for part in kind]
+        return kind.instance_class(*parts) if isinstance(kind, types.BaseNamedTuple) else tuple(parts)
+    return {types.float64: 0.0, types.int64: 0, types.boolean: False}.get(kind)
 
 
 class LateTable:

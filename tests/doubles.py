@@ -49,7 +49,8 @@ class System:
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
         self.calls: list[float] = []
         dofs, inputs = (tuple(f"{what} {i}" for i in range(n)) for what, n in (("dof", self.nv), ("input", self.nu)))
-        self.mechanism = SimpleNamespace(dof_names=dofs, input_names=inputs)
+        joints = (SimpleNamespace(nv=self.nv),)
+        self.mechanism = SimpleNamespace(dof_names=dofs, input_names=inputs, joints=joints)
 
     def neutral(self):
         return self.integrate(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.feet import Feet
 from dojo_opt.rest import input_map, least_pushes
+from sim.brief import brief_repr
 from sim.parts import Input, Joint
 from sim.simulator import Simulator
 
@@ -37,6 +38,8 @@ class Gait:
     feet: Array  # (T + 1, k, 3) centres of the feet [m]
     contact: Booleans  # (T + 1, k) whether a foot is on the ground
     foot_names: tuple[str, ...]  # names of the contacts
+
+    __repr__ = brief_repr
 
     def then(self, other: Gait) -> Gait:
         """This motion, and after it `other`, which begins where this one ends."""

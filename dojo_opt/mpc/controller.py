@@ -51,7 +51,7 @@ class MPC:
     A tick shifts the plan by the time that has passed and keeps its states as the guess, the measured one in front: the
     disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
     over together with the robot.) A plan that the planner rejects is not used: the one before stays in force.
-    `log` has one `Tick` per plan.
+    `log` has one `Tick` per plan, of the last 10,000 or as many as the setting `log` says; None keeps all.
     """
 
     def __init__(
@@ -234,3 +234,5 @@ class MPC:
         self.log.append(
             Tick(now, ms, cpu, iterations, float(cost), alpha, gap, status, fallback, contacts, error, x, first)
         )
+        if self.settings.log is not None:
+            del self.log[: -self.settings.log]

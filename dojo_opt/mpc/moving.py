@@ -15,6 +15,7 @@ from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
@@ -114,6 +115,13 @@ class References:
         self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
         self._call_checked(0.0)
         self._begin = np.nan  # [s] of the first knot
+        self.rise = 0.0  # [m] of a floating base, at the last move
+
+    @property
+    def tracked(self) -> Integers | None:
+        """Numbers of the coordinates that the first moving `Tracking` weighs; None when no state moves."""
+        term = next((term for term, _ in self._moving if isinstance(term, StateTerm)), None)
+        return None if term is None else np.flatnonzero(term.weight[:, : self._sim.nv].any(axis=0))
 
     def _function(self, call: str, value: Any, of_states: bool) -> Moving:
         if callable(value):
@@ -131,7 +139,7 @@ class References:
 
     def move(self, time: float, rise: float = 0.0) -> None:
         """Let the first knot of every reference be at `time` [s], and a floating base be higher by `rise` [m]."""
-        self._begin = time
+        self._begin, self.rise = time, rise
         for term, function in self._moving:
             term.reference[:] = function(time + self._h * term.knots)
             if rise and isinstance(term, StateTerm):

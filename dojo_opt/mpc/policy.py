@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -35,6 +36,8 @@ class Policy:
     K: Stack
     substeps: int = 1  # simulation steps per knot
     lead: tuple[float, Vector] | None = None  # an earlier time [s], and the state then, from which x[0] was predicted
+
+    __repr__ = brief_repr
 
     @property
     def knot_time(self) -> float:

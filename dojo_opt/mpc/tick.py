@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from dojo_opt.options import Options, Stage
 from sim import checks
+from sim.border import whole
+from sim.brief import brief_repr
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -36,6 +38,7 @@ class Settings:
     friction: float | None = None  # that plans count on, instead of the model's; less than the ground has is safer
     learn_ground: bool = False  # take the height of the ground from the contacts that stand
     options: Options | None = None  # of the planner in a tick; its stages are made from kappa and kappa_grad
+    log: int | None = 10_000  # the last ticks that `MPC.log` keeps, about 1 kB each; None keeps all
 
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:
@@ -48,6 +51,8 @@ class Settings:
                 raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
         for name in ("gain_scale", "delay"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
+        if self.log is not None:
+            whole("MPC(log=...)", self.log)
         if self.friction is not None:
             checks.number("MPC(friction=...)", self.friction, at_least=0.0)
 
@@ -76,6 +81,8 @@ class Tick:
     error: Vector = field(repr=False)  # (nv,) coordinates of x (-) reference [m, rad]; empty without a reference
     x: Vector = field(repr=False)  # (nx,) start of the plan: measured, as the model means it, after the delay
     first: bool = False  # the plan from which the others are warm-started
+
+    __repr__ = brief_repr
 
 
 def milliseconds(log: Sequence[Tick], cpu: bool = False) -> Vector:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.plant.perturbation import Perturbation, Push
 from sim import checks
 from sim.border import whole
+from sim.brief import brief_repr
 
 __all__ = ["Disturbances"]
 
@@ -31,6 +32,8 @@ class Disturbances:
     slope: tuple[float, float] = (0.0, 0.0)  # [rad], towards any heading
     delay: float = 0.0  # [s]
     noise: ArrayLike = 0.0
+
+    __repr__ = brief_repr
 
     def __post_init__(self) -> None:
         call = "Disturbances"

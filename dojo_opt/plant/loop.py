@@ -13,6 +13,7 @@ from dojo_opt.mpc.tick import Tick
 from dojo_opt.names import chosen_components
 from dojo_opt.plant.plant import Plant
 from sim import checks
+from sim.brief import brief_table
 from sim.results import Contacts, Interrupted
 from sim.simulator import Simulator
 from solvers.status import MESSAGES, Status
@@ -38,13 +39,18 @@ class ClosedLoop:
     survived: bool
     message: str
     softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
-    log: Sequence[Tick] = field(default=(), repr=False)  # of the controller, when it has one
+    log: Sequence[Tick] = field(default=(), repr=False)  # every tick of the controller, when it has ticks
     reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
+    tracked: Integers | None = None  # numbers of the coordinates that were, of an MPC those with a weight; None: all
 
     def __repr__(self) -> str:
         return (
             f"ClosedLoop({self.duration:g} s, {self.message} x {self.x.shape}, u {self.u.shape}, {len(self.log)} ticks)"
         )
+
+    def _repr_html_(self) -> str:
+        rows = [] if self.reference is None else list(self.by_coordinate().items())
+        return brief_table(repr(self), ("coordinate", "rms off the reference [m or rad]"), rows)
 
     @property
     def duration(self) -> float:
@@ -58,16 +64,22 @@ class ClosedLoop:
         sim = self.simulator
         return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
 
-    def rms(self, components: Any = (0, 1)) -> float:
-        """Root of the mean square of the distance from the reference in these coordinates, the first two by default.
+    def rms(self, components: Any = None) -> float:
+        """Root of the mean square of the distance from the reference in these coordinates, by default all `tracked`.
 
-        components: numbers below nv, or names as in `Mechanism.components`. The first two of a floating base are x and
-        y [m].
+        components: numbers below nv, or names as in `Mechanism.components`. Of several coordinates, squares of lengths
+        [m] and of angles [rad] are added up; `by_coordinate` has each of them by itself.
         """
         error = self.error()
-        call = "ClosedLoop.rms(components)"
-        chosen = chosen_components(call, components if error.shape[1] > 1 else None, self.simulator)
+        chosen = self.tracked
+        if components is not None or chosen is None:
+            chosen = chosen_components("ClosedLoop.rms(components)", components, self.simulator)
         return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
+
+    def by_coordinate(self) -> dict[str, float]:
+        """Name of each tracked coordinate: root of the mean square of its distance from the reference [m or rad]."""
+        each, names = np.sqrt(np.mean(self.error() ** 2, axis=0)), self.simulator.mechanism.dof_names
+        return {names[i]: float(each[i]) for i in (range(len(each)) if self.tracked is None else self.tracked)}
 
 
 def closed_loop(
@@ -83,7 +95,8 @@ def closed_loop(
 
     controller    an `MPC`, which is reset, or any function; asked every control_step [s], by default every time step of
                   the plant, its answer held in between
-    reference     times (n,) -> states (n, nx) for the error; that of the controller by default
+    reference     times (n,) -> states (n, nx) for the error; that of the controller by default, moved to the height of
+                  the ground as far as the controller has learnt it by then
     fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
 
     Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
@@ -103,8 +116,6 @@ def closed_loop(
     if hasattr(controller, "reset"):
         controller.reset()
     run = _Run([plant.x])
-    if reference is None:
-        reference = getattr(getattr(controller, "references", None), "state", None)
     try:
         _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen)
     except KeyboardInterrupt:
@@ -116,6 +127,9 @@ def closed_loop(
 def _closed_loop(run: _Run, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
     """What was kept of the steps, as arrays."""
     h, count = plant.sim.time_step, len(run.u)
+    own, tracked = getattr(controller, "references", None), None
+    if reference is None and own is not None and own.state is not None:
+        reference, tracked = Raised(own.state, h * np.arange(float(len(run.rise))), np.array(run.rise)), own.tracked
     return ClosedLoop(
         simulator=plant.simulator,
         time=h * np.arange(count + 1.0),
@@ -126,9 +140,26 @@ def _closed_loop(run: _Run, controller: Controller, plant: Plant, reference: Any
         survived=run.survived,
         message=run.message,
         softened=plant.softened,
-        log=tuple(getattr(controller, "log", ())),
+        log=tuple(run.log),
         reference=reference,
+        tracked=tracked,
     )
+
+
+class Raised:
+    """States over time, the third coordinate raised by what was learnt of the ground since the time of each row."""
+
+    def __init__(self, level: Any, time: Vector, rise: Vector) -> None:
+        self._level, self._time, self._rise = level, time, rise
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """(n, nx) at the times (n,) [s]."""
+        x = np.asarray(self._level(times))
+        if not self._rise.any():
+            return x
+        x = x.copy()
+        x[:, 2] += self._rise[np.maximum(np.searchsorted(self._time, np.asarray(times) + 1e-9) - 1, 0)]
+        return x
 
 
 @dataclass
@@ -139,6 +170,8 @@ class _Run:
     u: list[Vector] = field(default_factory=list)
     contacts: list[Contacts] = field(default_factory=list)
     status: list[int] = field(default_factory=list)
+    log: list[Tick] = field(default_factory=list)
+    rise: list[float] = field(default_factory=list)  # of the reference [m]
     survived: bool = True
     message: str = "Ran to the end."
 
@@ -148,11 +181,13 @@ def _drive(
 ) -> None:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
     command = np.zeros(plant.sim.nu)
+    own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
         if k % every == 0:
-            command = checks.array(
-                "closed_loop: controller's u", controller(plant.time, plant.measure()), (plant.sim.nu,)
-            )
+            asked = controller(plant.time, plant.measure().copy())  # a controller may write into what it gets
+            command = checks.array("closed_loop: controller's u", asked, (plant.sim.nu,))
+            run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
+        run.rise.append(0.0 if own is None else own.rise)
         u, result = plant.step(command)
         run.status.append(int(result.status))
         if result.status != Status.SOLVED:
@@ -161,7 +196,7 @@ def _drive(
         run.contacts.append(result.contacts)
         run.x.append(plant.x)
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
-        if lies(plant.x):
+        if lies(plant.x.copy()):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
 from sim.border import whole
+from sim.brief import brief_repr
 from sim.contact_settings import with_contacts
 from sim.mechanism import Mechanism
 from sim.parts import Input
@@ -59,6 +60,8 @@ class Perturbation:
     noise: ArrayLike = 0.0  # standard deviation of the measured state: a number or (ndx,) [m, rad, m/s, rad/s]
     control_limits: tuple[ArrayLike, ArrayLike] | None = None  # of what the actuators do with a command
     seed: int = 0  # of the noise
+
+    __repr__ = brief_repr
 
     def __post_init__(self) -> None:
         call = "Perturbation"
@@ -168,7 +171,7 @@ def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
 def _check_limits(call: str, limits: Any) -> None:
     """Refuse what is no (lower, upper) with lower <= upper; infinity is allowed."""
     try:
-        lo, hi = (np.asarray(b, dtype=np.float64) for b in limits)
+        lo, hi = (checks.floats(call, b) for b in limits)
     except (TypeError, ValueError):
         raise ValueError(f"{call}: expected (lower, upper), got {limits!r}") from None
     if not np.all(lo <= hi):

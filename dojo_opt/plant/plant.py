@@ -157,7 +157,7 @@ class Plant:
 
 def _spread(call: str, value: ArrayLike, size: int) -> Vector:
     """A number for all, or one for each of `size`."""
-    given = np.asarray(value, dtype=np.float64)
+    given = checks.floats(call, value)
     if given.shape not in ((), (size,)):
         raise ValueError(f"{call}: expected a number or shape ({size},), got {given.shape}")
     return np.array(np.broadcast_to(given, (size,)))

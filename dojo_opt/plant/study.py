@@ -18,6 +18,7 @@ from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim import checks
 from sim.border import whole
+from sim.brief import brief_repr, brief_table
 from sim.results import Interrupted
 
 Vector = NDArray[np.float64]
@@ -33,11 +34,13 @@ class Outcome:
     survived: bool
     message: str
     duration: float  # [s]
-    rms: float  # distance from the reference in x and y over time [m]; NaN without a reference
+    rms: float  # `ClosedLoop.rms` of all that is tracked [m, rad]; NaN without a reference
     x: Vector  # (nx,) last state
     log: Sequence[Tick]
     perturbation: Perturbation
     softened: int  # steps of the plant that needed softer contact than its own, see `Plant`
+
+    __repr__ = brief_repr
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,12 @@ class Study:
     outcomes: Sequence[Outcome]
     duration: float  # that each run was meant to last [s]
     seed: int
+
+    __repr__ = brief_repr
+
+    def _repr_html_(self) -> str:
+        rows = [(i, o.survived, o.duration, o.rms, o.message) for i, o in enumerate(self.outcomes)]
+        return brief_table(self.summary(), ("run", "survived", "duration [s]", "rms [m, rad]", "message"), rows)
 
     @property
     def survived(self) -> int:
@@ -65,7 +74,7 @@ class Study:
 
     @property
     def rms(self) -> Vector:
-        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m]."""
+        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m, rad]."""
         return np.array([o.rms if o.survived else np.nan for o in self.outcomes])
 
     def summary(self) -> str:
@@ -74,7 +83,7 @@ class Study:
         text = f"{self.survived} of {len(self.outcomes)} survive {self.duration:g} s (95 %: {lo:.3f} to {hi:.3f})"
         ms, lasted = self.milliseconds, self.rms[np.isfinite(self.rms)]
         if lasted.size:
-            text += f", rms xy median {np.median(lasted):.3f} m, largest {lasted.max():.3f} m"
+            text += f", rms median {np.median(lasted):.3f}, largest {lasted.max():.3f} (m, rad)"
         if ms.size:
             fallbacks = sum(tick.fallback for o in self.outcomes for tick in o.log)
             text += f"; tick median {np.median(ms):.2f} ms, 99 % {np.percentile(ms, 99):.2f} ms, {fallbacks} fallbacks"
@@ -91,13 +100,15 @@ def monte_carlo(
     seed: int = 0,
     executor: Executor | None = None,
     control_step: float | None = None,
+    components: Any = None,
 ) -> Study:
     """Run the closed loop `runs` times for `duration` [s], each under a perturbation drawn by the sampler.
 
     controller  an `MPC`, or a function of (time, x) without memory
     sampler     generator -> Perturbation; with an executor that uses processes, a function or object they can import
-    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor, Dask's
-                `client.get_executor()`, Ray's or MPI's pools
+    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
+                context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
+    components  of the `rms` of each run, as in `ClosedLoop.rms`; all that is tracked by default
 
     Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
     number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
@@ -115,7 +126,7 @@ def monte_carlo(
     whole("monte_carlo(seed=...)", seed, 0)
     checks.number("monte_carlo(duration)", duration, above=0.0)
     children = np.random.SeedSequence(seed).spawn(count)
-    tasks = [(controller, plant, sampler, float(duration), control_step, child) for child in children]
+    tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]
     futures: list[Any] = []
     outcomes: list[Outcome] = []
     try:
@@ -134,20 +145,21 @@ def _run(
     plant: Plant,
     sampler: Sampler,
     duration: float,
-    control_step: float | None,
+    settings: tuple[float | None, Any],
     seed: np.random.SeedSequence,
 ) -> Outcome:
     """One run; at module level, so that other processes can import it."""
     perturbation = sampler(np.random.default_rng(seed))
     if not isinstance(perturbation, Perturbation):
         raise TypeError(f"monte_carlo(sampler): expected it to return a Perturbation, got {perturbation!r}")
+    control_step, components = settings
     own = controller.fresh() if hasattr(controller, "fresh") else copy.copy(controller)
     loop = closed_loop(own, plant.perturbed(perturbation), duration, control_step=control_step)
     return Outcome(
         survived=loop.survived,
         message=loop.message,
         duration=loop.duration,
-        rms=float("nan") if loop.reference is None else loop.rms(),
+        rms=float("nan") if loop.reference is None else loop.rms(components),
         x=loop.x[-1],
         log=loop.log,
         perturbation=perturbation,

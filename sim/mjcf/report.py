@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.mechanism import Mechanism
 from sim.urdf.report import Frame, Note
 
@@ -34,6 +35,8 @@ class MjcfReport:
     gear: Floats  # (nu,)
     low: Floats  # (nu,) [N, N m]
     high: Floats  # (nu,)
+
+    __repr__ = brief_repr
 
     def __str__(self) -> str:
         lines = [f"{self.file}: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.gear)} actuators"]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.coupling.closing import is_weld
 from sim.mechanism import Mechanism
 from sim.model import IntegerMatrix, Vector
@@ -40,6 +41,9 @@ class Parameters(NamedTuple):
     names: tuple[str, ...]
     values: Floats  # (n,)
     rows: dict[str, slice]
+
+    def __repr__(self) -> str:
+        return brief_repr(self)
 
     def __getitem__(self, name: str) -> Floats:  # type: ignore[override]
         """Values of one name of the selection."""

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import checks
+from sim.brief import brief_repr
 from sim.terrain.ball_surface import raised
 from sim.terrain.spline import spline, spline_coefficients, spline_gradient, spline_shares
 
@@ -55,6 +56,8 @@ class Terrain:
     name: str = "ground"
     coefficients: Floats = field(init=False, repr=False)  # (nx + 2, ny + 2) of the spline
 
+    __repr__ = brief_repr
+
     def __post_init__(self) -> None:
         heights = np.array(checks.array("Terrain(heights=...)", self.heights, (None, None)))
         if heights.size == 0:
@@ -86,7 +89,7 @@ class Terrain:
             raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
         lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
         X, Y = np.meshgrid(*lines, indexing="ij")
-        values = np.array(np.broadcast_to(np.asarray(f(X, Y), dtype=np.float64), X.shape))
+        values = np.array(np.broadcast_to(checks.floats("Terrain.from_function(f)", f(X, Y)), X.shape))
         heights = checks.array("Terrain.from_function(f)", values, X.shape)
         spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
         return Terrain(heights, (lines[0][0], lines[1][0]), spacing)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.brief import brief_repr
 from sim.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,8 @@ class UrdfReport:
     links: dict[str, Frame]
     effort: Floats  # (nu,)
     velocity: Floats  # (nu,)
+
+    __repr__ = brief_repr
 
     def __str__(self) -> str:
         merged = len(self.links) - len({f.body for f in self.links.values()})

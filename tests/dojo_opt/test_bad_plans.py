@@ -145,3 +145,62 @@ def test_a_problem_says_what_it_is_about():
 def test_options_are_public():
     plan = dojo.ilqr(HOP, options=dojo.Options(max_iterations=2, stages=(dojo.Stage(1e-2, 1e-2),)))
     assert plan.status == dojo.Status.MAX_ITERATIONS and plan.nit == 2
+
+
+# -- complex numbers, and horizons that fit no memory -------------------------------------------------------------------
+
+HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
+AT, INPUTS = HOPPER.neutral(), np.zeros((5, 3))
+PATH = np.tile(AT, (6, 1))
+SPUN = 1.0 + 1e-3j  # a factor
+
+
+def plain(**settings):
+    return dojo.Problem(HOPPER, AT, 5, **{"cost": dojo.cost.Effort(1.0), **settings})
+
+
+COMPLEX = {
+    "start": lambda: dojo.Problem(HOPPER, AT * SPUN, 5),
+    "controls0": lambda: plain(controls0=INPUTS * SPUN),
+    "states0": lambda: plain(states0=PATH * SPUN),
+    "control_limits": lambda: plain(control_limits=(-np.ones(3) * SPUN, np.ones(3))),
+    "free_start": lambda: plain(free_start=np.array([1j])),
+    "Tracking(reference)": lambda: plain(cost=dojo.cost.Tracking(AT * SPUN, 1.0)),
+    "Tracking(weight)": lambda: plain(cost=dojo.cost.Tracking(AT, np.ones(14) * SPUN)),
+    "Effort(reference)": lambda: plain(cost=dojo.cost.Effort(1.0, reference=np.ones(3) * SPUN)),
+    "Effort(scale)": lambda: plain(cost=dojo.cost.Effort(1.0, scale=np.complex128(SPUN))),
+    "Goal(target)": lambda: plain(constraints=dojo.constraint.Goal(AT * SPUN)),
+    "StateBounds(lower)": lambda: plain(constraints=dojo.constraint.StateBounds(np.array(SPUN), 2.0, components=[2])),
+    "ControlBounds(upper)": lambda: plain(constraints=dojo.constraint.ControlBounds(-1.0, np.ones(3) * SPUN)),
+    "ilqr(controls)": lambda: dojo.ilqr(plain(), controls=INPUTS * SPUN),
+    "ilqr(states)": lambda: dojo.ilqr(plain(), states=PATH * SPUN),
+    "ilqr(stages)": lambda: dojo.ilqr(plain(), stages=((np.complex128(SPUN), 1e-3),)),
+    "step(x)": lambda: HOPPER.step(AT * SPUN, INPUTS[0]),
+    "rollout(us)": lambda: HOPPER.rollout(AT, INPUTS * SPUN),
+    "rollout(policy)": lambda: HOPPER.rollout(AT, lambda t, x: INPUTS[0] * SPUN, steps=3),
+    "closed_loop(limits)": lambda: HOPPER.closed_loop(AT, INPUTS, PATH, limits=(-np.ones(3) * SPUN, np.ones(3))),
+    "closed_loop(Ks)": lambda: HOPPER.closed_loop(AT, INPUTS, PATH, Ks=np.ones((5, 3, 14)) * SPUN),
+    "equilibrium(x)": lambda: dojo.equilibrium(HOPPER, AT * SPUN),
+    "Plant(noise)": lambda: dojo.Plant(HOPPER, noise=np.ones(14) * SPUN),
+    "Plant(payload_inertia)": lambda: dojo.Plant(HOPPER, payload=1.0, payload_inertia=np.ones(3) * SPUN),
+    "MPC(reference)": lambda: dojo.MPC(
+        plain(cost=dojo.cost.Tracking(AT, 1.0)), reference=lambda t: np.tile(AT, (len(t), 1)) * SPUN
+    ),
+    "MPC(x)": lambda: dojo.MPC(plain())(0.0, AT * SPUN),
+    "loop's u": lambda: dojo.closed_loop(lambda t, x: INPUTS[0] * SPUN, dojo.Plant(HOPPER), 0.1),
+    "Terrain": lambda: dojo.Terrain.from_function(lambda x, y: x * SPUN, [0.0, 1.0], [0.0]),
+    "Hopping(start)": lambda: dojo.tasks.Hopping(AT * SPUN, (0.0, 0.0), 0.2, 0.2),
+}
+
+
+@pytest.mark.parametrize("call", COMPLEX.values(), ids=COMPLEX)
+def test_complex_numbers_are_refused(call):
+    with pytest.raises((ValueError, TypeError), match=r"expected|real"):
+        call()
+
+
+def test_a_horizon_that_fits_no_memory_is_refused_with_what_it_takes():
+    with pytest.raises(ValueError, match=r"Problem\(horizon=...\): .* GiB of memory, and this machine has"):
+        dojo.Problem(HOPPER, AT, 10**9)
+    with pytest.raises(ValueError, match=r"GiB of memory"):
+        dojo.Problem(HOPPER, AT, 10**12, states0=PATH)

@@ -117,6 +117,20 @@ def test_a_step_that_cannot_be_solved_is_softened_and_counted():
     assert loop.survived and loop.softened == 1
 
 
+def test_functions_that_write_into_the_state_they_get_change_nothing():
+    def controller(t, x):
+        x[:] = 0.0
+        return np.array([0.0, 0.0, 41.0])
+
+    def fallen(x):
+        x[:] = 0.0
+        return False
+
+    loop = dojo.closed_loop(controller, Plant(HOPPER), 0.05, fallen=fallen)
+    kept = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, 41.0]), Plant(HOPPER), 0.05)
+    np.testing.assert_array_equal(loop.x, kept.x)
+
+
 def test_error_is_measured_from_the_reference():
     loop = dojo.closed_loop(
         lambda t, x: np.array([0.0, 0.0, 41.0]),

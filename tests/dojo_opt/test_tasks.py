@@ -27,16 +27,46 @@ def test_hopping_reference_is_consistent():
     away &= np.abs(np.mod(t, hopping.period) - hopping.stance) > 1e-4
     np.testing.assert_allclose(x[away][:, 8:11], slope[away][:, :3], atol=1e-6)
     np.testing.assert_allclose(x[away][:, 14], slope[away][:, 7], atol=1e-6)
-    foot = x[:, 2] - x[:, 7]
+    sim = dojo.tasks.hopper_mpc().sim
+    foot = sim.maximal(x)[:, 1]
     stands = np.mod(t, hopping.period) < hopping.stance
-    np.testing.assert_allclose(foot[stands], 0.05, atol=1e-12)
-    assert foot.max() == pytest.approx(0.05 + 0.25, abs=1e-4)
+    lap = np.floor(t / hopping.period)
+    middle = hopping.velocity * (lap * hopping.period + 0.5 * hopping.stance)[:, None]
+    np.testing.assert_allclose(foot[stands, :2], middle[stands], atol=1e-12)
+    np.testing.assert_allclose(foot[stands, 2], 0.05, atol=1e-12)
+    assert foot[:, 2].max() == pytest.approx(0.05 + 0.25, abs=1e-4)
+    turn = sim.difference(hopping(t + 1e-6), hopping(t - 1e-6))[:, 3:6] / 2e-6
+    np.testing.assert_allclose(x[away][:, 11:14], turn[away], atol=1e-5)
+    leaning = hopping.start.copy()
+    leaning[3:5] = np.cos(0.1), np.sin(0.1)
+    with pytest.raises(ValueError, match="upright body"):
+        dojo.tasks.Hopping(leaning, (0.0, 0.0), 0.25, 0.2)
+
+
+@pytest.mark.parametrize("perturbation", [{}, {"friction": 0.25}], ids=["nothing", "half the friction"])
+def test_hopper_keeps_to_all_that_is_tracked(perturbation):
+    """Height included, which the distance along the ground leaves out: to 20 mm."""
+    mpc = dojo.tasks.hopper_mpc(velocity=(0.2, 0.0), height=0.25)
+    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, **perturbation), 4.0)
+    each = loop.by_coordinate()
+    assert set(each) == {"body x", "body y", "body z", "body rx", "body ry", "body rz", "leg"}
+    assert loop.rms() == pytest.approx(np.sqrt(sum(value**2 for value in each.values())))
+    assert loop.rms() <= 0.020, each
+    assert loop.x[1000:, 2].max() == pytest.approx(0.8, abs=0.01)
+
+
+def test_the_reference_of_a_loop_is_where_the_ground_was_learnt_to_be():
+    mpc = dojo.tasks.quadruped_mpc()
+    loop = dojo.closed_loop(mpc, dojo.tasks.plant(mpc, 4e-3, slope=0.1), 1.5)
+    level = mpc.references.state(loop.time)
+    assert loop.reference(loop.time)[-1, 2] - level[-1, 2] > 0.01
+    assert loop.by_coordinate()["trunk z"] < 0.01
 
 
 def test_quadruped_trots_under_load_on_slippery_ground_and_pushed(quadruped):
     mpc, loop = quadruped
     assert loop.survived, loop.message
-    assert loop.rms() < 0.06
+    assert loop.rms((0, 1, 2)) < 0.06
     assert loop.x[-1, 0] - loop.x[0, 0] > 0.15
     heights = loop.contacts.gap  # it steps: every foot has been up and down
     assert np.all(heights.max(axis=0) > 0.02) and np.all(heights.min(axis=0) < 2e-3)
@@ -77,7 +107,7 @@ def test_quadruped_trots_over_a_bump(knows):
     plant = dojo.tasks.plant(mpc, 4e-3, **({} if knows else {"terrain": bump}))
     loop = dojo.closed_loop(mpc, plant, 1.6)
     assert loop.survived, loop.message
-    assert loop.rms() < 0.06
+    assert loop.rms((0, 1, 2)) < 0.06
     assert loop.x[-1, 2] - loop.x[0, 2] > 0.01
     assert loop.contacts.gap.min() > -1e-4
 
