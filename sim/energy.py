@@ -35,18 +35,19 @@ class Arrival(NamedTuple):
 
 
 @kernel
-def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, out: Matrix) -> None:
+def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, fall: float, out: Matrix) -> None:
     """out[i] = momentum of body i at the node where the interval ends, world axes, about `origin`:
 
-        linear     p = m (x2 - x1)/h + h/2 m g
+        linear     p = m (x2 - x1)/h + fall m g
         angular    x2 x p + P-(1, 2)
 
-    Springs and joints are left out: between bodies they cancel.   out: (nbody, 6).
+    fall: h/2 at the node, 0 before what acts there.   out: (nbody, 6).
+    Springs and joints are left out: between bodies they cancel.
     """
     for i in range(model.body_parent.shape[0]):
         P, t, m = out[i], end.turn[i], model.body_mass[i]
         for k in range(3):
-            P[k] = m * (end.move[i, k] / h + 0.5 * h * model.gravity[k])
+            P[k] = m * (end.move[i, k] / h + fall * model.gravity[k])
         x, y, z = end.pos[i, 0] - origin[0], end.pos[i, 1] - origin[1], end.pos[i, 2] - origin[2]
         mx, my, mz = cross(x, y, z, P[0], P[1], P[2])
         a, b, c = angular_momentum(end.inertia, i, h, t[0], -t[1], -t[2], -t[3])
@@ -59,7 +60,7 @@ def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) ->
     node_poses(model, work, h, x)
     world_inertia(model, work.rot2, work.inertia_world)
     end = Arrival(work.pos2, work.move_in, work.turn_in, work.inertia_world)
-    arriving_momentum(model, h, end, (0.0, 0.0, 0.0), out)
+    arriving_momentum(model, h, end, (0.0, 0.0, 0.0), 0.5 * h, out)
 
 
 @kernel

@@ -7,10 +7,11 @@ answer with there, and rounding adds 1e-16 M/D, M the same of a body that is fre
 
     W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 
-balances the two; 3e-14 M W' is an estimate of what is lost (Linearization.accuracy), 1e-6 where M = G. M is 1/m of the
-bodies that touch, with what is fixed to them. G is known from what the impulse gamma has done: it has stopped the speed
-v of the contact point, or carried weight for h, so G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has
-G = M/1000, and its impulses are not taken for those of a foot alone.
+balances the two; a contact that gives more than D is left alone. 3e-14 M W' is an estimate of what is lost
+(Linearization.accuracy), 1e-6 where M = G. M is 1/m of the bodies that touch, with what is fixed to them. G is known
+from what the impulse gamma has done: it has stopped the speed v of the contact point, or carried weight for h, so
+G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those
+of a foot alone.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def soften(model: Model, work: Work, h: float, c: int) -> None:
     q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
     M, G = responses(model, work, h, c)
     d = (_PART if work.bounce[c, 1] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
-    _compose(W, q, h * d, d)
+    _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
     hard = max(-h * W[0], -W[4], -W[8])
     work.contact_hard[0] = max(work.contact_hard[0], M * hard)
 

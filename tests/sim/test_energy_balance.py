@@ -8,7 +8,7 @@ from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
 from sim.bind import bind_step
-from sim.energy_balance import constraint_work, input_work, node_kinetic
+from sim.energy_balance import arriving_energy, constraint_work, work_at_node
 from sim.layout import model_view, work_view
 from solvers.jit import local_kernel
 
@@ -20,13 +20,13 @@ def joints_work(model_at, work_at, h, v):
 
 
 @local_kernel
-def kinetic(model_at, work_at, h, q, v, third):
-    return node_kinetic(model_view(model_at), work_view(work_at), h, q, v, third)
+def arriving(model_at, work_at, h, v, third):
+    return arriving_energy(model_view(model_at), work_view(work_at), h, v, third)
 
 
 @local_kernel
 def given(model_at, work_at, h, v, u):
-    return input_work(model_view(model_at), work_view(work_at), h, v, u)
+    return work_at_node(model_view(model_at), work_view(work_at), h, v, u)
 
 
 def tables(sim):
@@ -85,24 +85,40 @@ def test_a_body_without_joints_tumbles_without_it():
     assert abs(work_in_step(sim, x)[0]) < 1e-9
 
 
-@pytest.mark.parametrize("spring", [0.0, 30.0])
 @pytest.mark.parametrize("kind", KINDS)
-def test_energy_of_the_nodes_is_that_of_the_simulator(kind, spring, rng):
+def test_energy_on_arrival_is_that_of_the_simulator(kind, rng):
     """Before the step and after it, without leaving the step: another kernel computes `kinetic_energy`."""
-    if kind == "fixed" and spring:
-        pytest.skip("nothing for a spring to act on")
-    action = {"spring": spring} if spring else {}
-    sim = dojo.Simulator(chain(kind, 2, **action), time_step=0.03, tolerance=1e-12)
+    sim = dojo.Simulator(chain(kind, 2), time_step=0.03, tolerance=1e-12)  # without gravity
     x = random_state(sim, rng, speed=2.0)
     after = sim.step(x, throw=True).x
     for state, third in ((x, False), (after, True)):
         sim.step(x)
-        ours = kinetic(*tables(sim), sim.time_step, state[: sim.nq].copy(), state[sim.nq :].copy(), third)
+        ours = arriving(*tables(sim), sim.time_step, state[sim.nq :].copy(), third)
         assert abs(ours - sim.kinetic_energy(state)) < 1e-9 * (1.0 + ours)
 
 
-def test_work_of_inputs_is_what_bodies_gain(rng):
-    """A free body under forces and torques in its own and in world axes: to second order in the step."""
+@pytest.mark.parametrize(
+    "action", [{}, {"spring": 40.0}, {"armature": 0.3}, {"spring": 20.0, "armature": 0.3}], ids=str
+)
+def test_what_acts_on_a_chain_gives_what_it_gains(action, rng):
+    """Gravity, springs, rotors and torques: the balance is of third order in a step."""
+    errors = []
+    for h in (0.02, 0.01, 0.005):
+        sim = dojo.Simulator(pendulum(3, **action), time_step=h, tolerance=1e-12)
+        u = np.array([1.5, -2.0, 0.7])
+        x = sim.start(np.array([0.4, -0.3, 0.8]), np.array([1.0, 2.0, -1.5]))
+        after = sim.step(x, u, throw=True).x
+        before, later = (
+            arriving(*tables(sim), h, v.copy(), third) for v, third in ((x[sim.nq :], False), (after[sim.nq :], True))
+        )
+        work, size = given(*tables(sim), h, x[sim.nq :].copy(), u)
+        assert size >= abs(work) > 1e-3
+        errors.append(abs(later - before - work))
+    assert np.all(order(errors) > 2.5), (errors, order(errors))
+
+
+def test_work_of_inputs_is_what_bodies_gain():
+    """A free body under forces and torques in its own and in world axes."""
     body = dojo.Body("b", 2.0, inertia=(0.3, 0.2, 0.4))
     push = [dojo.Input(body="b", force=(1.0, 2.0, 0.5), torque=(0.3, -0.1, 0.2), frame=f) for f in ("world", "body")]
     mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "b")], inputs=push, gravity=(0.0, 0.0, 0.0))
@@ -112,11 +128,10 @@ def test_work_of_inputs_is_what_bodies_gain(rng):
         x = sim.start(sim.neutral()[: sim.nq], np.array([0.3, -0.2, 0.5, 1.0, 2.0, -1.5]))
         u = np.array([1.5, -2.0])
         after = sim.step(x, u, throw=True).x
-        w = given(*tables(sim), h, x[sim.nq :].copy(), u)
-        assert abs(w) > 1e-4
-        # impulses act at the nodes: the half that acted when the step began is in neither energy
-        errors.append(abs(sim.kinetic_energy(after) - sim.kinetic_energy(x) - w))
-    assert np.all(order(errors) > 1.7), (errors, order(errors))
+        work, _ = given(*tables(sim), h, x[sim.nq :].copy(), u)
+        assert abs(work) > 1e-4
+        errors.append(abs(sim.kinetic_energy(after) - sim.kinetic_energy(x) - work))
+    assert np.all(order(errors) > 2.5), (errors, order(errors))
 
 
 CASES = ("level", "wall", "limits", "restitution", "motor")
@@ -163,19 +178,18 @@ def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
 
 
 def test_a_rounding_of_the_state_does_not_flip_the_energy(attacks):
-    """States whose steps had two solutions a rounding apart: whichever is found first, none gains energy."""
-    for seed in (29, 33, 147, 171, 242):
-        rng = np.random.default_rng([seed, 1])
-        mech = attacks.random_mechanism(rng, attacks.ANYTHING)
-        kappa = None if rng.random() < 0.7 else 1e-4
-        sim = dojo.Simulator(mech, float(rng.choice([0.001, 0.005, *attacks.TIME_STEPS])), kappa=kappa)
-        x = attacks.random_state(sim, rng)
-        direction = rng.normal(size=sim.ndx)
-        for eps in (0.0, 1e-9, -1e-9, 1e-7):
+    """Passive trees at 50 ms, some with solutions a rounding apart: whichever is found first, none gains energy."""
+    refused = 0
+    for seed in range(300):
+        rng = np.random.default_rng([seed, 4])
+        sim = dojo.Simulator(attacks.random_mechanism(rng, attacks.PASSIVE), time_step=0.05)
+        x, direction = attacks.random_state(sim, rng), rng.normal(size=sim.ndx)
+        for eps in (0.0, 1e-9, -1e-9):
             y = sim.integrate(x, eps * direction)
             r = sim.step(y)
-            gain = float(sim.energy(r.x) - sim.energy(y))
-            assert gain <= 0.1 * sim.kinetic_energy(y) or not r.success, (seed, eps, gain)
+            refused += r.status == dojo.Status.ENERGY_STEP
+            assert not r.success or sim.energy(r.x) - sim.energy(y) <= 0.1 * sim.kinetic_energy(y), (seed, eps)
+    assert refused > 3
 
 
 @pytest.mark.parametrize("links, order_, h", [(10, 6, 0.025), (10, 8, 0.02), (20, 4, 0.02)])
