@@ -58,11 +58,12 @@ class Continuation:
     def reset(self) -> None:
         """Forget the last solve and start the clock."""
         self.journal.reset()
-        vars(self).pop("now", None)
+        self.begun = False  # whether `now` belongs to this solve
 
     def start(self, now: Iterate, kappa: float | None) -> None:
         """Begin at `now`, a rollout at `kappa`, or states whose gaps are not known yet (None)."""
         self._shooting.reset()
+        self.begun = True
         self.now = now
         self.kappa = kappa
         self._kappa_grad = 0.0

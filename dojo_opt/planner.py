@@ -107,8 +107,7 @@ class Solver:
         try:
             return self._solve(controls, states, warm_start)
         except KeyboardInterrupt:
-            known = hasattr(self.continuation, "now")
-            raise Interrupted(self._plan(Status.INTERRUPTED, "") if known else None) from None
+            raise Interrupted(self._plan(Status.INTERRUPTED, "") if self.continuation.begun else None) from None
 
     def _solve(self, controls: ArrayLike | None, states: ArrayLike | None, warm_start: Plan | None) -> Plan:
         """As `solve`."""

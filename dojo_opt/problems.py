@@ -79,9 +79,8 @@ def swingup(name: str = "cartpole") -> Problem:
     """Pendulum, cart-pole or acrobot from hanging at rest to upright at rest, which is a constraint.
 
     pendulum: 51 states, 50 ms, |torque| <= 200 N m, weights .1 and .01. cartpole: 26 states, 100 ms, .1 and .001.
-    acrobot: 51 states, 100 ms of two steps, .1 on the velocities and .1 on the torque.
+    acrobot: 51 states, 100 ms, .1 on the velocities and .1 on the torque.
     """
-    substeps = 1
     weight: ArrayLike
     if name == "pendulum":
         sim, horizon, upright = Simulator(models.pendulum(damper=1.0), time_step=0.05), 50, [np.pi]
@@ -90,8 +89,7 @@ def swingup(name: str = "cartpole") -> Problem:
         sim, horizon, upright = Simulator(models.cartpole(), time_step=0.1), 25, [0.0, np.pi]
         weight, effort, limits = 0.1, 1e-3, None
     elif name == "acrobot":
-        sim, horizon, upright = Simulator(models.acrobot(), time_step=0.05), 50, [np.pi, 0.0]
-        substeps = 2  # steps of 100 ms, in which the elbow turns by more than a radian, gain energy
+        sim, horizon, upright = Simulator(models.acrobot(), time_step=0.1), 50, [np.pi, 0.0]
         weight, effort, limits = np.array([0.0, 0.0, 0.1, 0.1]), 0.1, None
     else:
         raise ValueError(f'problems.swingup(name): expected "pendulum", "cartpole" or "acrobot", got {name!r}')
@@ -105,7 +103,6 @@ def swingup(name: str = "cartpole") -> Problem:
         constraints=[Goal(target)],
         control_limits=limits,
         controls0=np.broadcast_to(ramp, (horizon, sim.nu)).copy(),
-        substeps=substeps,
     )
 
 

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.collisions import pack_collisions
 from sim.contacts.clusters import pack_clusters
-from sim.contacts.confined import confined
 from sim.layout import Sizes, allocate_model
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law, Model
@@ -214,7 +213,10 @@ def _pack_contacts(mech: Mechanism, model: Model) -> None:
         model.contact_restitution[c] = contact.restitution
         model.contact_frame[c] = contact_frame(contact.normal).ravel()
         model.contact_height[c] = contact.height
-    model.contact_hold[:] = confined(model, mech.contacts)
+    if mech.contacts:
+        from sim.contacts.confined import confined  # scenes without contacts do not import it
+
+        model.contact_hold[:] = confined(model, mech.contacts)
     pack_clusters(model)
 
 

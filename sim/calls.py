@@ -12,6 +12,7 @@ with what they would have returned, as far as they came.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,28 @@ from solvers.status import Status
 Floats = NDArray[np.float64]
 
 REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
+_SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
+
+
+def finite_rows(array: Floats) -> NDArray[np.bool_]:
+    """Which rows (along the first axis) are finite throughout."""
+    return np.asarray(np.isfinite(array).reshape(len(array), -1).all(axis=1))
+
+
+def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
+    """The first of `count` steps with a row that is not finite, whose status says so then; `count` where there is none.
+
+    A sum is looked at first, which takes a tenth of the time; small ones by `dot`, which has less to set up.
+    """
+    if all(isfinite(flat.dot(flat) if flat.size < _SMALL else flat.sum()) for flat in [a.ravel() for a in arrays]):
+        return count
+    good = np.logical_and.reduce([finite_rows(a) for a in arrays])
+    if good.all():
+        return count
+    first = int(good.argmin())
+    reports[first, 0] = Status.NOT_FINITE
+    return first
 
 
 def interrupted(reports: Floats, knot: int) -> Floats:
@@ -97,6 +119,7 @@ class Calls(StateCalls):
                     break
         except KeyboardInterrupt:
             raise Interrupted((knot, xs, interrupted(reports, knot), contacts)) from None
+        knot = refuse(reports, knot, contacts[:knot])
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return knot, xs, reports, contacts
@@ -169,7 +192,8 @@ class Calls(StateCalls):
                 rollout.linearize_knots(model, works, settings, substeps, line, done)
                 if np.array_equal(done, ends[1:]):
                     break
-        if reports[:, 0].any():
+        if reports[:, 0].any() or refuse(reports, n, A, B) < n:
+            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
             unsolved = reports[:, 0] != Status.SOLVED
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
@@ -188,6 +212,7 @@ class Calls(StateCalls):
             knot = int(linear_rollout.roll_linear(model, work, settings, line, knot))
             if knot == n or reports[knot, 0] != Status.SOLVED:
                 break
+        knot = refuse(reports, knot, A[:knot], B[:knot])
         if knot < n:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
         return knot, xs, A, B, reports

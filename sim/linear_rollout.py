@@ -8,14 +8,12 @@ from sim.model import Vector
 from sim.options import Guess
 from sim.pace import is_due
 from sim.rollout import ACCURACY, Linearized, options_of
-from solvers.dense import is_finite
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
-_NOT_FINITE = int(Status.NOT_FINITE)
 
 
 @kernel
@@ -38,9 +36,6 @@ def roll_linear(model_at: Table, work_at: Table, settings: Vector, line: Lineari
             report[0] = _SINGULAR
             return t
         report[5] = ACCURACY * work.contact_hard[0]
-        if not (is_finite(line.A[t]) and is_finite(line.B[t])):
-            report[0] = _NOT_FINITE
-            return t
         if is_due(work, report[1] + line.A.shape[1]):
             return t + 1
     return line.us.shape[0]

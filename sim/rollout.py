@@ -20,7 +20,7 @@ from sim.options import Guess, Options
 from sim.pace import DEADLINE, is_due, start_pace
 from sim.work import Work
 from solvers.clock import seconds
-from solvers.dense import copy_vector, is_finite
+from solvers.dense import copy_vector
 from solvers.jit import kernel
 from solvers.parallel import parallel_kernel, prange
 from solvers.record import Table
@@ -28,7 +28,6 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
-_NOT_FINITE = int(Status.NOT_FINITE)
 ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
 Cube = Matrix  # (n, rows, columns)
 
@@ -91,9 +90,6 @@ def roll(
         if step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t]) != _SOLVED:
             return t
         report_contacts(model, work, options.h, contacts[t])
-        if not is_finite(contacts[t]):
-            reports[t, 0] = _NOT_FINITE
-            return t
         if is_due(work, reports[t, 1]):
             return t + 1
     return us.shape[0]
@@ -168,9 +164,6 @@ def linearize(
             report[5] = max(report[5], ACCURACY * work.contact_hard[0])
             if s > 0:
                 _chain(work, A, B)
-            if not (is_finite(A) and is_finite(B)):
-                report[0] = _NOT_FINITE
-                break
             if is_due(work, report[1] + A.shape[0]):
                 return t * substeps + s + 1
     return knots[2] * substeps

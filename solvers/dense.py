@@ -57,15 +57,6 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @kernel
-def is_finite(A: Matrix) -> bool:
-    """Whether every entry is finite, and below 1e150 in size."""
-    total = 0.0
-    for i in range(A.shape[0]):
-        total += dot(A[i], A[i])
-    return total < 1e300
-
-
-@kernel
 def axpy(a: float, x: Vector, y: Vector) -> None:
     """y += a x"""
     for i in range(x.shape[0]):

@@ -11,6 +11,7 @@ from naive import rotation as rot
 from scenes import random_state
 
 import dojo_opt as dojo
+from sim.calls import REPORT, refuse
 from sim.contacts.confined import IDLE, SUNK
 from sim.mechanism import Mechanism
 
@@ -225,27 +226,24 @@ def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
         assert np.isfinite(block).all()
 
 
-def test_a_number_that_is_not_finite_gets_a_status(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever kernel it comes from: contacts of a step, and derivatives."""
-    from sim import calls
+def test_a_number_that_is_not_finite_is_seen() -> None:
+    """In whichever step it stands; the status of that step says so."""
+    for wrong in (np.nan, np.inf, -np.inf):
+        for count in (3, 3000):  # small ones and large ones are looked at in two ways
+            reports, rows = np.zeros((count, REPORT)), np.ones((count, 4, 3))
+            assert refuse(reports, count, rows) == count
+            rows[1, 2, 0] = wrong
+            assert refuse(reports, count, rows) == 1
+            assert list(np.flatnonzero(reports[:, 0] == dojo.Status.NOT_FINITE)) == [1]
 
-    sim = dojo.Simulator(hinged(1.0), 0.01)
-    roll, linearize = calls.rollout.roll, calls.rollout.linearize
 
-    def spoilt_roll(*args):
-        knot = roll(*args)
-        args[-1][1, 0, 2] = np.nan
-        return knot
-
-    def spoilt_linearize(model, work, settings, knots, substeps, line):
-        linearize(model, work, settings, knots, substeps, line)
-        line.A[1, 0, 0] = np.inf
-
-    monkeypatch.setattr(calls.rollout, "roll", spoilt_roll)
-    t = sim.rollout(sim.neutral(), np.zeros((3, 1)))
-    assert (t.status, t.knot, len(t.x)) == (dojo.Status.NOT_FINITE, 1, 2)
-    monkeypatch.setattr(calls.rollout, "roll", roll)
-    monkeypatch.setattr(calls.rollout, "linearize", spoilt_linearize)
-    linear = sim.linearize_trajectory(np.tile(sim.neutral(), (3, 1)), np.zeros((3, 1)))
-    assert list(linear.status) == [0, dojo.Status.NOT_FINITE, 0]
-    assert np.isfinite(linear.A).all()
+def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
+    """Whatever a kernel makes of it, no number that is not finite is called solved."""
+    for field in ("contact_friction", "contact_radius", "body_mass", "contact_point"):
+        sim = dojo.Simulator(hinged(1.0), 0.01)
+        getattr(sim._calls.model, field)[...] = np.nan
+        t = sim.rollout(sim.neutral(), np.zeros((3, 1)))
+        linear = sim.linearize_trajectory(np.tile(sim.neutral(), (3, 1)), np.zeros((3, 1)))
+        assert np.isfinite(t.contacts.impulse).all() and np.isfinite(t.contacts.gap).all()
+        assert np.isfinite(linear.A).all() and np.isfinite(linear.B).all()
+        assert not t.success and linear.status.all()
