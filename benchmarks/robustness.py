@@ -132,7 +132,8 @@ def run_cell(name: str, friction: float, h: float, kappa: float, states: int, se
             cell.iterations.append(int(result.iterations))
             gain = sim.energy(result.x) - sim.energy(x)
             fine = np.isfinite(result.x).all() and lowest(sim, result.x) > -1e-6
-            cell.unreported += not (fine and gain <= GAIN * sim.kinetic_energy(x))
+            smoothing = kappa / h * len(sim.mechanism.contacts)
+            cell.unreported += not (fine and gain <= GAIN * sim.kinetic_energy(x) + smoothing)
         elif status == dojo.Status.ENERGY_STEP:
             cell.gaining += 1
         else:

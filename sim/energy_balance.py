@@ -38,7 +38,7 @@ from sim.energy import (
     momentum_velocity,
     spatial_inertia,
 )
-from sim.joints.limits import add_limit_impulse
+from sim.joints.terms import add_limit_impulse
 from sim.late import loop_slack, pair_slack
 from sim.mass import eliminate_mass
 from sim.model import InputKind, Model, Vector

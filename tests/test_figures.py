@@ -41,9 +41,9 @@ def test_a_changed_number_is_put_right(figures, studies):
     text = (figures.ROOT / "README.md").read_text(encoding="utf-8")
     quotes = figures.quotes()
     _, spans = figures.fill("README.md", text, quotes, studies)
-    command = text.index("random extreme states, unsolved |")
+    command = text.index("random extreme states, unsolved; refused")
     start, end = next((a, b) for a, b in spans if a <= command < b)
-    wrong = text[:start] + text[start:end].replace("unsolved | ", "unsolved | 1") + text[end:]
+    wrong = text[:start] + text[start:end].replace("gains energy | ", "gains energy | 1") + text[end:]
     assert wrong != text
     assert figures.fill("README.md", wrong, quotes, studies)[0] == text
 

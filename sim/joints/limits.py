@@ -9,8 +9,9 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 from __future__ import annotations
 
 from sim import late
+from sim.joints.terms import add_limit_impulse
 from sim.late import cone_block, cone_derivative, cone_gap
-from sim.model import Model, Vector
+from sim.model import Model
 from sim.options import Goal
 from sim.work import Work
 from solvers.cones import onto_path, return_pair
@@ -26,17 +27,6 @@ def limit_gaps(model: Model, work: Work, h: float) -> None:
             continue
         a = model.dof_qadr[model.limit_dof[k]]
         work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
-
-
-@kernel
-def add_limit_impulse(model: Model, work: Work, k: int, size: float, out: Vector) -> None:
-    """out += the generalized impulse of limit k.   out: (nv,)."""
-    d = model.limit_dof[k]
-    if model.limit_cone[k]:
-        for j in range(3):
-            out[d + j] += work.bound_row[k, j] * size
-    else:
-        out[d] += model.limit_sign[k] * size
 
 
 @kernel

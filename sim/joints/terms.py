@@ -86,3 +86,14 @@ def add_swing_curvature(model: Model, work: Work, q: Vector) -> None:
         if model.joint_nrot[i] == 2:
             a = model.body_qadr[i + 1] - 2
             swing_curvature(model, work, i, q[a], q[a + 1])
+
+
+@kernel
+def add_limit_impulse(model: Model, work: Work, k: int, size: float, out: Vector) -> None:
+    """out += the generalized impulse of limit k.   out: (nv,)."""
+    d = model.limit_dof[k]
+    if model.limit_cone[k]:
+        for j in range(3):
+            out[d + j] += work.bound_row[k, j] * size
+    else:
+        out[d] += model.limit_sign[k] * size
