@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import linear_rollout, rollout
-from sim.bind import bind_gradient, bind_step
 from sim.layout import work_view
+from sim.link import link_gradient, link_step
 from sim.model import Integers, Model, Vector
 from sim.pace import pieces
 from sim.policy import Path, Policy, closed_loop
@@ -94,14 +94,14 @@ class Calls(StateCalls):
 
     def __getstate__(self) -> tuple[Model, Settings]:
         """Tables and kernels are addresses in this process: another one makes its own."""
-        return self.model._replace(late=np.zeros_like(self.model.late)), self.settings
+        return self.model._replace(optional=np.zeros_like(self.model.optional)), self.settings
 
     def __setstate__(self, state: tuple[Model, Settings]) -> None:
         self.__init__(*state)  # type: ignore[misc]
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Tables of the Model, bound for derivatives and what else a call needs, and of this thread's first Work."""
-        return self._table(bind_step, bind_gradient, *needs), self._scratch.table()
+        return self._table(link_step, link_gradient, *needs), self._scratch.table()
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """(number of solved steps, states, report of every step, contacts of every step)."""
@@ -110,7 +110,7 @@ class Calls(StateCalls):
         reports = np.zeros((steps, REPORT))
         contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
         xs[0] = x
-        model, work, settings = self._table(bind_step), self._scratch.table(), self.settings.array()
+        model, work, settings = self._table(link_step), self._scratch.table(), self.settings.array()
         knot = 0
         try:
             for _ in pieces(settings, steps):
@@ -150,7 +150,7 @@ class Calls(StateCalls):
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
         path = self._path(len(policy.us), keep=keep)
         path.xs[0] = x
-        model, work, settings = self._table(bind_step), self._scratch.table(), self.settings.array(kappa)
+        model, work, settings = self._table(link_step), self._scratch.table(), self.settings.array(kappa)
 
         def go_on(first: int) -> int:
             return int(closed_loop(model, work, settings, policy, alpha, limits, substeps, path, first))
@@ -177,7 +177,7 @@ class Calls(StateCalls):
             if len(xs) == n:
                 x_next[-1:] = xs[-1:]
         line = rollout.Linearized(xs, us, A, B, x_next, reports)
-        model, settings = self._table(bind_step, bind_gradient), self.settings.array(kappa)
+        model, settings = self._table(link_step, link_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
             work, step = self._scratch.table(), 0
             for _ in pieces(settings, n * substeps):
@@ -228,7 +228,7 @@ class Calls(StateCalls):
         xs = np.zeros((n, steps + 1, self.nx))
         xs[:, 0] = x0s
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-        model, works, settings = self._table(bind_step), self._scratch.chunks(n), self.settings.array()
+        model, works, settings = self._table(link_step), self._scratch.chunks(n), self.settings.array()
         try:
             for _ in pieces(settings, n * steps):
                 rollout.roll_batch(model, works, settings, us, xs, status, knots)

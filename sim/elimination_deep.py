@@ -6,12 +6,13 @@ the nearest cache.
 
 from __future__ import annotations
 
-from sim import late
 from sim.model import Model
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
 from solvers.lanes import LANES, dot_lanes, load, plus, plus_outer, put, six, store, zeros
 from solvers.lu import lu_solve_lanes
+from solvers.optional import optional
 
 
 @kernel
@@ -63,7 +64,7 @@ def _down(model: Model, work: Work, c: int) -> None:
             put(P, 6 * i, 0, above)
 
 
-@late.solve_deep_panel.defined(otherwise=0)
+@optional(Slot.SOLVE_DEEP_PANEL, default=0)
 def solve_deep_panel(model: Model, work: Work, count: int) -> int:
     """columns[:, :count] := H^-1 columns[:, :count], in time that is linear in the number of joints; returns count."""
     for c in range(0, count, LANES):

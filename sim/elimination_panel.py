@@ -12,7 +12,7 @@ so that the last block of columns needs no care.
 
 from __future__ import annotations
 
-from sim.late import solve_deep_panel
+from sim.elimination_deep import solve_deep_panel
 from sim.model import Model
 from sim.work import Work
 from solvers.jit import kernel

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from sim.angular_momentum import angular_momentum
 from sim.coordinates import node_poses
+from sim.coupling.loop_velocity import close_velocity
 from sim.dynamics import world_inertia
 from sim.elimination import factor, project, solve, subtree_sums
 from sim.joints.ball_spring import relative_to_rest
-from sim.late import close_velocity
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, quat_exp, quat_mul

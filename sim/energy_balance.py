@@ -29,6 +29,7 @@ contacts by .05 rad: of the motions of benchmarks/attacks.py, none that is accep
 
 from __future__ import annotations
 
+from sim.coupling.loop_work import loop_slack
 from sim.dynamics import world_inertia
 from sim.elimination import add_children, dot_six
 from sim.energy import (
@@ -39,10 +40,10 @@ from sim.energy import (
     spatial_inertia,
 )
 from sim.joints.terms import add_limit_impulse
-from sim.late import loop_slack, pair_slack
 from sim.mass import eliminate_mass
 from sim.model import InputKind, Model, Vector
 from sim.options import Options
+from sim.pairs.work import pair_slack
 from sim.rotation import cross, rotate
 from sim.solve.residual import residual_scale
 from sim.work import Work

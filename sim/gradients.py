@@ -6,35 +6,31 @@ central path the condensed contact matrices W are the exact derivatives of the i
 
 from __future__ import annotations
 
-from sim import late
+from sim.contacts.restitution_gradient import add_bounce_composites, add_bounce_derivatives
+from sim.coupling.gradient import add_coupling_composites, add_coupling_derivatives
+from sim.coupling.system import factor_coupling, solve_coupling_panel
 from sim.elimination import factor_of
 from sim.elimination_panel import solve_panel
+from sim.joints.limits import add_limit_derivatives
 from sim.joints.terms import add_spring_derivatives, add_swing_curvature, joint_blocks
 from sim.kinematics import velocity_columns
-from sim.late import (
-    add_bounce_composites,
-    add_bounce_derivatives,
-    add_coupling_composites,
-    add_coupling_derivatives,
-    add_limit_derivatives,
-    add_stiffness,
-    all_near,
-    factor_coupling,
-    solve_coupling_panel,
-)
 from sim.model import InputKind, Matrix, Model, Vector
 from sim.outer import input_wrench
+from sim.pairs.far import all_near
 from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.residual_gradient import residual_derivatives
 from sim.rotation import Vec3, left_jacobian, quat_exp, quat_matrix
+from sim.slots import Slot
+from sim.solve.inequalities import add_stiffness
 from sim.work import Work
 from solvers.jit import kernel
 from solvers.lanes import LANES, load, spread, store
+from solvers.optional import optional
 
 _JOINT = int(InputKind.JOINT)
 
 
-@late.gradient.defined(otherwise=False)
+@optional(Slot.GRADIENT, default=False)
 def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix) -> bool:
     """A = dx3/dx2 (2 nv, 2 nv), B = dx3/du (2 nv, nu) of the step now in `work`, solved at kappa.  False if singular.
 

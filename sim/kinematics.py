@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim.late import swing_pose
+from sim.joints.swing import swing_pose
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
 from sim.work import Work

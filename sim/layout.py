@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import late
 from sim.model import Model
+from sim.slots import Slot
 from sim.work import Work
 from solvers.lanes import LANES, SIDE, whole
 from solvers.record import Field, record, table
@@ -32,7 +32,7 @@ MODEL_INTS = _shapes(
     body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
     body_above nbody nblock, body_below nbody nblock,
     dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
-    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, late nlate,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, optional nslot,
     contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
     pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
     loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
@@ -133,7 +133,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
         "2npair": 2 * sizes.npair,
         "ncoupling+1": sizes.ncoupling + 1,
         "2ncoupling": 2 * sizes.ncoupling,
-        "nlate": late.COUNT,
+        "nslot": len(Slot),
         "nblock": whole(nv) // LANES,
         "nwide": whole(nv),
         "ncolumn": columns,

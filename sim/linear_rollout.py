@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from sim.late import gradient, step
+from sim.gradients import gradient
 from sim.layout import model_view, work_view
 from sim.model import Vector
 from sim.options import Guess
 from sim.pace import is_due
 from sim.rollout import ACCURACY, Linearized, options_of
+from sim.step import step
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status

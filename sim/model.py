@@ -62,7 +62,7 @@ class Model(NamedTuple):
     dof_qadr: Integers  # (nv,) coordinate of a scalar dof in q; for a quaternion dof, that of its quaternion
     contact_body: Integers  # (ncontact,) contacts with the ground come first, then the pairs
     contact_law: Integers  # (ncontact,) Law
-    late: Integers  # addresses of kernels, by sim/late.py; 0 where the scene has no use for one, or had none so far
+    optional: Integers  # addresses of the optional kernels, by Slot; 0 where the scene has not linked one
     contact_terrain: Integers  # (nground,) 1 + its terrain, 0 for a half-space
     terrain_size: IntegerMatrix  # (nterrain, 3) first of its coefficients, and their number along x and y
     contact_hold: Integers  # (nground,) IDLE or SUNK of contacts/confined.py, 0 for the others

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.joints.swing import swing_pose, swing_turn
 from sim.kinematics import axis_column, displace
-from sim.late import swing_pose, swing_turn
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
 from sim.work import Work

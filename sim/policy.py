@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.late import step
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Vector
 from sim.options import Guess
 from sim.pace import is_due
 from sim.rollout import Cube, options_of
 from sim.state import integrate_state, state_difference
+from sim.step import step
 from solvers.dense import copy, copy_vector, dot
 from solvers.jit import kernel
 from solvers.record import Table

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.late import gradient, report_contacts, step
+from sim.contacts.report import report_contacts
+from sim.gradients import gradient
 from sim.layout import model_view, work_view
 from sim.model import Integers, Matrix, Vector
 from sim.options import Guess, Options
 from sim.pace import DEADLINE, is_due, start_pace
+from sim.step import step
 from sim.work import Work
 from solvers.clock import seconds
 from solvers.dense import copy_vector

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import coordinates, coordinates_jacobian, energy, start, state, velocity
-from sim.bind import bind_nodes, bind_poses
 from sim.layout import sizes_of, table
+from sim.link import link_nodes, link_poses
 from sim.model import Model, Vector
 from sim.pace import rows
 from sim.results import SimulationError
@@ -28,7 +28,7 @@ class StateCalls:
         self.model, self.settings = model, settings
         self.sizes = sizes_of(model)
         self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
-        bind_poses(model)
+        link_poses(model)
         self._bound: set[Callable[[Model], None]] = set()
         self._model = table(model)
         self._scratch = Scratch(self.sizes, model.contact_frame)
@@ -58,7 +58,7 @@ class StateCalls:
     def node_velocities(self, xs: Floats) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""
         out = np.zeros((len(xs), self.sizes.nv))
-        model, work, h = self._table(bind_nodes), self._scratch.table(), self.settings.time_step
+        model, work, h = self._table(link_nodes), self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
             velocity.node_velocities(model, work, h, xs[part], out[part])
         return out
@@ -126,7 +126,7 @@ class StateCalls:
     def energies(self, xs: Floats) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        model, work, h = self._table(bind_nodes), self._scratch.table(), self.settings.time_step
+        model, work, h = self._table(link_nodes), self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
             energy.energies(model, work, h, xs[part], out[part])
         return out

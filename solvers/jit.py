@@ -1,5 +1,5 @@
 """`@kernel`: Numba, its flags, and compiled code on disk, of cache.py. (Numba is imported here, in cache.py, code.py,
-lowering.py, arithmetic.py, lanes.py, late.py, record.py, clock.py and parallel.py only.)
+lowering.py, arithmetic.py, lanes.py, optional.py, record.py, clock.py and parallel.py only.)
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ contact_frame holds the rows n, T: those of the half-space, or on terrain those 
 
 from __future__ import annotations
 
-from sim.late import place_on_terrain, turn_on_terrain
 from sim.model import Matrix, Model
 from sim.rotation import cross, rotate, transposed_times
+from sim.terrain.contact import place_on_terrain, turn_on_terrain
 from sim.work import Work
 from solvers.jit import kernel
 

@@ -31,10 +31,11 @@ from __future__ import annotations
 
 from sim.contacts.clusters import STIFFNESS
 from sim.contacts.confined import SUNK
-from sim.late import enlist_pairs, pairs_came_near, terrain_gap
 from sim.model import Model
 from sim.options import Options
+from sim.pairs.far import enlist_pairs, pairs_came_near
 from sim.rotation import rotate
+from sim.terrain.contact import terrain_gap
 from sim.work import Work
 from solvers.jit import kernel
 

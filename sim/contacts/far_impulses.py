@@ -13,10 +13,10 @@ from math import sqrt
 
 from sim.contacts.far_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contacts.friction import contact_impulse, start_contact
-from sim.late import evaluate_on_terrain
 from sim.model import Law, Model
 from sim.moves import third_quaternion
 from sim.rotation import cross, rotate, transposed_times
+from sim.terrain.far import evaluate_on_terrain
 from sim.work import Work
 from solvers.jit import inlined, kernel
 

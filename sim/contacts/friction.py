@@ -8,11 +8,8 @@ degenerate, and costs nothing when left out.
 from __future__ import annotations
 
 from sim.contacts.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
-from sim.contacts.contact import contact_rate
-from sim.contacts.softening import soften
-from sim.late import (
+from sim.contacts.pyramid import (
     condense_pyramid,
-    pair_rate,
     pyramid_boundary,
     pyramid_constant,
     pyramid_error,
@@ -22,8 +19,10 @@ from sim.late import (
     return_pyramid,
     start_pyramid,
 )
-from sim.model import Law, Model
+from sim.contacts.softening import soften
+from sim.model import Law, Model, Vector
 from sim.options import LINEAR, SOFT, Goal
+from sim.rotation import Vec3
 from sim.work import Work
 from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.jit import kernel
@@ -221,14 +220,11 @@ def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
 
 
 @kernel
-def recover_contact(model: Model, work: Work, c: int, share: float) -> None:
-    """cone_step of contact c from the body twists of the last solve."""
+def recover_contact(model: Model, work: Work, c: int, rate: Vec3, share: float) -> None:
+    """cone_step of contact c, where its gap and slip change by `rate`: contact_rate, or pair_rate between bodies."""
     z = work.cone[c]
     d = work.cone_step[c]
-    if c < model.contact_height.shape[0]:
-        a, x, y = contact_rate(model, work, c)
-    else:
-        a, x, y = pair_rate(model, work, c)
+    a, x, y = rate
     d[0] = a + share * (work.contact_kin[c, 0] - z[0])
     d[1] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
     law = law_of(model, c)
@@ -236,3 +232,17 @@ def recover_contact(model: Model, work: Work, c: int, share: float) -> None:
         recover_cone(work, c, a, x, y)
     elif law == _LINEAR:
         recover_pyramid(model, work, c, x, y, share)
+
+
+@kernel
+def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+    """One row, with the frame F of its normal and tangents."""
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    fn, f1, f2 = contact_impulse(model, work, c)
+    for e in range(3):
+        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+        out[3 + e] = work.pos3[i, e] + k[3 + e]
+        out[8 + e] = F[e]
+    out[6] = k[0] + work.bounce[c, 0]
+    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

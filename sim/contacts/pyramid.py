@@ -8,12 +8,13 @@ along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:1
 
 from __future__ import annotations
 
-from sim import late
 from sim.model import Model
 from sim.options import Goal
+from sim.slots import Slot
 from sim.work import Work
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -45,7 +46,7 @@ def _pyramid_slip(x: float, y: float, a: float) -> float:
     return psi
 
 
-@late.start_pyramid.defined()
+@optional(Slot.START_PYRAMID)
 def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
     """Variables on the central path of kappa at the present slip and gap slack."""
     z = work.cone[c]
@@ -65,7 +66,7 @@ def cap_error(model: Model, work: Work, c: int) -> float:
     return model.contact_friction[c] * z[1] - z[4] - z[5] - z[6] - z[7] - z[3]
 
 
-@late.pyramid_error.defined(otherwise=0.0)
+@optional(Slot.PYRAMID_ERROR, default=0.0)
 def pyramid_error(model: Model, work: Work, c: int) -> float:
     """Largest of |s_psi - (mu gamma - sum beta)| and |s_i - (d_i.v_t + psi)|."""
     z = work.cone[c]
@@ -76,7 +77,7 @@ def pyramid_error(model: Model, work: Work, c: int) -> float:
     return r
 
 
-@late.pyramid_products.defined(otherwise=(0.0, 0.0, 0.0))
+@optional(Slot.PYRAMID_PRODUCTS, default=(0.0, 0.0, 0.0))
 def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, float]:
     """(sum, low, high) of the five products."""
     z = work.cone[c]
@@ -91,7 +92,7 @@ def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, fl
     return total, lo, hi
 
 
-@late.pyramid_products_ahead.defined(otherwise=0.0)
+@optional(Slot.PYRAMID_PRODUCTS_AHEAD, default=0.0)
 def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> float:
     """Sum of the five products after a step of length alpha."""
     z = work.cone[c]
@@ -102,7 +103,7 @@ def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> fl
     return total
 
 
-@late.pyramid_boundary.defined(otherwise=1e30)
+@optional(Slot.PYRAMID_BOUNDARY, default=1e30)
 def pyramid_boundary(model: Model, work: Work, c: int) -> float:
     """Largest step that keeps all ten variables positive, or 1e30."""
     a = 1e30
@@ -111,7 +112,7 @@ def pyramid_boundary(model: Model, work: Work, c: int) -> float:
     return a
 
 
-@late.return_pyramid.defined()
+@optional(Slot.RETURN_PYRAMID)
 def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float) -> None:
     """The five pairs put back onto the central path of kappa where they left their cones."""
     return_pair(work.cone[c], work.cone_trial[c], 2, 3, weight, kappa)
@@ -119,7 +120,7 @@ def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float
         return_pair(work.cone[c], work.cone_trial[c], 8 + e, 4 + e, weight, kappa)
 
 
-@late.condense_pyramid.defined()
+@optional(Slot.CONDENSE_PYRAMID)
 def condense_pyramid(model: Model, work: Work, c: int) -> None:
     """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4).
 
@@ -148,7 +149,7 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
     W[6] = mu * W[0] * g * q[5]
 
 
-@late.pyramid_constant.defined()
+@optional(Slot.PYRAMID_CONSTANT)
 def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     """Friction part of contact_w, after its normal part."""
     z = work.cone[c]
@@ -172,7 +173,7 @@ def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     w[2] = q[10] - q[11] - q[5] * p
 
 
-@late.recover_pyramid.defined()
+@optional(Slot.RECOVER_PYRAMID)
 def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share: float) -> None:
     """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
     z = work.cone[c]

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.contact import contact_kinematics
 from sim.contacts.far import sunk_contact
-from sim.contacts.friction import contact_error, contact_impulse, slip_violation
-from sim.late import report_pairs
-from sim.model import Matrix, Model, Vector
+from sim.contacts.friction import contact_error, report_contact, slip_violation
+from sim.model import Matrix, Model
+from sim.pairs.report import report_pairs
+from sim.slots import Slot
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.optional import optional
 
 
-@late.worst_contact.defined(otherwise=-1.0)
+@optional(Slot.WORST_CONTACT, default=-1.0)
 def worst_contact(model: Model, work: Work, kappa: float) -> float:
     """Index of the contact that cannot leave the ground, or of the one furthest from its law; -1 when a limit is worse
     or there is none.
@@ -33,7 +33,7 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     return worst
 
 
-@late.report_contacts.defined()
+@optional(Slot.REPORT_CONTACTS)
 def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
@@ -47,17 +47,3 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
             contact_kinematics(model, work, h, c, c + 1)
         report_contact(model, work, c, work.contact_frame[c], out[c])
     report_pairs(model, work, out)
-
-
-@kernel
-def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
-    """One row, with the frame F of its normal and tangents."""
-    i = model.contact_body[c]
-    k = work.contact_kin[c]
-    fn, f1, f2 = contact_impulse(model, work, c)
-    for e in range(3):
-        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-        out[3 + e] = work.pos3[i, e] + k[3 + e]
-        out[8 + e] = F[e]
-    out[6] = k[0] + work.bounce[c, 0]
-    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

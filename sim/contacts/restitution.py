@@ -34,16 +34,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
 from sim.contacts.contact import contact_jacobian, contact_kinematics
 from sim.contacts.friction import contact_impulse
-from sim.late import pair_kinematics
 from sim.model import Model
 from sim.options import AT_EVERY_POSE, AT_START
-from sim.pairs.contact import gap_normal, is_absent, pair_arm, pair_force
+from sim.pairs.contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
 from sim.rotation import Vec3, cross, transposed_times
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none
 _FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are
@@ -111,7 +111,7 @@ def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
             b[1] = e if impact else 0.0
 
 
-@late.find_impacts.defined()
+@optional(Slot.FIND_IMPACTS)
 def find_impacts(model: Model, work: Work, h: float) -> None:
     """Which near contacts are impacts in this step, and their floors."""
     for c in range(work.bounce.shape[0]):
@@ -123,7 +123,7 @@ def find_impacts(model: Model, work: Work, h: float) -> None:
     raise_floors(model, work, h, 1.0)
 
 
-@late.subtract_floors.defined()
+@optional(Slot.SUBTRACT_FLOORS)
 def subtract_floors(model: Model, work: Work) -> None:
     """contact_kin: gaps above the floors."""
     for m in range(work.counts[2]):
@@ -168,7 +168,7 @@ def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
     return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
 
 
-@late.impacts_gained.defined(otherwise=False)
+@optional(Slot.IMPACTS_GAINED, default=False)
 def impacts_gained(model: Model, work: Work, h: float) -> bool:
     """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
 

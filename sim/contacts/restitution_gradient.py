@@ -10,16 +10,17 @@ A2 and A3. Scenes without restitution do not compile these kernels.
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.contact import add_contact_law
 from sim.coupling.gradient import add_column
 from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import pair_arm, pair_force
 from sim.pairs.stiffness import slip_rate
 from sim.rotation import Vec3, cross, join, transposed_times
+from sim.slots import Slot
 from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -40,7 +41,7 @@ def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
     return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
 
 
-@late.add_bounce_composites.defined(otherwise=False)
+@optional(Slot.ADD_BOUNCE_COMPOSITES, default=False)
 def add_bounce_composites(model: Model, work: Work) -> bool:
     """Of pairs A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O.
 
@@ -79,7 +80,7 @@ def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
             A[18 + 6 * r + k] += t[r] * x
 
 
-@late.add_bounce_derivatives.defined()
+@optional(Slot.ADD_BOUNCE_DERIVATIVES)
 def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
     """dR_dq, dR_dv of impacts with the ground; of pairs, -= the same across the two bodies."""
     ground = model.contact_height.shape[0]

@@ -7,10 +7,11 @@ They come after the rows of pairs and loops. Their directions are constant, so t
 
 from __future__ import annotations
 
-from sim import late
 from sim.model import Matrix, Model, Vector
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -19,7 +20,7 @@ def gear_row(model: Model, k: int) -> int:
     return int(model.coupling_row[model.coupling_body.shape[0]]) + k
 
 
-@late.apply_gears.defined(otherwise=0.0)
+@optional(Slot.APPLY_GEARS, default=0.0)
 def apply_gears(model: Model, work: Work, h: float) -> float:
     """residual -= impulses of gears; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap.
 

@@ -8,21 +8,23 @@ dR_dq pair by pair of joints.
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.coupling.gears import gear_derivatives
 from sim.coupling.loop_stiffness import loop_stiffness
 from sim.coupling.rows import is_loop
 from sim.model import Matrix, Model, Vector
 from sim.pairs.contact import is_absent, pair_force
-from sim.pairs.stiffness import add_earlier_slip, centre_shift
+from sim.pairs.stiffness import add_earlier_slip
+from sim.pairs.wrench_columns import centre_shift
 from sim.rotation import Vec3, cross
+from sim.slots import Slot
 from sim.work import Work
 from solvers.dense import dot
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
-@late.add_coupling_composites.defined()
+@optional(Slot.ADD_COUPLING_COMPOSITES)
 def add_coupling_composites(model: Model, work: Work, h: float) -> None:
     """A3, A2 += the terms of one branch; fills coupling_K2. After `pose2_to_origin`, before `sum_composites`.
 
@@ -70,7 +72,7 @@ def _take_back(model: Model, work: Work, k: int, f: Vec3) -> None:
                 work.A2[i, 18 + 6 * r + c] += m[r]
 
 
-@late.add_coupling_derivatives.defined()
+@optional(Slot.ADD_COUPLING_DERIVATIVES)
 def add_coupling_derivatives(model: Model, work: Work) -> None:
     """dR_dq += the terms across branches; couple_panel = the gaps of loops by the columns of dR_dq."""
     for k in range(model.coupling_body.shape[0]):

@@ -15,14 +15,15 @@ counted along the motion, whose first step takes the long way.
 
 from __future__ import annotations
 
-from sim import late
 from sim.coupling.loop_lead import lead_loops
-from sim.coupling.loops import direct_loops
+from sim.coupling.loop_velocity import close_velocity
+from sim.coupling.loops import direct_loops, start_loops
 from sim.energy import factor_mass_matrix
-from sim.late import close_velocity, start_loops
 from sim.model import Model, Vector
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -31,7 +32,7 @@ _REGULAR = 5e-3  # a pivot above this is far from where branches meet
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
 
 
-@late.loops_regular.defined(otherwise=True)
+@optional(Slot.LOOPS_REGULAR, default=True)
 def loops_regular(model: Model, work: Work) -> bool:
     """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
     work.loop_led[0] = 0
@@ -45,7 +46,7 @@ def loops_regular(model: Model, work: Work) -> bool:
     return regular
 
 
-@late.stay_regular.defined(otherwise=True)
+@optional(Slot.STAY_REGULAR, default=True)
 def stay_regular(model: Model, work: Work, status: int) -> bool:
     """Whether this step is as far, too; if not, the forces of loops are zero again."""
     deficiency = work.couple_rank[1] - work.couple_rank[0]
@@ -55,7 +56,7 @@ def stay_regular(model: Model, work: Work, status: int) -> bool:
     return False
 
 
-@late.predict_loops.defined(otherwise=False)
+@optional(Slot.PREDICT_LOOPS, default=False)
 def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
     """loop_velocity = 2 P v - v, and the directions of forces that it leads (loop_lead.py); False if a guess is not v.
 
@@ -82,7 +83,7 @@ def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, gues
     return not given
 
 
-@late.lead_again.defined(otherwise=False)
+@optional(Slot.LEAD_AGAIN, default=False)
 def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
     if work.loop_led[0] == 0:
@@ -95,7 +96,7 @@ def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     return True
 
 
-@late.meet_ahead.defined(otherwise=False)
+@optional(Slot.MEET_AHEAD, default=False)
 def meet_ahead(model: Model, work: Work) -> bool:
     """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
 
@@ -110,7 +111,7 @@ def meet_ahead(model: Model, work: Work) -> bool:
     return True
 
 
-@late.is_farther.defined(otherwise=False)
+@optional(Slot.IS_FARTHER, default=False)
 def is_farther(model: Model, work: Work, status: int) -> bool:
     """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
     kept = 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.coupling.loops import child_point, loop_frame, relative_rotation
 from sim.model import Matrix, Model
-from sim.pairs.stiffness import add_wrench_column, point_shift, unit_vector
+from sim.pairs.wrench_columns import add_wrench_column, point_shift, unit_vector
 from sim.rotation import Vec3, cross, rotate, times
 from sim.work import Work
 from solvers.jit import kernel

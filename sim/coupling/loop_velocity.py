@@ -7,14 +7,14 @@ With v = M^-1 p, p without the half of the loops' impulses that acts at the node
 
 from __future__ import annotations
 
-from sim import late
 from sim.coupling.loop_lead import lead_loops
 from sim.coupling.loops import direct_loops
-from sim.coupling.system import body_twists
-from sim.late import factor_coupling, solve_coupling
+from sim.coupling.system import body_twists, factor_coupling, solve_coupling
 from sim.model import Model, Vector
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _WEAK = 1e-3  # a pivot of G M^-1 G^T above this is that of a configuration where no branches meet
 
@@ -34,7 +34,7 @@ def _set_rows(model: Model, work: Work) -> None:
         work.gear_rate[k, 1] = -model.gear_ratio[k]
 
 
-@late.close_velocity.defined()
+@optional(Slot.CLOSE_VELOCITY)
 def close_velocity(model: Model, work: Work, h: float, q: Vector, v: Vector, out: Vector) -> None:
     """out = P out, with the mass matrix of configuration 2 factored; its twists in work.twist.
 

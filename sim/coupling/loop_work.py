@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from sim import late
 from sim.coupling.loops import loop_rows
 from sim.coupling.rows import is_loop
 from sim.energy import momentum_velocity
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.rotation import Vec3, cross
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
 
@@ -62,13 +63,13 @@ def _closing_work(model: Model, work: Work, tolerance: float) -> float:
     return total
 
 
-@late.loop_slack.defined(otherwise=0.0)
+@optional(Slot.LOOP_SLACK, default=0.0)
 def loop_slack(model: Model, work: Work, options: Options) -> float:
     """Energy that the forces of loops may give to close what was open where the step began [J]."""
     return 0.5 * _closing_work(model, work, options.tolerance) / options.h
 
 
-@late.loops_gained.defined(otherwise=False)
+@optional(Slot.LOOPS_GAINED, default=False)
 def loops_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the forces of loops did work on the way 1-2-3, which those of a motion do to O(h^3) only.
 

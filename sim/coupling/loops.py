@@ -14,13 +14,14 @@ A loop joint sits on b (the parent) with the frame Q = R_b offset, and holds the
 
 from __future__ import annotations
 
-from sim import late
 from sim.coupling.rows import is_loop
 from sim.frame import place_frame
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, join, rotate, times
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -97,7 +98,7 @@ def direct_loops(model: Model, work: Work) -> None:
         loop_rows(model, work, m, work.pos2, work.rot2, work.couple_B)
 
 
-@late.start_loops.defined()
+@optional(Slot.START_LOOPS)
 def start_loops(model: Model, work: Work, keep: bool) -> None:
     """Force directions couple_B at configuration 2; forces at zero, or those of the step before."""
     direct_loops(model, work)
@@ -109,7 +110,7 @@ def start_loops(model: Model, work: Work, keep: bool) -> None:
         work.loop_open[row] = abs(work.couple_gap[row])
 
 
-@late.apply_loops.defined(otherwise=0.0)
+@optional(Slot.APPLY_LOOPS, default=0.0)
 def apply_loops(model: Model, work: Work) -> float:
     """wrench -= loop forces on a, += on b; couple_gap and couple_R at configuration 3; returns the largest gap."""
     for m in range(model.loop_ntrans.shape[0]):
@@ -131,14 +132,14 @@ def apply_loops(model: Model, work: Work) -> float:
     return error
 
 
-@late.keep_loops.defined()
+@optional(Slot.KEEP_LOOPS)
 def keep_loops(model: Model, work: Work) -> None:
     """Remember the loop forces from which the line search starts."""
     for row in range(work.couple_force.shape[0]):
         work.couple_trial[row] = work.couple_force[row]
 
 
-@late.move_loops.defined()
+@optional(Slot.MOVE_LOOPS)
 def move_loops(model: Model, work: Work, alpha: float) -> None:
     """force = kept + alpha step; pairs have none of their own."""
     first = model.coupling_row[model.coupling_body.shape[0] - model.loop_ntrans.shape[0]]

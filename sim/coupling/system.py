@@ -19,13 +19,14 @@ rows are rounding, and kept so by a scale that does not look at directions.
 
 from __future__ import annotations
 
-from sim import late
 from sim.coupling.rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
 from sim.elimination import solve
 from sim.model import Matrix, Model, Vector
+from sim.slots import Slot
 from sim.work import Work
 from solvers.full_lu import full_lu_factor, full_lu_solve
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
 
@@ -42,7 +43,7 @@ def scale_row(T: Matrix, p: int, size: float) -> float:
     return scale
 
 
-@late.factor_coupling.defined(otherwise=True)
+@optional(Slot.FACTOR_COUPLING, default=True)
 def factor_coupling(model: Model, work: Work) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
     n = enlist(model, work)
@@ -75,7 +76,7 @@ def factor_coupling(model: Model, work: Work) -> bool:
     return rank >= pairs
 
 
-@late.solve_coupling.defined()
+@optional(Slot.SOLVE_COUPLING)
 def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
     """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
 
@@ -112,7 +113,7 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
                 V[k] += work.S3nu[d, k] * y[d]
 
 
-@late.solve_coupling_panel.defined()
+@optional(Slot.SOLVE_COUPLING_PANEL)
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
     n = int(work.couple_rank[1])

@@ -7,12 +7,12 @@ from typing import NoReturn
 import numpy as np
 
 from sim import bodies, coordinates
-from sim.bind import bind_smooth
 from sim.calls import CONTACT, REPORT, Calls, Floats, follow, interrupted
 from sim.high_order import runge_kutta
 from sim.high_order.hamilton_gradient import Slopes
 from sim.high_order.tableau import stable, tableau
 from sim.high_order.tangents import Tangents
+from sim.link import link_smooth
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Integers, Model, Vector
 from sim.pace import pieces
@@ -44,7 +44,7 @@ class HighOrder(Calls):
 
     def _tables(self) -> tuple[Integers, Integers, Vector]:
         """Tables of the Model and of this thread's first Work, and settings."""
-        return self._table(bind_smooth), self._scratch.table(), self.settings.array()
+        return self._table(link_smooth), self._scratch.table(), self.settings.array()
 
     def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
         """As Calls.roll; without contacts."""

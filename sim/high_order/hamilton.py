@@ -20,8 +20,8 @@ from sim.dynamics import world_inertia
 from sim.elimination import dot_six, project
 from sim.energy import spring_energy
 from sim.joints.ball_spring import relative_to_rest
+from sim.joints.swing import swing_curvature
 from sim.kinematics import tree_poses
-from sim.late import swing_curvature
 from sim.mass import solve_mass
 from sim.model import InputKind, Integers, Model, Vector
 from sim.outer import outer_wrenches

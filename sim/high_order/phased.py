@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import rollout
-from sim.bind import bind_smooth, bind_step
 from sim.calls import CONTACT, REPORT, Calls, Floats, interrupted
 from sim.high_order import legendre, phases
 from sim.high_order.calls import HighOrder
 from sim.high_order.hamilton_gradient import Slopes
+from sim.link import link_smooth, link_step
 from sim.model import Integers, Model, Vector
 from sim.pace import pieces
 from sim.policy import Path, Policy
@@ -89,7 +89,7 @@ class Phased(HighOrder):
 
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
         """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
-        model, work = self._table(bind_smooth, bind_step), self._scratch.table()
+        model, work = self._table(link_smooth, link_step), self._scratch.table()
         settings, scheme = self.settings.array(kappa), self._scheme()
         taken, why = 0, int(Status.SOLVED)
         try:
@@ -106,7 +106,7 @@ class Phased(HighOrder):
 
         None in its place where a step is not solved.
         """
-        model, work, settings = self._table(bind_step), self._second._scratch.table(), self.settings.array(kappa)
+        model, work, settings = self._table(link_step), self._second._scratch.table(), self.settings.array(kappa)
         t, piece, nq = first, _PIECE, self.sizes.nq
         while t < len(us):
             count = min(piece, len(us) - t)

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 from sim.contacts.confined import IDLE
 from sim.contacts.far import cluster_gap, highest
+from sim.contacts.report import report_contacts
 from sim.high_order.runge_kutta import Scheme, advance, begin
-from sim.late import report_contacts
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.pace import is_due, start_pace

@@ -5,11 +5,12 @@ With s the vector part of the rotation from rest, V_d = (h/2) k |(s(2) + s(3))/2
 
 from __future__ import annotations
 
-from sim import late
 from sim.model import Model, Vector
 from sim.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_matrix, quat_mul
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -36,7 +37,7 @@ def spring_turns(model: Model, work: Work, h: float, q: Vector, v: Vector, i: in
     return r1, r2, r3
 
 
-@late.spring_impulse.defined(otherwise=(0.0, 0.0, 0.0))
+@optional(Slot.SPRING_IMPULSE, default=(0.0, 0.0, 0.0))
 def spring_impulse(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> tuple[float, float, float]:
     """(h k/2) (c2 I - [s2]) (s1 + 2 s2 + s3), s the vector parts of the rotations from rest."""
     r1, r2, r3 = spring_turns(model, work, h, q, v, i)
@@ -62,7 +63,7 @@ def turn_product(a: Quat, b: Quat) -> Mat3:
     )  # fmt: skip
 
 
-@late.add_spring_block.defined()
+@optional(Slot.ADD_SPRING_BLOCK)
 def add_spring_block(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> None:
     """joint_block[i] += d(spring impulse)/d(nu)."""
     d = model.body_vadr[i]
@@ -79,7 +80,7 @@ def add_spring_block(model: Model, work: Work, h: float, q: Vector, v: Vector, i
             B[(n - 3 + a) * n + n - 3 + b] += g * t
 
 
-@late.add_ball_spring_derivatives.defined()
+@optional(Slot.ADD_BALL_SPRING_DERIVATIVES)
 def add_ball_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> None:
     """The quaternion part of `add_spring_derivatives`, of joint i."""
     e = model.body_vadr[i] + model.joint_ntrans[i]

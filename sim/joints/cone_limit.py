@@ -16,11 +16,12 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim import late
 from sim.model import Model
 from sim.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -44,7 +45,7 @@ def _cone_axes(model: Model, work: Work, h: float, k: int) -> tuple[Vec3, Vec3]:
     return v, (E[0] * x + E[1] * y + E[2] * z, E[3] * x + E[4] * y + E[5] * z, E[6] * x + E[7] * y + E[8] * z)
 
 
-@late.cone_gap.defined()
+@optional(Slot.CONE_GAP)
 def cone_gap(model: Model, work: Work, h: float, k: int) -> None:
     """bound_gap, and p in bound_row."""
     v, b = _cone_axes(model, work, h, k)
@@ -56,7 +57,7 @@ def cone_gap(model: Model, work: Work, h: float, k: int) -> None:
     work.bound_row[k, 2] = scale * z
 
 
-@late.cone_block.defined()
+@optional(Slot.CONE_BLOCK)
 def cone_block(model: Model, work: Work, h: float, k: int) -> None:
     """joint_block += (gamma/s) p c^T - gamma dp h J; fills c."""
     d = model.limit_dof[k]
@@ -77,7 +78,7 @@ def cone_block(model: Model, work: Work, h: float, k: int) -> None:
             work.joint_block[i, first + r * n + j] += ratio * p[r] * p[3 + j] - g * (v[r] * bJ - dot * J[3 * r + j])
 
 
-@late.cone_derivative.defined()
+@optional(Slot.CONE_DERIVATIVE)
 def cone_derivative(model: Model, work: Work, h: float, k: int) -> None:
     """dR_dq += (gamma/s) p p^T - gamma (b v^T - (v.b) I)/sin angle: b turns with q2, v does not."""
     d = model.limit_dof[k]

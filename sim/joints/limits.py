@@ -8,14 +8,15 @@ Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
 
 from __future__ import annotations
 
-from sim import late
+from sim.joints.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.joints.terms import add_limit_impulse
-from sim.late import cone_block, cone_derivative, cone_gap
 from sim.model import Model
 from sim.options import Goal
+from sim.slots import Slot
 from sim.work import Work
 from solvers.cones import onto_path, return_pair
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -43,7 +44,7 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
             work.joint_block[i, a * n + a] += h * work.bound[k, 1] / work.bound[k, 0]
 
 
-@late.add_limit_derivatives.defined()
+@optional(Slot.ADD_LIMIT_DERIVATIVES)
 def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
     """dR_dq += gamma/s, and what a cone has in its place."""
     for k in range(model.limit_dof.shape[0]):

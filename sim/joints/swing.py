@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from sim import late
 from sim.model import Model, Vector
 from sim.rotation import (
     Quat,
@@ -27,8 +26,10 @@ from sim.rotation import (
     so3_coefficients,
     transposed_times,
 )
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _SMALL = 0.1  # below this square of the half angle, its series are exact to rounding
@@ -41,7 +42,7 @@ def swing(model: Model, i: int, p1: float, p2: float) -> Vec3:
     return p1 * V[0] + p2 * V[3], p1 * V[1] + p2 * V[4], p1 * V[2] + p2 * V[5]
 
 
-@late.swing_pose.defined(otherwise=_STILL)
+@optional(Slot.SWING_POSE, default=_STILL)
 def swing_pose(model: Model, i: int, p1: float, p2: float) -> tuple[Quat, Vec3, Vec3]:
     """Quaternion of exp(t) and columns J(t)^T V_k = J(-t) V_k in the child's axes, of joint i at p."""
     t = swing(model, i, p1, p2)
@@ -72,7 +73,7 @@ def half_angle_change(a: float, b: float, x: float) -> tuple[float, float]:
     return w, 0.5 * (2.0 * cos(0.5 * s) * sin(0.5 * d) - 2.0 * half_angle(4.0 * small * small)[1] * d) / large
 
 
-@late.swing_turn.defined(otherwise=_STILL[0])
+@optional(Slot.SWING_TURN, default=_STILL[0])
 def swing_turn(model: Model, i: int, p1: float, p2: float, d1: float, d2: float) -> Quat:
     """exp(t)^* exp(t + d) of joint i at p, whose increment is d: in the child's axes, rounded to eps |d|.
 
@@ -124,7 +125,7 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
     )
 
 
-@late.swing_curvature.defined()
+@optional(Slot.SWING_CURVATURE)
 def swing_curvature(model: Model, work: Work, i: int, p1: float, p2: float) -> None:
     """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 

@@ -8,7 +8,8 @@ discrete Lagrangian, the energy of a rotor that turns with the coordinate and ca
 
 from __future__ import annotations
 
-from sim.late import add_ball_spring_derivatives, add_spring_block, spring_impulse, swing_curvature
+from sim.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
+from sim.joints.swing import swing_curvature
 from sim.model import InputKind, Model, Vector
 from sim.work import Work
 from solvers.jit import kernel

@@ -21,13 +21,11 @@ out, and overlaps in the end. Where several attempts end so (pair_free[1] is 1),
 
 from __future__ import annotations
 
-from sim import late
 from sim.collision.axes import OPEN
 from sim.collision.collide import arrange, choose, collide_chosen, instead, open_sides
-from sim.late import choose_cylinders, cylinder_before, cylinder_distance
 from sim.model import Model
 from sim.options import ASTRAY, AT_EVERY_POSE, BESIDE_KEPT, OVERLAPPING, PLACED
-from sim.pairs.cylinders import on_cylinder
+from sim.pairs.cylinders import choose_cylinders, cylinder_before, cylinder_distance, on_cylinder
 from sim.pairs.memory import (
     NEAR,
     has_no_room,
@@ -39,8 +37,10 @@ from sim.pairs.memory import (
     rounding_of_rims,
 )
 from sim.pairs.pose import place_shapes
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less
@@ -111,7 +111,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
             collide_chosen(kind, k - first, work.pair_code[k], sizes, model.hull, pose[:9], pose[9:], work.pair_out[k])
 
 
-@late.choose_pairs.defined()
+@optional(Slot.CHOOSE_PAIRS)
 def choose_pairs(model: Model, work: Work) -> None:
     """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
@@ -150,7 +150,7 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     return False
 
 
-@late.overlapping.defined(otherwise=PLACED)
+@optional(Slot.OVERLAPPING, default=PLACED)
 def overlapping(model: Model, work: Work) -> int:
     """PLACED, or why the solution at configuration 3 is none: OVERLAPPING in elements that were not chosen, or ASTRAY
     where a point has passed through the other shape.

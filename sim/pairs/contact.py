@@ -15,17 +15,18 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from sim import late
 from sim.collision.collide import collide_chosen
-from sim.late import collide_cylinders, is_taut, pull_from_before, string_arm
 from sim.model import Matrix, Model
 from sim.options import AT_EVERY_POSE
 from sim.pairs.choice import choose_shapes
-from sim.pairs.cylinders import on_cylinder
+from sim.pairs.cylinders import collide_cylinders, on_cylinder
 from sim.pairs.pose import place_shapes
+from sim.pairs.string import is_taut, pull_from_before, string_arm
 from sim.rotation import Vec3, cross, rotate, transposed_times
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
 _TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole
@@ -87,7 +88,7 @@ def is_absent(work: Work, j: int) -> bool:
     return work.pair_out[j, 0] > _NO_POINT
 
 
-@late.pair_kinematics.defined()
+@optional(Slot.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
     """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
     ground = model.contact_height.shape[0]

@@ -4,7 +4,6 @@ do for the others. Scenes without such collisions do not compile these kernels.
 
 from __future__ import annotations
 
-from sim import late
 from sim.collision.cylinders import (
     choose_on_cylinder,
     collide_with_cylinder,
@@ -15,8 +14,10 @@ from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Model
 from sim.options import BESIDE_KEPT
 from sim.pairs.memory import keep, last_point, left_behind
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import inner_kernel
+from solvers.optional import optional
 
 
 @inner_kernel
@@ -25,7 +26,7 @@ def on_cylinder(kind: int) -> bool:
     return kind % SWAPPED >= Pair.POLYTOPE_CYLINDER
 
 
-@late.cylinder_distance.defined(otherwise=0.0)
+@optional(Slot.CYLINDER_DISTANCE, default=0.0)
 def cylinder_distance(model: Model, work: Work, first: int) -> float:
     """Distance of the shapes of a collision at pair_relative."""
     pose = work.pair_relative[first]
@@ -51,13 +52,13 @@ def put_all(model: Model, work: Work, first: int) -> None:
         collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_out[j])
 
 
-@late.collide_cylinders.defined()
+@optional(Slot.COLLIDE_CYLINDERS)
 def collide_cylinders(model: Model, work: Work, first: int) -> None:
     """`put_all`"""
     put_all(model, work, first)
 
 
-@late.choose_cylinders.defined()
+@optional(Slot.CHOOSE_CYLINDERS)
 def choose_cylinders(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
     the step began; where that leaves a point without, those of the beginning.
@@ -88,7 +89,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
     put_all(model, work, first)
 
 
-@late.cylinder_before.defined()
+@optional(Slot.CYLINDER_BEFORE)
 def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
     """pair_trial: the elements of point j where the step began."""
     before = work.pair_before[first]

@@ -21,7 +21,6 @@ bound of the change of their wrenches per displacement, 0 where there is none.
 
 from __future__ import annotations
 
-from sim import late
 from sim.collision.axes import OPEN
 from sim.contacts.far_bounds import ANGLE
 from sim.contacts.friction import contact_impulse, start_contact
@@ -31,13 +30,15 @@ from sim.options import Options
 from sim.pairs.choice import choose_shapes, open_pairs
 from sim.pairs.contact import add_pair_wrench, is_absent, point_kinematics
 from sim.pairs.pose import place_shapes
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 COUPLED = 1e-2  # largest sum of e over the far collisions of a body
 
 
-@late.enlist_pairs.defined()
+@optional(Slot.ENLIST_PAIRS)
 def enlist_pairs(model: Model, work: Work) -> None:
     """Runs of near for the near collisions, after those of the ground; coupling_live, the bodies that they couple."""
     ground = model.contact_height.shape[0]
@@ -62,7 +63,7 @@ def enlist_pairs(model: Model, work: Work) -> None:
     work.counts[2] = runs
 
 
-@late.begin_pairs.defined()
+@optional(Slot.BEGIN_PAIRS)
 def begin_pairs(model: Model, work: Work, options: Options) -> None:
     """Which collisions are near, and what the shapes of these are at configuration 2, where the step begins."""
     change = 0.0
@@ -128,7 +129,7 @@ def _change(model: Model, work: Work, options: Options, j: int, a: float) -> flo
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a)
 
 
-@late.far_pair_impulses.defined()
+@optional(Slot.FAR_PAIR_IMPULSES)
 def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
     """Wrenches of the far collisions at configuration 3, evaluated again where they may have changed."""
     if work.pair_far_state[2] == 0.0 or not _moved(model, work):
@@ -198,7 +199,7 @@ def add_far_pairs(work: Work) -> None:
             work.wrench[i, k] += work.far_wrench[i, k]
 
 
-@late.pairs_came_near.defined(otherwise=False)
+@optional(Slot.PAIRS_CAME_NEAR, default=False)
 def pairs_came_near(model: Model, work: Work) -> bool:
     """Whether a far collision is not, at configuration 3; it is near from now on."""
     found = False
@@ -218,7 +219,7 @@ def pairs_came_near(model: Model, work: Work) -> bool:
     return found
 
 
-@late.all_near.defined()
+@optional(Slot.ALL_NEAR)
 def all_near(model: Model, work: Work) -> None:
     """All collisions taken as near ones, for the derivatives of a step that has been solved."""
     for j in range(model.pair_kind.shape[0]):

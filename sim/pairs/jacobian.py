@@ -7,12 +7,13 @@ Everything moves with b, plus what the motion of a relative to b does:
 
 from __future__ import annotations
 
-from sim import late
 from sim.model import Model, Vector
 from sim.pairs.contact import POLE, gap_normal, point_velocity, shape_b
 from sim.rotation import Vec3, cross
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -135,7 +136,7 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
             Cb[6 * e + 3 + k] += gm[k] + ge[k]
 
 
-@late.pair_rate.defined(otherwise=(0.0, 0.0, 0.0))
+@optional(Slot.PAIR_RATE, default=(0.0, 0.0, 0.0))
 def pair_rate(model: Model, work: Work, c: int) -> Vec3:
     """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
     j = c - model.contact_height.shape[0]

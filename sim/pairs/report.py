@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from sim import late
-from sim.contacts.report import report_contact
+from sim.contacts.friction import report_contact
 from sim.model import Matrix, Model
 from sim.pairs.contact import is_absent
+from sim.slots import Slot
 from sim.work import Work
+from solvers.optional import optional
 
 
-@late.report_pairs.defined()
+@optional(Slot.REPORT_PAIRS)
 def report_pairs(model: Model, work: Work, out: Matrix) -> None:
     """The rows of the pairs: impulse on the first body."""
     for j in range(model.pair_kind.shape[0]):

@@ -7,49 +7,20 @@ with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows 
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.friction import condense_contact, contact_constant, contact_error, contact_impulse
-from sim.late import add_string_stiffness, add_string_turn, is_taut
 from sim.model import Matrix, Model, Vector
 from sim.options import Goal
 from sim.pairs.contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.pairs.far import add_far_pairs
 from sim.pairs.jacobian import pair_jacobian
+from sim.pairs.string import is_taut
+from sim.pairs.string_stiffness import add_string_stiffness, add_string_turn
+from sim.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
 from sim.rotation import Vec3, cross
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
-
-
-@kernel
-def unit_vector(k: int) -> Vec3:
-    """e_k"""
-    return 1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0
-
-
-@kernel
-def point_shift(k: int, x: float, y: float, z: float) -> Vec3:
-    """Displacement of the point (x, y, z) from O by the unit twist k about O."""
-    if k < 3:
-        return unit_vector(k)
-    e = unit_vector(k - 3)
-    return cross(e[0], e[1], e[2], x, y, z)
-
-
-@kernel
-def centre_shift(work: Work, pos: Matrix, i: int, k: int) -> Vec3:
-    """Displacement of the centre of mass of body i by the unit twist k about O."""
-    o = work.origin
-    return point_shift(k, pos[i, 0] - o[0], pos[i, 1] - o[1], pos[i, 2] - o[2])
-
-
-@kernel
-def add_wrench_column(K: Vector, k: int, f: Vec3, df: Vec3, P: Vec3, dP: Vec3) -> None:
-    """Column k of K (6 x 6) += (df, dP x f + P x df)."""
-    a = cross(dP[0], dP[1], dP[2], f[0], f[1], f[2])
-    b = cross(P[0], P[1], P[2], df[0], df[1], df[2])
-    for r in range(3):
-        K[6 * r + k] += df[r]
-        K[18 + 6 * r + k] += a[r] + b[r]
+from solvers.optional import optional
 
 
 @kernel
@@ -106,7 +77,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         add_wrench_column(Kb, k, f, df, P, dP)
 
 
-@late.condense_pairs.defined()
+@optional(Slot.CONDENSE_PAIRS)
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
     """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
@@ -123,7 +94,7 @@ def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: floa
                 add_pair_stiffness(model, work, c - ground, share)
 
 
-@late.apply_pairs.defined(otherwise=0.0)
+@optional(Slot.APPLY_PAIRS, default=0.0)
 def apply_pairs(model: Model, work: Work) -> float:
     """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
     ground = model.contact_height.shape[0]
@@ -138,7 +109,7 @@ def apply_pairs(model: Model, work: Work) -> float:
     return r
 
 
-@late.pair_constants.defined()
+@optional(Slot.PAIR_CONSTANTS)
 def pair_constants(model: Model, work: Work, goal: Goal) -> None:
     """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
     ground = model.contact_height.shape[0]

@@ -14,15 +14,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
 from sim.collision.kinds import SWAPPED, Pair
-from sim.contacts.friction import contact_impulse
-from sim.model import Matrix, Model
-from sim.pairs.contact import pair_force
-from sim.pairs.stiffness import add_wrench_column, point_shift
+from sim.model import Model
 from sim.rotation import Vec3, cross, rotate
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _STRING = int(Pair.STRING)
 _TAUT = 1e-3  # of the length: less slack than this
@@ -52,7 +50,7 @@ def string_before(model: Model, work: Work, j: int) -> tuple[float, Vec3]:
     return d, (x / d, y / d, z / d)
 
 
-@late.is_taut.defined(otherwise=False)
+@optional(Slot.IS_TAUT, default=False)
 def is_taut(model: Model, work: Work, j: int) -> bool:
     """Whether pair j is a string that is taut at configuration 2, and turns slowly enough to pull as joints do."""
     if model.pair_kind[j] % SWAPPED != _STRING:
@@ -76,7 +74,7 @@ def is_taut(model: Model, work: Work, j: int) -> bool:
     return x * x + y * y + z * z < _TURN * _TURN * d * d
 
 
-@late.pull_from_before.defined()
+@optional(Slot.PULL_FROM_BEFORE)
 def pull_from_before(model: Model, work: Work, j: int) -> None:
     """The rows of the frame of a taut string, from that of its gap."""
     F = work.pair_frame[j]
@@ -86,7 +84,7 @@ def pull_from_before(model: Model, work: Work, j: int) -> None:
         F[k] = n[k]
 
 
-@late.string_arm.defined(otherwise=(0.0, 0.0, 0.0))
+@optional(Slot.STRING_ARM, default=(0.0, 0.0, 0.0))
 def string_arm(model: Model, work: Work, j: int) -> Vec3:
     """P - O of a taut string."""
     e = end_before(model, work, j, 0)
@@ -99,34 +97,3 @@ def string_turn(model: Model, work: Work, j: int, u: Vec3) -> Vec3:
     d, n = string_before(model, work, j)
     s = n[0] * u[0] + n[1] * u[1] + n[2] * u[2]
     return (u[0] - s * n[0]) / d, (u[1] - s * n[1]) / d, (u[2] - s * n[2]) / d
-
-
-@late.add_string_stiffness.defined()
-def add_string_stiffness(model: Model, work: Work, j: int) -> None:
-    """coupling_K += taut string j, condensed: where it acts, and along what, is given at configuration 2."""
-    c = model.contact_height.shape[0] + j
-    zero = (0.0, 0.0, 0.0)
-    P = string_arm(model, work, j)
-    for side in range(2):
-        K = work.coupling_K[2 * model.pair_coupling[j] + side]
-        C = work.pair_Ca[j] if side == 0 else work.pair_Cb[j]
-        for k in range(6):
-            df = pair_force(work, j, work.contact_W[c, 0] * C[k], 0.0, 0.0)
-            add_wrench_column(K, k, zero, df, P, zero)
-
-
-@late.add_string_turn.defined()
-def add_string_turn(model: Model, work: Work, j: int, K2: Matrix) -> None:
-    """K2 (2, 36) += dF by the twists of a and b at configuration 2, of taut string j: df = gamma dn2, dP = de_a."""
-    fn, _, _ = contact_impulse(model, work, model.contact_height.shape[0] + j)
-    f = pair_force(work, j, fn, 0.0, 0.0)
-    P = string_arm(model, work, j)
-    o = work.origin
-    for side in range(2):
-        e = end_before(model, work, j, side)
-        g = -fn if side == 0 else fn
-        for k in range(6):
-            u = point_shift(k, e[0] - o[0], e[1] - o[1], e[2] - o[2])
-            n = string_turn(model, work, j, u)
-            dP = u if side == 0 else (0.0, 0.0, 0.0)
-            add_wrench_column(K2[side], k, f, (g * n[0], g * n[1], g * n[2]), P, dP)

@@ -15,18 +15,19 @@ Taut strings pass through nothing.
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.friction import contact_impulse
 from sim.contacts.restitution import impulse_work
 from sim.energy import twice_kinetic
-from sim.late import is_taut
 from sim.model import Model, Vector
 from sim.options import Options
 from sim.pairs.contact import is_absent, pair_arm, pair_force
 from sim.pairs.memory import least_size, overlap_before, rounding_of_rims
+from sim.pairs.string import is_taut
 from sim.rotation import Vec3, cross
+from sim.slots import Slot
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
 _LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (choice.py)
@@ -63,7 +64,7 @@ def _overlapped(model: Model, work: Work, j: int) -> float:
     return max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
 
 
-@late.pair_slack.defined(otherwise=0.0)
+@optional(Slot.PAIR_SLACK, default=0.0)
 def pair_slack(model: Model, work: Work) -> float:
     """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
     total, overlap = 0.0, 0.0
@@ -75,7 +76,7 @@ def pair_slack(model: Model, work: Work) -> float:
     return total
 
 
-@late.pairs_gained.defined(otherwise=False)
+@optional(Slot.PAIRS_GAINED, default=False)
 def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
     h = options.h

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.coupling.system import solve_coupling_panel
 from sim.elimination_panel import column_count, solve_panel
-from sim.late import add_height_gradient, solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
 from sim.pace import DEADLINE
 from sim.parameters.columns import clear_columns, fill_columns
 from sim.parameters.effects import At, Effect
+from sim.parameters.terrain import add_height_gradient
 from sim.rollout import Cube, Linearized, linearize
 from sim.rotation import left_jacobian
 from sim.work import Work

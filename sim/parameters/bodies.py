@@ -10,7 +10,7 @@ from math import cos, sin
 
 from sim.joints.ball_spring import spring_turns
 from sim.model import InputKind, Model, Vector
-from sim.pairs.stiffness import unit_vector
+from sim.pairs.wrench_columns import unit_vector
 from sim.parameters.effects import At
 from sim.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from sim.work import Work

@@ -7,7 +7,6 @@ weights   (n,) how much of the elementary change a unit of the parameter makes
 from __future__ import annotations
 
 from sim.elimination_panel import column_count
-from sim.late import add_surface_radius
 from sim.model import IntegerMatrix, Model, Vector
 from sim.moves import other_quaternions
 from sim.parameters.bodies import (
@@ -34,6 +33,7 @@ from sim.parameters.geometry import add_geometry
 from sim.parameters.loops import add_gear_offset, add_gear_ratio, add_loop_geometry, add_loop_turn
 from sim.parameters.pairs import add_pairs_mass, add_shapes_shift
 from sim.parameters.sizes import add_shapes_size
+from sim.parameters.surface import add_surface_radius
 from sim.work import Work
 from solvers.jit import kernel
 

@@ -10,7 +10,7 @@ from sim.collision.witness import dot
 from sim.contacts.friction import contact_impulse, law_of
 from sim.model import Law, Model, Vector
 from sim.pairs.contact import is_absent, pair_arm, pair_force
-from sim.pairs.stiffness import unit_vector
+from sim.pairs.wrench_columns import unit_vector
 from sim.parameters.bodies import add_wrench, moment
 from sim.rotation import Vec3, cross, rotate
 from sim.terrain.contact import centre

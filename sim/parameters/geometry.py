@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from sim.contacts.restitution_gradient import gap_wrench
 from sim.model import Matrix, Model, Vector
-from sim.pairs.stiffness import unit_vector
+from sim.pairs.wrench_columns import unit_vector
 from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import At, Effect
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate

@@ -11,8 +11,8 @@ By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv 
 
 from __future__ import annotations
 
+from sim.coupling.system import solve_coupling_panel
 from sim.elimination_panel import column_count, solve_panel
-from sim.late import solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import IntegerMatrix, Matrix, Model, Vector
 from sim.parameters.columns import fill_columns

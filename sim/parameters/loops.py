@@ -8,7 +8,7 @@ from __future__ import annotations
 from sim.coupling.gears import gear_row
 from sim.coupling.loops import child_point, loop_frame
 from sim.model import Model
-from sim.pairs.stiffness import unit_vector
+from sim.pairs.wrench_columns import unit_vector
 from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import Effect
 from sim.rotation import cross, rotate, times

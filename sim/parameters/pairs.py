@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from sim.collision.witness import dot
 from sim.contacts.friction import contact_impulse
-from sim.late import add_moved_end, is_taut
 from sim.model import Model, Vector
 from sim.pairs.contact import is_absent, pair_force
-from sim.pairs.stiffness import unit_vector
+from sim.pairs.string import is_taut
+from sim.pairs.wrench_columns import unit_vector
 from sim.parameters.contacts import add_pair, floor_change, impulse_change, is_near, turning
+from sim.parameters.strings import add_moved_end
 from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
 from solvers.jit import kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.bind import bind_heights, bind_parameters
 from sim.calls import REPORT, Calls
+from sim.link import link_heights, link_parameters
 from sim.mechanism import Mechanism
 from sim.model import Vector
 from sim.pace import pieces
@@ -29,7 +29,7 @@ def parameter_columns(calls: Calls, mech: Mechanism, step: tuple[Vector, Vector]
     out = np.zeros((calls.ndx, plan.size))
     nq = calls.sizes.nq
     at = At(calls.settings.time_step, x[:nq], x[nq:], u, np.zeros((_TWISTS, 6)), np.zeros(calls.sizes.nbody))
-    model, work = calls.tables(bind_parameters)
+    model, work = calls.tables(link_parameters)
     if len(plan.weights):
         parameter_jacobian(model, work, at, A, plan.terms, plan.weights, out)
     if len(plan.heights):
@@ -109,7 +109,7 @@ def adjoint_sweep(
     )
     if calls.settings.order > 2:
         return adjoint_products(calls, line, kappa), line
-    needs = (bind_parameters, bind_heights) if len(plan.heights) else (bind_parameters,)
+    needs = (link_parameters, link_heights) if len(plan.heights) else (link_parameters,)
     model, work = calls.tables(*needs[: 2 if plan.size else 0])
     settings, left = calls.settings.array(kappa), len(us)
     line.costate[0] = loss[-1]

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from sim.collision.kinds import SWAPPED, Pair
 from sim.collision.witness import dot
-from sim.late import add_moved_end, is_taut
 from sim.model import Model, Vector
 from sim.pairs.contact import gap_normal
 from sim.pairs.pose import place_shape
+from sim.pairs.string import is_taut
 from sim.parameters.effects import SIDE, Size
 from sim.parameters.pairs import add_moved_shape, is_felt, pair_floor, row
+from sim.parameters.strings import add_moved_end
 from sim.rotation import Vec3
 from sim.work import Work
 from solvers.jit import kernel

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from sim import late
 from sim.collision.witness import dot
 from sim.contacts.friction import contact_impulse
 from sim.model import Model
 from sim.pairs.string import string_turn
 from sim.parameters.contacts import add_pair, impulse_change
 from sim.rotation import Vec3
+from sim.slots import Slot
 from sim.work import Work
+from solvers.optional import optional
 
 
-@late.add_moved_end.defined()
+@optional(Slot.ADD_MOVED_END)
 def add_moved_end(
     model: Model, work: Work, j: int, side: int, e2: Vec3, e3: Vec3, floor: float, w: float, col: int
 ) -> None:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
 from sim.model import Matrix, Model
 from sim.parameters.contacts import add_impulse, add_turn, floor_change, impulse_change, is_near
+from sim.slots import Slot
 from sim.terrain.contact import centre, frame_turn
 from sim.terrain.height_field import field_values, height_field
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -47,7 +48,7 @@ def earlier_rate(model: Model, c: int, phi: float, pos: Matrix, rot: Matrix) -> 
     return -i * (G + phi * i * (Fx * Gx + Fy * Gy))
 
 
-@late.add_surface_radius.defined()
+@optional(Slot.ADD_SURFACE_RADIUS)
 def add_surface_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -> None:
     """The surface on which the centre of contact c is, made for a larger radius."""
     if not is_on_terrain(model, work, c):

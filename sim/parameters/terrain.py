@@ -13,9 +13,8 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
+from sim.coupling.system import solve_coupling_panel
 from sim.elimination_panel import column_count, solve_panel
-from sim.late import solve_coupling_panel
 from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.parameters.columns import clear_columns
@@ -23,10 +22,12 @@ from sim.parameters.effects import At
 from sim.parameters.gradients import coordinate_rows
 from sim.parameters.surface import add_ground_place, is_on_terrain
 from sim.rotation import Vec3
+from sim.slots import Slot
 from sim.terrain.contact import centre
 from sim.terrain.height_field import cell, height_field, weight
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 from solvers.record import Table
 
 
@@ -103,7 +104,7 @@ def height_jacobian(model_at: Table, work_at: Table, at: At, places: Matrix, out
     spread_contacts(model, work, places, out)
 
 
-@late.add_height_gradient.defined()
+@optional(Slot.ADD_HEIGHT_GRADIENT)
 def add_height_gradient(model: Model, work: Work, h: float, y: Vector, places: Matrix, out: Matrix) -> None:
     """out (1, ncoefficient) += y.(-dR/d(coefficients)); places: (1, 3 nground), overwritten."""
     for m in range(places.shape[1]):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from sim.coupling.system import factor_coupling, solve_coupling
 from sim.elimination import factor, solve
-from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
 from sim.options import LINEAR, PLAIN, Goal
 from sim.solve.complementarity import boundary_step, products_ahead

@@ -6,13 +6,13 @@ and its matrix.
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.contact import (
     add_contact_law,
     add_contact_turn,
     add_contact_wrench,
     contact_jacobian,
     contact_kinematics,
+    contact_rate,
 )
 from sim.contacts.far_impulses import add_far_wrenches, far_impulses
 from sim.contacts.friction import (
@@ -26,6 +26,8 @@ from sim.contacts.friction import (
     return_contact,
     start_contact,
 )
+from sim.contacts.restitution import subtract_floors
+from sim.coupling.loops import keep_loops, move_loops
 from sim.elimination import dot_six, subtree_sums
 from sim.joints.limits import (
     add_limit_blocks,
@@ -36,22 +38,18 @@ from sim.joints.limits import (
     resume_limits,
     return_limits,
 )
-from sim.late import (
-    add_frame_matrix,
-    apply_pairs,
-    condense_pairs,
-    far_pair_impulses,
-    keep_loops,
-    move_loops,
-    pair_constants,
-    pair_kinematics,
-    subtract_floors,
-)
 from sim.model import Matrix, Model
 from sim.options import SOFT, Goal
+from sim.pairs.contact import pair_kinematics
+from sim.pairs.far import far_pair_impulses
+from sim.pairs.jacobian import pair_rate
+from sim.pairs.stiffness import apply_pairs, condense_pairs, pair_constants
 from sim.pose_jacobians import add_slip_jacobian
+from sim.slots import Slot
+from sim.terrain.contact import add_frame_matrix
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 _KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
 _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it
@@ -181,7 +179,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
     condense_pairs(model, work, h, kappa, share, form)
 
 
-@late.add_stiffness.defined()
+@optional(Slot.ADD_STIFFNESS)
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
     work.contact_hard[0] = 0.0
@@ -220,9 +218,11 @@ def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
 @kernel
 def recover_inequalities(model: Model, work: Work, h: float, share: float) -> None:
     """Steps of all cone variables from the twists and rates of the last solve."""
+    ground = model.contact_height.shape[0]
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            recover_contact(model, work, c, share)
+            rate = contact_rate(model, work, c) if c < ground else pair_rate(model, work, c)
+            recover_contact(model, work, c, rate, share)
     recover_limits(model, work, h, share)
 
 

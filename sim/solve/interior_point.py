@@ -23,11 +23,10 @@ Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 
 from __future__ import annotations
 
-from sim import late
 from sim.contacts.far import came_near, choose_far, sunk_contact
 from sim.contacts.friction import slip_noise
+from sim.contacts.restitution import find_impacts, impacts_gained
 from sim.energy_balance import step_gained
-from sim.late import begin_pairs, find_impacts, impacts_gained, overlapping, pairs_gained
 from sim.model import Model, Vector
 from sim.options import (
     ASTRAY,
@@ -42,6 +41,10 @@ from sim.options import (
     Options,
     Outcome,
 )
+from sim.pairs.choice import overlapping
+from sim.pairs.far import begin_pairs
+from sim.pairs.work import pairs_gained
+from sim.slots import Slot
 from sim.solve.central_path import AGAIN, Beginning, begin, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
@@ -50,6 +53,7 @@ from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
+from solvers.optional import optional
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -161,7 +165,7 @@ def misplacement(
     return found
 
 
-@late.interior_point.defined(otherwise=FAILED)
+@optional(Slot.INTERIOR_POINT, default=FAILED)
 def interior_point(
     model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:

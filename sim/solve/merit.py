@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.late import apply_loops
+from sim.coupling.loops import apply_loops
 from sim.model import Model, Vector
 from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits

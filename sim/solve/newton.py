@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from sim import late
+from sim.coupling.loops import apply_loops, keep_loops, move_loops
+from sim.coupling.system import factor_coupling, solve_coupling
 from sim.dynamics import momentum_balance
 from sim.elimination import solve
-from sim.late import apply_loops, factor_coupling, keep_loops, move_loops, solve_coupling
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.options import FAILED, Guess, Options, Outcome
+from sim.slots import Slot
 from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
 from sim.work import Work
 from solvers.jit import inlined, kernel
+from solvers.optional import optional
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
@@ -63,7 +65,7 @@ def closed_to(work: Work, options: Options) -> float:
     return options.tolerance * max(work.couple_rank[2], _ROUNDED) ** 0.5 if work.couple_rank[1] > 0.0 else 1e300
 
 
-@late.newton.defined(otherwise=FAILED)
+@optional(Slot.NEWTON, default=FAILED)
 def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
     """Solve R(v25) = 0 from the guess of v25; halve steps that leave the domain or let the residual grow.
 

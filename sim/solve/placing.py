@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sim.dynamics import momentum_balance
-from sim.late import choose_pairs
 from sim.model import Model, Vector
 from sim.moves import turn_bodies
+from sim.pairs.choice import choose_pairs
 from sim.solve.inequalities import inequality_kinematics
 from sim.work import Work
 from solvers.jit import kernel

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from sim.coupling.gears import apply_gears
 from sim.elimination import project, subtree_sums
 from sim.joints.terms import joint_impulses
-from sim.late import apply_gears
 from sim.model import Model, Vector
 from sim.rotation import cross
 from sim.work import Work

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, rotate, transposed_times
+from sim.slots import Slot
 from sim.terrain.height_field import height_field
 from sim.work import Work
 from solvers.jit import kernel
+from solvers.optional import optional
 
 
 @kernel
@@ -43,7 +44,7 @@ def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
     return x + pos[i, 0], y + pos[i, 1], z + pos[i, 2]
 
 
-@late.place_on_terrain.defined()
+@optional(Slot.PLACE_ON_TERRAIN)
 def place_on_terrain(model: Model, work: Work, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
     x, y, z = centre(model, c, work.pos3, work.rot3)
@@ -53,7 +54,7 @@ def place_on_terrain(model: Model, work: Work, c: int) -> None:
     work.contact_kin[c, 0] = i * (z - F - model.contact_height[c])
 
 
-@late.terrain_gap.defined(otherwise=0.0)
+@optional(Slot.TERRAIN_GAP, default=0.0)
 def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
     """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
@@ -80,7 +81,7 @@ def frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
     return a + s * n[0], b + s * n[1], c + s * n[2]
 
 
-@late.turn_on_terrain.defined()
+@optional(Slot.TURN_ON_TERRAIN)
 def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
     """contact_turn = Omega, rotation of the frame by the twist about O; (gap, slip) rows of contact_kin on terrain.
 
@@ -121,7 +122,7 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
             k[9 + 3 * e + j] += s0 * W[3 + j] + s1 * W[9 + j] + s2 * W[15 + j]
 
 
-@late.add_frame_matrix.defined()
+@optional(Slot.ADD_FRAME_MATRIX)
 def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= d(wrench about O)/d(twist) by the turning of the frame, of the impulse f = n fn + t1 f1 + t2 f2:
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim import late
 from sim.contacts.contact import contact_kinematics
 from sim.contacts.far_bounds import NEARER, bound_changes, keep_motion
 from sim.contacts.friction import contact_impulse, start_contact
 from sim.model import Model
 from sim.rotation import cross
+from sim.slots import Slot
 from sim.work import Work
+from solvers.optional import optional
 
 
-@late.evaluate_on_terrain.defined()
+@optional(Slot.EVALUATE_ON_TERRAIN)
 def evaluate_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
     """far[c, 1:4], far[c, 4:24] and the cone variables of a far contact at configuration 3.
 

@@ -7,11 +7,11 @@ import pytest
 from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
-from sim.bind import bind_poses
 from sim.build import pack
 from sim.coordinates import maximal_states, minimal_states
 from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
 from sim.layout import allocate_work, sizes_of, table
+from sim.link import link_poses
 from sim.mechanism import Mechanism
 from sim.state import integrate_states, state_differences
 
@@ -25,7 +25,7 @@ class Maps:
     def __init__(self, mech: Mechanism) -> None:
         self.mech = mech
         self.model = pack(mech)
-        bind_poses(self.model)
+        link_poses(self.model)
         self.model_at = table(self.model)
         self.work = allocate_work(sizes_of(self.model))
         for array in self.work:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim import late
 from sim.elimination import solve
 from sim.elimination_panel import column_count, solve_panel
 from sim.layout import model_view, work_view
+from sim.slots import Slot
 from solvers.jit import local_kernel
 
 
@@ -43,18 +43,18 @@ def test_columns_are_solved_as_one_by_one(build, deep, rng):
     sim = dojo.Simulator(build(), time_step=0.01)
     sim.linearize(sim.neutral(), rng.normal(size=sim.nu))  # leaves factors
     model_at, work_at = sim._calls.tables()
-    bound = sim.model.late[late.solve_deep_panel.index]
+    bound = sim.model.optional[Slot.SOLVE_DEEP_PANEL]
     assert (bound != 0) == deep
     columns = rng.normal(size=work_view(work_at).columns.shape)
     for address in {bound, 0}:
-        sim.model.late[late.solve_deep_panel.index] = address
+        sim.model.optional[Slot.SOLVE_DEEP_PANEL] = address
         ours, by_one = columns.copy(), np.zeros_like(columns)
         count = both_ways(model_at, work_at, ours, by_one)
         assert count == 2 * sim.nv + sim.nu
         scale = np.abs(by_one[:, :count]).max()
         np.testing.assert_allclose(ours[:, :count], by_one[:, :count], rtol=0.0, atol=1e-11 * scale)
         np.testing.assert_array_equal(ours[:, count:], 0.0)
-    sim.model.late[late.solve_deep_panel.index] = bound
+    sim.model.optional[Slot.SOLVE_DEEP_PANEL] = bound
 
 
 def test_a_deep_tree_has_the_derivatives_of_its_steps(rng):

@@ -8,11 +8,11 @@ from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from dojo_opt import models
-from sim.bind import bind_poses
 from sim.build import pack
 from sim.coordinates import maximal_states
 from sim.energy import energies, momenta
 from sim.layout import allocate_work, sizes_of, table
+from sim.link import link_poses
 from sim.mechanism import Mechanism
 from sim.shapes import rotation_matrix
 
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 def measure(mech: Mechanism, q: Floats, v: Floats, h: float) -> tuple[Floats, Floats, Floats]:
     """(kinetic, potential), momentum, maximal state."""
     model = pack(mech)
-    bind_poses(model)
+    link_poses(model)
     work = allocate_work(sizes_of(model))
     for array in work:
         array[...] = np.nan if array.dtype.kind == "f" else 0

@@ -7,9 +7,9 @@ from naive import rotation as rot
 from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
-from sim.bind import bind_step
 from sim.energy_balance import arriving_energy, constraint_work, work_at_node
 from sim.layout import model_view, work_view
+from sim.link import link_step
 from solvers.jit import local_kernel
 
 
@@ -30,7 +30,7 @@ def given(model_at, work_at, h, v, u):
 
 
 def tables(sim):
-    return sim._calls.tables(bind_step)
+    return sim._calls.tables(link_step)
 
 
 def work_in_step(sim, x):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.bind import bind_step
 from sim.contacts.contact import add_contact_wrench, contact_rate
 from sim.elimination import solve, subtree_sums
 from sim.layout import model_view, work_view
+from sim.link import link_step
 from sim.solve.delassus import delassus
 from solvers.jit import local_kernel
 
@@ -50,7 +50,7 @@ def test_the_delassus_matrix_is_that_of_whole_solves():
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
     us = np.random.default_rng(0).uniform(-5.0, 5.0, (3, sim.nu))
     sim.rollout(sim.neutral(), us, throw=True)  # leaves factors and Jacobians of a step
-    model_at, work_at = sim._calls.tables(bind_step)
+    model_at, work_at = sim._calls.tables(link_step)
     work = work_view(work_at)
     stops = [0, 3, 9]
     size = 3 * FEET + len(stops)

@@ -1,20 +1,18 @@
-"""`@late`: kernels that other kernels call by their address, for what few scenes have.
+"""`@optional`: kernels that other kernels call by their address, for features that few scenes have.
 
-A call of a late kernel is compiled like any other call, but the kernel itself is not: the address is read from the
-table `late` of the first argument, a record, and where it is 0 the call stands for a constant. So a scene compiles what
-it binds, and pays a comparison for the rest; and what many entries call, the time step for one, is compiled once
-instead of once in each.
+A call of an optional kernel is compiled like any other call, but the kernel itself is not: its address is read from the
+table `optional` of the first argument, a record, and where it is 0 the call gives a default. So a scene compiles the
+features that it links, and pays a comparison for the others; and a kernel that many entries call, the time step for
+one, is compiled once instead of once in each.
 
-What a late kernel takes and returns is read from its annotations, because a caller is compiled before it:
+The types of its arguments and of its result are read from the annotations, because a caller is compiled before it:
 
     int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/record.py), NamedTuples
 
-    factor_coupling = _late("sim.coupling.system:factor_coupling")  # sim/late.py: for callers
-
-    @late.factor_coupling.defined(otherwise=True)
+    @optional(Slot.FACTOR_COUPLING, default=True)  # Slot: an IntEnum of the package that uses them
     def factor_coupling(model: Model, work: Work) -> bool: ...
 
-    model.late[factor_coupling.index] = factor_coupling.address()
+    link(model.optional, factor_coupling)
 """
 
 from __future__ import annotations
@@ -23,21 +21,24 @@ import inspect
 import sys
 from collections.abc import Callable, Iterable
 from functools import cached_property
-from importlib import import_module
 from types import GenericAlias
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from solvers.jit import entry
 from solvers.record import RECORDS, load_word
 
-__all__ = ["LateKernel", "LateTable"]
+__all__ = ["OptionalKernel", "link", "optional"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 _TYPES: dict[str, types.Type] = {
     "int": types.int64,
@@ -75,46 +76,29 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
     return types.BaseTuple.from_types(parts)
 
 
-_UNCOMPILED: list[LateKernel] = []  # asked for an address with NUMBA_DISABLE_JIT=1
+_UNCOMPILED: list[OptionalKernel] = []  # asked for an address with NUMBA_DISABLE_JIT=1
 
 
-class LateKernel:
-    """A kernel at an address; imported, and compiled, when it is first asked for."""
+class OptionalKernel:
+    """A kernel with a slot in a table of addresses; compiled when it is first linked."""
 
-    def __init__(self, home: str, index: int) -> None:
-        self.home, self.index = home, index
-        self.otherwise: Any = None
-        self._func: Callable[..., Any] | None = None
+    def __init__(self, func: Callable[..., Any], slot: int, default: Any) -> None:
+        self.func, self.slot, self.default = func, slot, default
+        self.name = f"{func.__module__}:{func.__name__}"
         self._code: Any = None
-
-    def defined(self, otherwise: Any = None) -> Callable[[Callable[..., Any]], LateKernel]:
-        """A decorator for the text of the kernel; `otherwise` stands for calls of it where its address is 0."""
-
-        def define(func: Callable[..., Any]) -> LateKernel:
-            if f"{func.__module__}:{func.__name__}" != self.home:
-                raise TypeError(f"late kernel {self.home}: expected there, got {func.__module__}:{func.__name__}")
-            self._func, self.otherwise = func, otherwise
-            return self
-
-        return define
-
-    @property
-    def func(self) -> Callable[..., Any]:
-        """The text."""
-        if self._func is None:
-            import_module(self.home.split(":")[0])
-        if self._func is None:
-            raise TypeError(f"late kernel {self.home}: not defined there")
-        return self._func
 
     def __call__(self, *args: Any) -> Any:
         """What compiled code does at a call, for kernels that run uncompiled."""
         if not numba.config.DISABLE_JIT:
-            raise TypeError(f"{self.home} is called from kernels only")
-        number = int(args[0].late[self.index])
+            raise TypeError(f"{self.name} is called from kernels only")
+        number = int(args[0].optional[self.slot])
         if number:
             return _UNCOMPILED[number - 1].func(*args)
-        return _nothing(self.signature().return_type) if self.otherwise is None else self.otherwise
+        return self.default_of(self.signature().return_type)
+
+    def default_of(self, kind: types.Type) -> Any:
+        """Result of a call while the slot is empty."""
+        return _zeros(kind) if self.default is None else self.default
 
     @property
     def compiled(self) -> bool:
@@ -137,7 +121,7 @@ class LateKernel:
             code = entry(self.func, declared.args)
             if code.signature.return_type != declared.return_type:
                 found = code.signature.return_type
-                raise TypeError(f"late kernel {self.home}: expected to return {declared.return_type}, got {found}")
+                raise TypeError(f"optional kernel {self.name}: expected to return {declared.return_type}, got {found}")
             self._code = code
         return int(self._code.library.get_pointer_to_function(self._code.fndesc.llvm_func_name))
 
@@ -152,27 +136,45 @@ class LateKernel:
         return cpu_target.typing_context.resolve_value_type(self._call)
 
 
-def _nothing(kind: types.Type) -> Any:
-    """What a call stands for where it is said of neither the kernel nor its address: zeros of its type."""
+def _zeros(kind: types.Type) -> Any:
+    """Zeros of a type of numbers and tuples; None of the others."""
     if isinstance(kind, types.BaseTuple):
-        parts = [_nothing(part) for part in kind]
+        parts = [_zeros(part) for part in kind]
         return kind.instance_class(*parts) if isinstance(kind, types.BaseNamedTuple) else tuple(parts)
     return {types.float64: 0.0, types.int64: 0, types.boolean: False}.get(kind)
 
 
-class LateTable:
-    """Late kernels by their homes, "module:name"; each has an index of its own, but for one `instead_of` another."""
+def optional(slot: int, default: Any = None) -> Callable[[Function], Function]:
+    """A decorator: the kernel gets a slot in the table of addresses.
 
-    def __init__(self) -> None:
-        self.count = 0
+    Args:
+        slot: its index in the table, a member of an IntEnum: never the order of imports, because machine code on disk
+            holds it.
+        default: result of a call where the slot is empty; zeros of the type of the result unless given.
 
-    def __call__(self, home: str, instead_of: Any = None) -> Any:
-        index = self.count if instead_of is None else instead_of.index
-        self.count += instead_of is None
-        return LateKernel(home, index)
+    Returns:
+        The decorator. Tools see the decorated function with its own type.
+    """
+
+    def decorate(func: Function) -> Function:
+        return cast(Function, OptionalKernel(func, slot, default))
+
+    return decorate
 
 
-def _caller(kernel: LateKernel) -> Any:
+def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
+    """Write the addresses of optional kernels into their slots; compile them, or load them, the first time.
+
+    Args:
+        table: (slots,) addresses; overwritten in place.
+        kernels: functions decorated by `optional`.
+    """
+    for kernel in kernels:
+        found = cast(OptionalKernel, kernel)
+        table[found.slot] = found.address()
+
+
+def _caller(kernel: OptionalKernel) -> Any:
     """What Numba compiles a call of the kernel to."""
 
     def call(typing: Any, *args: Any) -> Any:
@@ -180,10 +182,10 @@ def _caller(kernel: LateKernel) -> Any:
 
         def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             result = signature.return_type
-            k, _ = signature.args[0].fields["late"]
+            k, _ = signature.args[0].fields["optional"]
             addresses = load_word(builder, arguments[0], cgutils.intp_t.as_pointer(), 3 * k)
-            address = builder.load(builder.gep(addresses, [ir.Constant(cgutils.intp_t, kernel.index)]))
-            value = context.get_constant_generic(builder, result, kernel.otherwise)
+            address = builder.load(builder.gep(addresses, [ir.Constant(cgutils.intp_t, kernel.slot)]))
+            value = context.get_constant_generic(builder, result, kernel.default_of(result))
             slot = cgutils.alloca_once_value(builder, value)
             with builder.if_then(cgutils.is_not_null(builder, address)):
                 kind = context.call_conv.get_function_type(result, signature.args)

@@ -1,0 +1,21 @@
+"""The unknown of a step: the velocity v25 between configurations 2 and 3."""
+
+from __future__ import annotations
+
+from sim.model import Model, Vector
+from sim.options import Guess, Options, Outcome
+from sim.solve.interior_point import interior_point
+from sim.solve.newton import newton
+from sim.work import Work
+from solvers.jit import kernel
+
+
+@kernel
+def solve_step(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+    """Solve the equations of the step that `begin_step` began; work.nu is its velocity.
+
+    The interior point solves scenes with contacts or limits, Newton's method the others; a scene links one of them.
+    """
+    if model.contact_body.shape[0] + model.limit_dof.shape[0] > 0:
+        return interior_point(model, work, options, q, v, u, guess)
+    return newton(model, work, options, q, v, u, guess)
