@@ -15,7 +15,7 @@ import numpy as np
 from dojo_opt.motion import Motion, motion
 from dojo_opt.viewer_page import page
 from sim import shapes
-from sim.build import contact_frame
+from sim.axes import contact_frame
 from sim.parts import WORLD
 from sim.polytope import Polytope
 from sim.simulator import Simulator

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from sim.mechanism import Mechanism
 from sim.parts import WORLD
 from sim.polytope import Polytope
+from sim.poses import poses
 from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
-from sim.urdf.stance import poses
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float =
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon
 
-    at = poses(mechanism, np.asarray(mechanism.neutral if q is None else q, dtype=np.float64))
+    at = poses(mechanism.joints, np.asarray(mechanism.neutral if q is None else q, dtype=np.float64))
     right, up, depth = _camera()
     figure = Figure(figsize=(size, size))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.build import contact_frame, fixed_axes
+from sim.axes import contact_frame, fixed_axes
 from sim.calls import Calls
 from sim.coupling.closing import is_weld
 from sim.coupling.loop_rank import LoopRank

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.build import translation_axes
+from sim.axes import translation_axes
 from sim.mjcf.groups import Group, name_of
 from sim.parts import KINDS, WORLD, Body, Joint
 from sim.urdf.pose import HERE, Pose, turn

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +12,10 @@ from numpy.typing import NDArray
 from sim.collision import kinds
 from sim.collision.broad import bounding_radius
 from sim.collision.kinds import CROSSINGS, EDGES, RIM_POINTS, SPARE
-from sim.parts import WORLD
+from sim.collisions import Collision
+from sim.parts import WORLD, Body, Joint
 from sim.polytope import Polytope, hull_table
 from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
-
-if TYPE_CHECKING:
-    from sim.collisions import Collision
-    from sim.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 End = tuple[int, Solid]  # body, -1 for the world, and shape
@@ -43,36 +39,36 @@ class Touch:
     collision: str
 
 
-def touches(mech: Mechanism) -> list[Touch]:
-    """All contact points of the collisions of a mechanism; those of the same two bodies follow one another.
+def touches(call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisions: Sequence[Collision]) -> list[Touch]:
+    """All contact points that collisions may have; those of the same two bodies follow one another.
 
     What is fixed to one another cannot touch: no motion changes the gap, and no impulse could be told.
     """
-    holder = _holders(mech)
-    found = [touch for collision in mech.collisions for touch in _touches(mech, collision)]
+    index = {body.name: i for i, body in enumerate(bodies)} | {WORLD: -1}
+    holder = _holders(index, joints)
+    found = [touch for collision in collisions for touch in _touches(call, bodies, index, collision)]
     found = [touch for touch in found if holder[touch.bodies[0]] != holder[touch.bodies[1]]]
     order = list(dict.fromkeys(touch.bodies for touch in found))
     return sorted(found, key=lambda touch: order.index(touch.bodies))
 
 
-def _holders(mech: Mechanism) -> dict[int, int]:
+def _holders(index: dict[str, int], joints: Sequence[Joint]) -> dict[int, int]:
     """The first body of those that are fixed to one another, of each body; -1 for what is fixed to the world."""
     holder = {-1: -1}
-    for i, joint in enumerate(mech.joints):
-        parent = mech.body_names.index(joint.parent) if joint.parent in mech.body_names else -1
-        holder[i] = holder[parent] if joint.nv == 0 else i
+    for i, joint in enumerate(joints):
+        holder[i] = holder[index[joint.parent or WORLD]] if joint.nv == 0 else i
     return holder
 
 
-def _touches(mech: Mechanism, collision: Collision) -> list[Touch]:
-    call = f"Mechanism({mech.name!r}): collision {collision.name!r}"
+def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision: Collision) -> list[Touch]:
+    call = f"{call}: collision {collision.name!r}"
     solids: list[End] = []
     for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
-        index = -1 if body == WORLD else mech.body_names.index(body)
-        shape = given if given is not None else mech.bodies[index].shape
+        i = index[body]
+        shape = given if given is not None else bodies[i].shape
         if shape is None:
             raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
-        solids.append((index, shape))
+        solids.append((i, shape))
     (a, first), (b, second) = solids
     if isinstance(first, String) and isinstance(second, String) and first.length != second.length:
         raise ValueError(f"{call}: both ends of a string have its length, got {first.length:g} and {second.length:g}")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.build import contact_frame
+from sim.axes import contact_frame
 from sim.collisions import Collision
 from sim.mechanism import Mechanism
 from sim.pairs.touch import Touch

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.build import translation_axes
+from sim.axes import translation_axes
 from sim.coupling.closing import parts_of
 from sim.mechanism import Mechanism
 from sim.parameters.effects import Effect

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.build import translation_axes
 from sim.mechanism import Mechanism
-from sim.parts import Joint
+from sim.poses import poses
 from sim.shapes import rotation_matrix
-from sim.urdf.pose import HERE, Pose, turn
 
 Floats = NDArray[np.float64]
 
@@ -23,32 +21,9 @@ def resting(limits: tuple[float, float] | None) -> float:
     return 0.5 * (limits[0] + limits[1])
 
 
-def poses(mech: Mechanism, q: Floats) -> dict[str, Pose]:
-    """Pose of every body, at its centre of mass, at the coordinates q (nq,)."""
-    out: dict[str, Pose] = {}
-    for joint in mech.joints:
-        parent = out.get(joint.parent or "", HERE)
-        frame = parent.then(Pose(rotation_matrix(joint.orientation), np.asarray(joint.parent_point)))
-        moved = frame.then(_motion(joint, q[mech.q_slice(joint.name)]))
-        out[joint.child] = Pose(moved.rotation, moved.at(-np.asarray(joint.child_point)))
-    return out
-
-
-def _motion(joint: Joint, q: Floats) -> Pose:
-    """Pose of the child's joint point in the joint frame."""
-    shift = q[: joint.ntrans] @ translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
-    if joint.nrot == 2:
-        t = q[-2:] @ translation_axes(2, joint.axis)[:2]
-        angle = float(np.linalg.norm(t))
-        return Pose(turn(t / angle, angle) if angle > 0.0 else np.eye(3), shift)
-    if joint.nrot == 1:
-        return Pose(turn(joint.axis, float(q[-1])), shift)
-    return Pose(rotation_matrix(q[-4:]) if joint.nrot == 3 else np.eye(3), shift)
-
-
 def gaps(mech: Mechanism, q: Floats) -> Floats:
     """(ncontact,) distance of every contact from its ground [m]."""
-    at = poses(mech, q)
+    at = poses(mech.joints, q)
     return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import BALL, CASES, INF, chain_with, hip, two
 
-from sim.build import contact_frame, mechanism_sizes, pack, translation_axes
+from sim.axes import contact_frame, translation_axes
+from sim.build import mechanism_sizes, pack
 from sim.mechanism import Mechanism
 from sim.model import InputKind, Law
 from sim.parts import KINDS, Body, Contact, Input, Joint
