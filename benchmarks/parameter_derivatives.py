@@ -17,9 +17,9 @@ from command import deliver, number, parser
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report
-from sim.parameters.parameters import KINDS, all_parameters
-from sim.parameters.selection import select
-from sim.parameters.sensitivity import parameter_columns
+from sim.derivatives.parameters.parameters import KINDS, all_parameters
+from sim.derivatives.parameters.selection import select
+from sim.simulator.sensitivity import parameter_columns
 
 REPEATS = 40
 

@@ -93,7 +93,7 @@ def load(path: Path) -> tuple[Any, str, str]:
 
 def _raised(path: Path, mech: Any, floating: bool, repair: bool) -> Any:
     """The mechanism with its fixed base so high that its lowest contact has some clearance."""
-    from sim.urdf.stance import gaps
+    from sim.mechanism.stance import gaps
 
     up = CLEARANCE - gaps(mech, np.array(mech.neutral)).min(initial=CLEARANCE)
     return dojo.load_urdf(path, floating=floating, repair=repair, position=(0.0, 0.0, up)) if up > 0.0 else mech

@@ -82,48 +82,48 @@ __all__ = [
 
 # public name -> module that defines it; a name mapped to None is itself a module of dojo_opt
 _HOME: dict[str, str | None] = {
-    "Body": "sim.parts",
-    "Box": "sim.shapes",
-    "Capsule": "sim.shapes",
+    "Body": "sim.mechanism.parts",
+    "Box": "sim.mechanism.shapes",
+    "Capsule": "sim.mechanism.shapes",
     "ClosedLoop": "dojo_opt.plant.loop",
-    "Collision": "sim.collisions",
-    "Contact": "sim.parts",
-    "Cylinder": "sim.shapes",
+    "Collision": "sim.mechanism.collision",
+    "Contact": "sim.mechanism.parts",
+    "Cylinder": "sim.mechanism.shapes",
     "Disturbances": "dojo_opt.plant.disturbances",
     "Environment": "dojo_opt.environment",
-    "Gear": "sim.gear",
-    "HalfSpace": "sim.shapes",
-    "Input": "sim.parts",
-    "Interrupted": "sim.results",
-    "Joint": "sim.parts",
-    "Linearization": "sim.results",
+    "Gear": "sim.mechanism.gear",
+    "HalfSpace": "sim.mechanism.shapes",
+    "Input": "sim.mechanism.parts",
+    "Interrupted": "sim.simulator.results",
+    "Joint": "sim.mechanism.parts",
+    "Linearization": "sim.simulator.results",
     "MPC": "dojo_opt.mpc.controller",
-    "Mechanism": "sim.mechanism",
-    "MjcfMechanism": "sim.mjcf",
-    "MjcfWarning": "sim.mjcf",
+    "Mechanism": "sim.mechanism.mechanism",
+    "MjcfMechanism": "sim.io.mjcf",
+    "MjcfWarning": "sim.io.mjcf",
     "Options": "dojo_opt.options",
     "ParameterSpace": "dojo_opt.parameter_space",
-    "Parameters": "sim.parameters.parameters",
+    "Parameters": "sim.derivatives.parameters.parameters",
     "Perturbation": "dojo_opt.plant.perturbation",
     "Plan": "dojo_opt.plan",
     "Plant": "dojo_opt.plant.plant",
-    "Polytope": "sim.polytope",
+    "Polytope": "sim.mechanism.polytope",
     "Problem": "dojo_opt.problem",
     "Push": "dojo_opt.plant.perturbation",
-    "Reactions": "sim.reactions",
+    "Reactions": "sim.simulator.reactions",
     "Sampled": "dojo_opt.mpc.moving",
-    "SimulationError": "sim.results",
-    "Simulator": "sim.simulator",
-    "Sphere": "sim.shapes",
+    "SimulationError": "sim.simulator.results",
+    "Simulator": "sim.simulator.simulator",
+    "Sphere": "sim.mechanism.shapes",
     "Stage": "dojo_opt.options",
     "Status": "solvers.status",
-    "StepResult": "sim.results",
-    "String": "sim.shapes",
-    "Terrain": "sim.terrain.terrain",
-    "Trajectory": "sim.results",
-    "UrdfError": "sim.urdf.xml",
-    "UrdfMechanism": "sim.urdf.report",
-    "UrdfWarning": "sim.urdf.report",
+    "StepResult": "sim.simulator.results",
+    "String": "sim.mechanism.shapes",
+    "Terrain": "sim.mechanism.terrain",
+    "Trajectory": "sim.simulator.results",
+    "UrdfError": "sim.io.urdf.xml",
+    "UrdfMechanism": "sim.io.urdf.report",
+    "UrdfWarning": "sim.io.urdf.report",
     "bridges": None,
     "closed_loop": "dojo_opt.plant.loop",
     "constraint": None,
@@ -132,8 +132,8 @@ _HOME: dict[str, str | None] = {
     "gaits": None,
     "ilqr": "dojo_opt.planner",
     "kernel": "dojo_opt.residual",
-    "load_mjcf": "sim.mjcf",
-    "load_urdf": "sim.urdf.load",
+    "load_mjcf": "sim.io.mjcf",
+    "load_urdf": "sim.io.urdf.load",
     "models": None,
     "monte_carlo": "dojo_opt.plant.study",
     "plots": None,
@@ -162,21 +162,21 @@ if TYPE_CHECKING:
     from dojo_opt.residual import kernel
     from dojo_opt.rest import equilibrium
     from dojo_opt.tracking import tracking_gains
-    from sim.collisions import Collision
-    from sim.gear import Gear
-    from sim.mechanism import Mechanism
-    from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
-    from sim.parameters.parameters import Parameters
-    from sim.parts import Body, Contact, Input, Joint
-    from sim.polytope import Polytope
-    from sim.reactions import Reactions
-    from sim.results import Interrupted, Linearization, SimulationError, StepResult, Trajectory
-    from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
-    from sim.simulator import Simulator
-    from sim.terrain.terrain import Terrain
-    from sim.urdf.load import load_urdf
-    from sim.urdf.report import UrdfMechanism, UrdfWarning
-    from sim.urdf.xml import UrdfError
+    from sim.derivatives.parameters.parameters import Parameters
+    from sim.io.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
+    from sim.io.urdf.load import load_urdf
+    from sim.io.urdf.report import UrdfMechanism, UrdfWarning
+    from sim.io.urdf.xml import UrdfError
+    from sim.mechanism.collision import Collision
+    from sim.mechanism.gear import Gear
+    from sim.mechanism.mechanism import Mechanism
+    from sim.mechanism.parts import Body, Contact, Input, Joint
+    from sim.mechanism.polytope import Polytope
+    from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
+    from sim.mechanism.terrain import Terrain
+    from sim.simulator.reactions import Reactions
+    from sim.simulator.results import Interrupted, Linearization, SimulationError, StepResult, Trajectory
+    from sim.simulator.simulator import Simulator
     from solvers.status import Status
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import chosen_components, chosen_inputs, component_name
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, numbers, state_table
-from sim.brief import brief_repr
+from sim.mechanism.brief import brief_repr
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]

@@ -14,7 +14,7 @@ from dojo_opt.line_search import Iterate, LineSearch
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options, Stage
 from dojo_opt.shooting import Shooting
-from sim.horizon import Horizon
+from sim.simulator.horizon import Horizon
 from solvers.riccati import Promise
 from solvers.status import Status
 

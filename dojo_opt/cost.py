@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import input_weight, state_weight
 from dojo_opt.residual import ResidualKernels, check_residual
 from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
-from sim import checks
-from sim.brief import brief_repr
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 
 Integers = NDArray[np.int64]
 

@@ -13,7 +13,7 @@ from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
-from sim.horizon import Horizon
+from sim.simulator.horizon import Horizon
 from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import MESSAGES, Status
 

@@ -11,7 +11,7 @@ from dojo_opt.mpc.horizon import with_own_terms
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.study import Sampler
 from dojo_opt.problem import Problem
-from sim import checks
+from sim.mechanism import checks
 
 try:
     import gymnasium

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.cross import cross
-from sim import checks
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
 

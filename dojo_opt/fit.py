@@ -9,7 +9,7 @@ import numpy as np
 from dojo_opt.line_search import Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Stage
-from sim.horizon import Horizon
+from sim.simulator.horizon import Horizon
 
 _GOOD = 2.0  # times the least sum of squared gaps
 _REST = 1e-9  # [m, rad] from one knot to the next: what rests

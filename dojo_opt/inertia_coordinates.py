@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import checks
+from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
-from sim.horizon import Horizon
+from sim.simulator.horizon import Horizon
 from solvers.riccati import Promise
 from solvers.status import Status
 
@@ -32,7 +32,7 @@ class Iterate(NamedTuple):
     gaps: Matrix | None  # (T + 1, ndx) f(x_t, u_t) (-) x_{t+1}, None when consistent
     cost: float
     merit: float
-    steps: Any = None  # what the simulator knows about its steps (sim/horizon.py)
+    steps: Any = None  # what the simulator knows about its steps (sim/simulator/horizon.py)
 
     @property
     def gap(self) -> float:

@@ -17,9 +17,9 @@ from dojo_opt.options import CONTINUATION, PLANNED
 from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
-from sim import checks
-from sim.border import whole
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.border import whole
+from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
 

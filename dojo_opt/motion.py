@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from sim.brief import brief_repr
-from sim.mechanism import Mechanism
-from sim.model import Vector
-from sim.shapes import rotation_matrix
-from sim.simulator import Simulator
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.shapes import rotation_matrix
+from sim.model.model import Vector
+from sim.simulator.simulator import Simulator
 
 Array = Vector
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import checks
-from sim.dofs import components
+from sim.mechanism import checks
+from sim.mechanism.dofs import components
 
 Integers = NDArray[np.int64]
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim import checks
+from sim.mechanism import checks
 
 __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 

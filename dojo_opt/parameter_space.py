@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import inertia_coordinates
-from sim import checks
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 Chart = Callable[[Floats], tuple[Floats, Floats]]  # coordinates -> values of parameters, and their derivative

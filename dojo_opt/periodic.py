@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.names import chosen_components
 from dojo_opt.penalty import penalty_derivatives
 from dojo_opt.term import StateTerm, Term, table
-from sim.brief import brief_repr
-from sim.rotation import inverse_right_jacobian
+from sim.mechanism.brief import brief_repr
+from solvers.rotation import inverse_right_jacobian
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.border import whole
-from sim.brief import brief_table
+from sim.mechanism.brief import brief_table
+from sim.simulator.border import whole
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]

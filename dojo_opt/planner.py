@@ -24,8 +24,8 @@ from dojo_opt.options import Options, Stage
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
 from dojo_opt.shooting import Shooting
-from sim import checks
-from sim.results import Interrupted
+from sim.mechanism import checks
+from sim.simulator.results import Interrupted
 from solvers.status import MESSAGES, Status
 
 __all__ = ["Solver", "ilqr"]

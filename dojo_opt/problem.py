@@ -14,7 +14,7 @@ from dojo_opt.cost import Spec
 from dojo_opt.manifold import tangent_layout
 from dojo_opt.names import chosen_components
 from dojo_opt.term import numbers, state_table, table
-from sim.border import whole
+from sim.simulator.border import whole
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

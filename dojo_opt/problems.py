@@ -14,10 +14,10 @@ from dojo_opt.leaps import leap
 from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
-from sim import checks
-from sim.border import whole
-from sim.checks import nearest
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.mechanism.checks import nearest
+from sim.simulator.border import whole
+from sim.simulator.simulator import Simulator
 
 __all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
 

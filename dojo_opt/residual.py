@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.captured import fingerprint
 from dojo_opt.manifold import displace
-from sim.pace import rows
+from sim.model.pace import rows
 from solvers.jit import CompilationError, users_kernel, users_loop
 
 Matrix = NDArray[np.float64]

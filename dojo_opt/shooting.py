@@ -11,7 +11,7 @@ from dojo_opt.line_search import Gains, Iterate
 from dojo_opt.objective import Objective
 from dojo_opt.options import Options
 from dojo_opt.problem import Problem
-from sim.horizon import Horizon
+from sim.simulator.horizon import Horizon
 from solvers.riccati import Promise
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from sim import checks
-from sim.checks import nearest
+from sim.mechanism import checks
+from sim.mechanism.checks import nearest
 
 __all__ = ["add_show", "show"]
 

@@ -17,11 +17,11 @@ from dojo_opt.mpc.tick import OPTIONS
 from dojo_opt.options import PLANNED
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
-from sim import checks
-from sim.border import whole
-from sim.checks import nearest
-from sim.simulator import Simulator
-from sim.terrain.terrain import Terrain
+from sim.mechanism import checks
+from sim.mechanism.checks import nearest
+from sim.mechanism.terrain import Terrain
+from sim.simulator.border import whole
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.manifold import state_residual
 from dojo_opt.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
 from dojo_opt.residual import ResidualKernels
-from sim import checks
+from sim.mechanism import checks
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

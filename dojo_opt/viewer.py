@@ -14,12 +14,12 @@ import numpy as np
 
 from dojo_opt.motion import Motion, motion
 from dojo_opt.viewer_page import page
-from sim import shapes
-from sim.axes import contact_frame
-from sim.parts import WORLD
-from sim.polytope import Polytope
-from sim.simulator import Simulator
-from sim.terrain.terrain import Terrain
+from sim.mechanism import shapes
+from sim.mechanism.axes import contact_frame
+from sim.mechanism.parts import WORLD
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.terrain import Terrain
+from sim.simulator.simulator import Simulator
 
 __all__ = ["save_html"]
 

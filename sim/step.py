@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from sim.contacts.report import worst_contact
-from sim.coupling.loop_branch import solve_loops
-from sim.coupling.loop_work import loops_gained
-from sim.coupling.loops import start_loops
-from sim.dynamics import begin_step
-from sim.energy_balance import step_gained
-from sim.model import Model, Vector
-from sim.options import Guess, Options, Outcome
-from sim.slots import Slot
+from sim.contact.contact_report import worst_contact
+from sim.dynamics.loops.closure import start_loops
+from sim.dynamics.loops.loop_work import loops_gained
+from sim.dynamics.momentum_balance import begin_step
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import Guess, Options, Outcome
+from sim.model.slots import Slot
+from sim.solve.energy_balance import step_gained
+from sim.solve.loop_branch import solve_loops
 from sim.solve.solve_step import solve_step
-from sim.work import Work
 from solvers.jit import inlined
 from solvers.optional import optional
 from solvers.status import Status

@@ -44,7 +44,7 @@ _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def _sources() -> list[Path]:
-    """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
+    """Every file whose text can end up inside a compiled kernel; a loader (sim/io) is not among them."""
     root = Path(__file__).resolve().parent.parent
     files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
     files += [

@@ -8,8 +8,8 @@ import numpy as np
 from mechanisms import random_body, random_state, unit_quaternion
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.parts import KINDS, Input, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import KINDS, Input, Joint
 
 ORDERS = (4, 6, 8)
 

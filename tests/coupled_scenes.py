@@ -11,9 +11,9 @@ from linkage import fourbar
 from dojo_opt.report.mechanics.case import Case
 from dojo_opt.report.mechanics.couplings import started
 from dojo_opt.report.mechanics.situations import CASES
-from sim.gear import Gear
-from sim.parts import Body, Joint
-from sim.simulator import Simulator
+from sim.mechanism.gear import Gear
+from sim.mechanism.parts import Body, Joint
+from sim.simulator.simulator import Simulator
 
 # other values of these and the four-bar is no planar linkage of rods, and cannot close
 PLANAR = ("inertia", "orientation", "axis", "parent_point", "child_point")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.results import Trajectory
-from sim.simulator import Simulator
+from sim.simulator.results import Trajectory
+from sim.simulator.simulator import Simulator
 
 
 def check_motion(sim: Simulator, t: Trajectory, seed: int) -> bool:

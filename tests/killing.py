@@ -10,7 +10,7 @@ from typing import Any
 from dojo_opt.report.engines import Ours, Run
 from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.run import ended
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.parts import Body, Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Box
 
 Y = (0.0, 1.0, 0.0)
 CRANK, COUPLER, ROCKER = 0.5, 1.0, 0.8  # [m]; the ground is 1 m long

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism import Mechanism
-from sim.parts import KINDS, Body, Contact, Joint
-from sim.shapes import Sphere
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import KINDS, Body, Contact, Joint
+from sim.mechanism.shapes import Sphere
 
 Floats = NDArray[np.float64]
 BALL = Sphere(0.1)

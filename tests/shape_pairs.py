@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.collision.collide import collide
-from sim.collision.kinds import OUT, Pair, Shape, count, pair
+from sim.contact.collision.collide import collide
+from sim.model.shape_kinds import OUT, Pair, Shape, count, pair
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))

@@ -35,7 +35,7 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
 
     seen = [digest(), digest()]
     assert seen[0] == seen[1]
-    for name in ("sim/model.py", "solvers/status.py"):
+    for name in ("sim/model/model.py", "solvers/status.py"):
         file = copy / name
         file.write_text(file.read_text() + "\n# edited\n")
         seen.append(digest())
@@ -302,22 +302,22 @@ print(json.dumps(compiled_signatures()))
 """
     kernels = json.loads(python(program))
     assert any(name.startswith("sim.") for name in kernels)
-    hard = "contact complementarity friction interior_point inequalities limits central_path direction line_search merit".split()
-    foreign = ("solvers.cones", *(f"sim.{name}" for name in hard))
+    hard = "complementarity interior_point inequalities central_path direction step_length merit".split()
+    foreign = ("solvers.cones", "sim.contact", "sim.dynamics.joints.limits", *(f"sim.solve.{name}" for name in hard))
     assert [name for name in kernels if name.startswith(foreign)] == []
 
 
 def test_what_few_scenes_have_is_compiled_by_them_only() -> None:
     program = """
 import numpy as np, dojo_opt as dojo
-from sim.joints.ball_spring import spring_impulse
-from sim.joints.cone_limit import cone_gap
-from sim.coupling.system import factor_coupling
+from sim.dynamics.joints.ball_spring import spring_impulse
+from sim.dynamics.joints.cone_limit import cone_gap
+from sim.dynamics.loops.coupling_system import factor_coupling
 from sim.solve.interior_point import interior_point
 from sim.solve.newton import newton
-from sim.contacts.pyramid import start_pyramid
-from sim.joints.swing import swing_pose
-late = (newton, interior_point, swing_pose, cone_gap, spring_impulse, start_pyramid, factor_coupling)
+from sim.contact.pyramid import start_pyramid
+from sim.dynamics.joints.swing import swing_pose
+optional = (newton, interior_point, swing_pose, cone_gap, spring_impulse, start_pyramid, factor_coupling)
 body = dojo.Body("b", 1.0, (1, 1, 1))
 scenes = (
     dojo.models.pendulum(),
@@ -328,19 +328,16 @@ scenes = (
 for mech in scenes:
     sim = dojo.Simulator(mech, time_step=0.01)
     sim.step(sim.neutral())
-    print("".join("x" if kernel.compiled else "." for kernel in late))
+    print("".join("x" if kernel.compiled else "." for kernel in optional))
 """
     assert python(program).split() == ["x......", "xx.....", "xx.x...", "xxxx..."]
 
 
-FEATURES = (  # what few scenes have: rooms and files with kernels of their own
-    "sim.collision.", "sim.coupling.", "sim.high_order.", "sim.pairs.", "sim.parameters.", "sim.terrain.",
-    "sim.contacts.pyramid", "sim.contacts.restitution", "sim.joints.cone_limit", "sim.joints.swing",
-)  # fmt: skip
-NOUNS = (  # what users write and mechanisms ask their parts for
-    "sim.collision.broad", "sim.collision.kinds", "sim.contacts.clusters", "sim.contacts.left_out",
-    "sim.coupling.closing", "sim.coupling.closure", "sim.coupling.loop_rank", "sim.coupling.nearest", "sim.pairs.touch",
-    "sim.joints.swing_coordinates", "sim.terrain.ball_surface", "sim.terrain.spline", "sim.terrain.terrain",
+FEATURES = (  # of few scenes: rooms and files with kernels of their own
+    "sim.contact.collision.", "sim.contact.pairs.", "sim.contact.pyramid", "sim.contact.restitution",
+    "sim.contact.terrain_contact", "sim.contact.height_field", "sim.dynamics.joints.cone_limit",
+    "sim.dynamics.joints.swing", "sim.dynamics.loops.", "sim.derivatives.parameters.", "sim.integrators.hamilton",
+    "sim.integrators.runge_kutta",
 )  # fmt: skip
 
 
@@ -352,23 +349,19 @@ NOUNS = (  # what users write and mechanisms ask their parts for
         (
             "sim = dojo.Simulator(dojo.models.pendulum())\n"
             "sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())",
-            (*FEATURES, "sim.contacts.", "sim.solve.interior_point", "sim.solve.inequalities", "solvers.cones"),
+            (*FEATURES, "sim.contact.", "sim.solve.interior_point", "sim.solve.inequalities", "solvers.cones"),
         ),
     ],
     ids=["hop", "pendulum"],
 )
-def test_what_few_scenes_have_is_neither_compiled_nor_imported(program: str, foreign: tuple[str, ...]) -> None:
+def test_features_of_few_scenes_are_not_compiled(program: str, foreign: tuple[str, ...]) -> None:
     text = f"""
-import json, sys, numpy as np, dojo_opt as dojo
+import json, numpy as np, dojo_opt as dojo
 from solvers.jit import compiled_signatures
 {program}
-print(json.dumps([list(compiled_signatures()), list(sys.modules)]))
+print(json.dumps(list(compiled_signatures())))
 """
-    compiled, _ = json.loads(python(text))
-    _, imported = json.loads(python(text))  # the first may have compiled, which imports what is called
-    assert [name for name in compiled if name.startswith(foreign)] == []
-    assert [name for name in imported if name.startswith(foreign) and name not in NOUNS] == []
-    assert {"sim.step", "sim.calls"} <= set(imported)
+    assert [name for name in json.loads(python(text)) if name.startswith(foreign)] == []
 
 
 @pytest.mark.slow

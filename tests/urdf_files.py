@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from sim.poses import poses
-from sim.shapes import rotation_matrix
+from sim.mechanism.poses import poses
+from sim.mechanism.shapes import rotation_matrix
 
 BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 AXIS = '<axis xyz="0 1 0"/>'

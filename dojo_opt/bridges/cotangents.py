@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.cross import cross
 from dojo_opt.manifold import tangent_layout
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

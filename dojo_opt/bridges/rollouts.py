@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from dojo_opt.bridges.cotangents import Cotangents
 from dojo_opt.parameter_space import ParameterSpace
-from sim import checks
-from sim.results import SimulationError
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.results import SimulationError
+from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from dojo_opt.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
-from sim import checks
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from dojo_opt.feet import Feet
 from dojo_opt.rest import input_map, least_pushes
-from sim.brief import brief_repr
-from sim.parts import Input, Joint
-from sim.simulator import Simulator
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.parts import Input, Joint
+from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
-from sim import checks
-from sim.border import whole
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.border import whole
+from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
 

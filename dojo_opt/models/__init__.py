@@ -42,7 +42,7 @@ from dojo_opt.models.twister import twister
 from dojo_opt.models.uuv import uuv
 from dojo_opt.models.walker import walker
 from dojo_opt.models.youbot import youbot
-from sim.checks import nearest
+from sim.mechanism.checks import nearest
 
 __all__ = [
     "acrobot",

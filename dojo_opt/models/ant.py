@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, degrees, grounded, joints, rod, touch
-from sim.mechanism import Mechanism
-from sim.parts import Input, Joint
-from sim.shapes import Sphere
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Input, Joint
+from sim.mechanism.shapes import Sphere
 
 RADIUS = 0.08  # of the legs [m]
 # leg: signs of x and y, stops of the ankle [degrees]

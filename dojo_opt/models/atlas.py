@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
-from sim import checks
-from sim.mechanism import Mechanism
-from sim.parts import Contact, Input, Joint
-from sim.shapes import Box
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Contact, Input, Joint
+from sim.mechanism.shapes import Box
 
 TRUNK = {
     "pelvis": Link(9.509, (0.0111, 0, 0.0271), (0.1244, 0.0008, -0.0007, 0.0958, -0.0005, 0.1167), Box(0.2, 0.2, 0.15)),

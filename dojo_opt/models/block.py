@@ -6,9 +6,9 @@ from itertools import product
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box
 
 
 def block(

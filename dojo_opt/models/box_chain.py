@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sim.border import whole
-from sim.parts import Body, Joint
-from sim.shapes import Box
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import Box
+from sim.simulator.border import whole
 
 Point = tuple[float, float, float]
 

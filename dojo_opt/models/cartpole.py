@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim import checks
-from sim.mechanism import Mechanism
-from sim.parts import Body, Input, Joint
-from sim.shapes import Capsule
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Capsule
 
 CART_INERTIA = (0.106974, 0.106974, 0.00636812)
 POLE_INERTIA = (0.0422274, 0.0422274, 0.0012155)

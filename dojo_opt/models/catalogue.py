@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import dojo_opt.models as models
-from sim.build import mechanism_sizes
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import mechanism_sizes
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.npendulum import npendulum
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 
 def double_pendulum(

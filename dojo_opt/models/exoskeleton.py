@@ -7,7 +7,7 @@ from math import pi
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, degrees, joints
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 # the wearer's arm: 3 % and 2 % of 75 kg
 UPPER_ARM = Link(2.25, (0.0, 0.0, -0.155), (0.01875, 0.01875, 0.00375))

@@ -6,9 +6,9 @@ from math import pi
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Box
 
 X = (1.0, 0.0, 0.0)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.models.hopper import DOWN
 from dojo_opt.models.links import Mount, rod
 from dojo_opt.models.planar import Ball, planar_robot
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 RADIUS = 0.046  # of all capsules [m]
 TORSO_MASS = 6.36031  # with the head [kg]

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Mount, degrees, rod
 from dojo_opt.models.planar import planar_robot
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 DOWN, FORWARD = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, from_z, grounded, joints, touch
-from sim.mechanism import Mechanism
-from sim.parts import Input, Joint
-from sim.shapes import Capsule, Shape
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Input, Joint
+from sim.mechanism.shapes import Capsule, Shape
 
 FOOT_RADIUS = 0.027  # [m]
 HEEL, TOE = np.array([-0.07, -0.01, 0.0]), np.array([0.14, -0.03, 0.0])  # of the right foot [m]
@@ -89,7 +89,7 @@ def humanoid(
            (quaternion), knee, ankle, shoulder (2), elbow [rad]
         u  (19,) torques in the same order [N m]: 2, 1, then 3, 1, 1, 2, 1 for each side
 
-    Joints written with (2) are orbital: the rotation vector across their axis, see sim/joints/swing.py. spring
+    Joints written with (2) are orbital: the rotation vector across their axis, see sim/dynamics/joints/swing.py. spring
     [N m/rad] and damper [N m s/rad] of all joints; friction of the four contacts, a heel and a toe per foot; law: see
     Contact.
     40.84 kg; masses, inertias and dimensions are those of the model in Dojo, after gym's.

@@ -9,12 +9,12 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.mechanism import Mechanism
-from sim.parts import WORLD, Body, Contact, Joint
-from sim.shapes import Capsule, Shape
-from sim.urdf.inertia import RigidInertia, combined
-from sim.urdf.pose import Pose, quaternion, roll_pitch_yaw
-from sim.urdf.stance import gaps
+from sim.io.urdf.inertia import RigidInertia, combined
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import WORLD, Body, Contact, Joint
+from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw
+from sim.mechanism.shapes import Capsule, Shape
+from sim.mechanism.stance import gaps
 
 Floats = NDArray[np.float64]
 

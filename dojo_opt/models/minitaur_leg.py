@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box
 
 Y = (0.0, 1.0, 0.0)
 

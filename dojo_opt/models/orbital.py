@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim.border import whole
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import Box
+from sim.simulator.border import whole
 
 
 def orbital(

@@ -7,7 +7,7 @@ from math import pi
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, joints
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 LINKS = {
     "link1": Link(4.970684, (0.003875, 0.002081, -0.04762), (0.70337, -1.39e-4, 6.772e-3, 0.70661, 0.019169, 0.009117)),

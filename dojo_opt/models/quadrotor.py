@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, bodies, grounded, touch
-from sim.mechanism import Mechanism
-from sim.parts import Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Input, Joint
+from sim.mechanism.shapes import Box
 
 ARM, HEIGHT = 0.21, 0.05  # of the rotors [m]
 ROTOR = Link(0.01, (0.0, 0.0, 0.0), (1.94999922e-06, 0.00013660827869, 0.00013840827797))

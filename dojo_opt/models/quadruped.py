@@ -7,10 +7,10 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim import checks
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.shapes import Box, Cylinder
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
+from sim.mechanism.shapes import Box, Cylinder
 
 # leg: (front or rear, left or right) as signs of x and y
 LEGS = {"FR": (1, -1), "FL": (1, 1), "RR": (-1, -1), "RL": (-1, 1)}

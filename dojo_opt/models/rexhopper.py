@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
-from sim.mechanism import Mechanism
-from sim.parts import Input, Joint
-from sim.shapes import Box, Cylinder
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Input, Joint
+from sim.mechanism.shapes import Box, Cylinder
 
 BASE = Link(
     5.596078,

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.models.links import from_z
-from sim.mechanism import Mechanism
-from sim.parts import Body, Input, Joint
-from sim.shapes import Cylinder
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Cylinder
 
 Floats = NDArray[np.float64]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import Box
 
 
 def tennisracket(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.shapes import Sphere
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
+from sim.mechanism.shapes import Sphere
 
 
 def tippetop(

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.models.hopper import DOWN, FORWARD
 from dojo_opt.models.links import Mount, degrees, rod
 from dojo_opt.models.planar import Ball, planar_robot
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 
 def walker(

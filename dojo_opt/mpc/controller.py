@@ -23,8 +23,8 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.study import Sampler, Study, monte_carlo
 from dojo_opt.problem import Problem
 from dojo_opt.term import StateTerm
-from sim import checks
-from sim.border import whole
+from sim.mechanism import checks
+from sim.simulator.border import whole
 from solvers.status import Status
 
 Vector = NDArray[np.float64]

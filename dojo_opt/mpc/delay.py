@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.mpc.measurement import Measurement
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

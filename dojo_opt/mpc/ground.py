@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.cross import cross
 from dojo_opt.mpc.policy import Policy
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

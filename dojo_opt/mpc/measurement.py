@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.problem import Problem
 from dojo_opt.term import PickTerm, StateTerm
-from sim import checks
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.options import Options, Stage
-from sim import checks
-from sim.border import whole
-from sim.brief import brief_repr
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.simulator.border import whole
 from solvers.status import Status
 
 Vector = NDArray[np.float64]

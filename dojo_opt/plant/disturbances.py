@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dojo_opt.plant.perturbation import Perturbation, Push
-from sim import checks
-from sim.border import whole
-from sim.brief import brief_repr
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.simulator.border import whole
 
 __all__ = ["Disturbances"]
 

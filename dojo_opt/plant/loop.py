@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.mpc.tick import Tick
 from dojo_opt.names import chosen_components
 from dojo_opt.plant.plant import Plant
-from sim import checks
-from sim.brief import brief_table
-from sim.results import Contacts, Interrupted
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_table
+from sim.simulator.results import Contacts, Interrupted
+from sim.simulator.simulator import Simulator
 from solvers.status import MESSAGES, Status
 
 Vector = NDArray[np.float64]

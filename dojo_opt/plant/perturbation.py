@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim import checks
-from sim.border import whole
-from sim.brief import brief_repr
-from sim.contact_settings import with_contacts
-from sim.mechanism import Mechanism
-from sim.parts import Input
-from sim.terrain.terrain import Terrain
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Input
+from sim.mechanism.terrain import Terrain
+from sim.simulator.border import whole
+from sim.simulator.contact_settings import with_contacts
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

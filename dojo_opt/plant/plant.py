@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
-from sim import checks
-from sim.mechanism import Mechanism
-from sim.parts import Joint
-from sim.results import StepResult
-from sim.shapes import rotation_matrix
-from sim.simulator import Simulator
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Joint
+from sim.mechanism.shapes import rotation_matrix
+from sim.simulator.results import StepResult
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

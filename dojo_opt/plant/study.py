@@ -16,10 +16,10 @@ from dojo_opt.mpc.tick import Tick, milliseconds
 from dojo_opt.plant.loop import closed_loop
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
-from sim import checks
-from sim.border import whole
-from sim.brief import brief_repr, brief_table
-from sim.results import Interrupted
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr, brief_table
+from sim.simulator.border import whole
+from sim.simulator.results import Interrupted
 
 Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]

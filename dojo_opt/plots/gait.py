@@ -8,7 +8,7 @@ import numpy as np
 
 from dojo_opt.motion import Array, Motion, motion
 from dojo_opt.plots.axes import finish, panel
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

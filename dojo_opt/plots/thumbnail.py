@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.mechanism import Mechanism
-from sim.parts import WORLD
-from sim.polytope import Polytope
-from sim.poses import poses
-from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import WORLD
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.poses import poses
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 from dojo_opt.motion import Motion, motion
 from dojo_opt.plots.axes import finish as _finish
 from dojo_opt.plots.axes import input_units, panel, units
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.engines.run import Run
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ from dojo_opt.report.lean_scenes import (
 )
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
-from sim.contacts.left_out import reach
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.omitted_contacts import reach
 from solvers.parallel import threads
 
 ABSENT = 1.05  # of the time of a model that never had the feature: what two runs of the same model differ by
@@ -185,9 +185,8 @@ def _by_module(kernels: list[str]) -> str:
 
 
 CONTACT_KERNELS = tuple(
-    f"sim.{name}."
-    for name in ("contact", "contact_report", "friction", "cone", "pyramid", "limits", "far", "far_impulses")
-) + ("sim.solve.interior_point.", "sim.solve.inequalities.", "sim.solve.central_path.", "solvers.cones.")
+    f"sim.{name}." for name in ("contact", "dynamics.joints.limits", "solve.interior_point", "solve.inequalities")
+) + ("sim.solve.central_path.", "solvers.cones.")
 
 
 def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.lean_scenes import Scene
-from sim.layout import allocate_work, sizes_of
-from sim.model import Law
+from sim.model.layout import allocate_work, sizes_of
+from sim.model.model import Law
 
 KNOTS = 50  # steps per call
 HEAVY = ("matplotlib", "meshcat", "mujoco", "scipy.optimize")  # imported only by those who use them

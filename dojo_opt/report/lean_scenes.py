@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.models import pendulum
-from sim.mechanism import Mechanism
-from sim.parts import Contact
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Contact
+from sim.simulator.simulator import Simulator
 
 MANY = 100  # contacts at once
 FAR = 50.0  # [m] to the wall that they might touch

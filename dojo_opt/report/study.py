@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Protocol, TextIO, TypeVar
 
 from dojo_opt.report.result import Report, Row
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 Item = TypeVar("Item")
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.model import Model, Vector
-from sim.options import Guess, Options
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import Guess, Options
 from sim.solve.inequalities import (
     keep_inequalities,
     move_inequalities,
@@ -13,11 +14,10 @@ from sim.solve.inequalities import (
     start_inequalities,
     total_impulse,
 )
-from sim.solve.line_search import largest_turn
 from sim.solve.merit import residuals
-from sim.solve.placing import NOWHERE, place
 from sim.solve.prediction import predict, predictable
-from sim.work import Work
+from sim.solve.step_length import largest_turn
+from sim.solve.trial_velocity import NOWHERE, place
 from solvers.jit import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa

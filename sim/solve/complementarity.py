@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from sim.contacts.friction import (
+from sim.contact.contact_law import (
     contact_boundary,
     contact_products,
     contact_products_ahead,
     slip_violation,
 )
-from sim.model import Model
-from sim.work import Work
+from sim.model.data import Work
+from sim.model.model import Model
 from solvers.cones import orthant_step
 from solvers.jit import kernel
 

@@ -1,6 +1,6 @@
 """What impulses of contacts and joint limits do to each other: G = J H^-1 B^T, after Delassus.
 
-The elimination of H (sim/elimination.py) goes from a body to the root and back. On the way up the answer to an impulse
+The elimination of H (elimination.py) goes from a body to the root and back. On the way up the answer to an impulse
 has entries of the joints on that way alone, and so have, on the way down, the rates of a body:
 
     G_ab = sum over the joints that are ancestors of both of  rate_a(d) z_b(d)
@@ -11,10 +11,10 @@ has entries of the joints on that way alone, and so have, on the way down, the r
 
 from __future__ import annotations
 
-from sim.contacts.contact import add_contact_wrench
-from sim.elimination import dot_six
-from sim.model import Model, Vector
-from sim.work import Work
+from sim.contact.ground_contact import add_contact_wrench
+from sim.dynamics.elimination import dot_six
+from sim.model.data import Work
+from sim.model.model import Model, Vector
 from solvers.jit import kernel
 from solvers.lu import lu_solve
 

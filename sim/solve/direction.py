@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from sim.coupling.system import factor_coupling, solve_coupling
-from sim.elimination import factor, solve
-from sim.model import Model, Vector
-from sim.options import LINEAR, PLAIN, Goal
+from sim.dynamics.elimination import factor, solve
+from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import LINEAR, PLAIN, Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.matrix import free_matrix
-from sim.work import Work
 from solvers.jit import inlined
 
 _SHORT = 0.1  # a step below this share of the Newton step is short

@@ -1,21 +1,12 @@
 """All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
 
-Their complementarity products are in complementarity.py. Far contacts (contacts/far.py) have no part in its variables
+Their complementarity products are in complementarity.py. Far contacts (inactive.py) have no part in its variables
 and its matrix.
 """
 
 from __future__ import annotations
 
-from sim.contacts.contact import (
-    add_contact_law,
-    add_contact_turn,
-    add_contact_wrench,
-    contact_jacobian,
-    contact_kinematics,
-    contact_rate,
-)
-from sim.contacts.far_impulses import add_far_wrenches, far_impulses
-from sim.contacts.friction import (
+from sim.contact.contact_law import (
     condense_contact,
     contact_constant,
     contact_error,
@@ -26,10 +17,23 @@ from sim.contacts.friction import (
     return_contact,
     start_contact,
 )
-from sim.contacts.restitution import subtract_floors
-from sim.coupling.loops import keep_loops, move_loops
-from sim.elimination import dot_six, subtree_sums
-from sim.joints.limits import (
+from sim.contact.ground_contact import (
+    add_contact_law,
+    add_contact_turn,
+    add_contact_wrench,
+    contact_jacobian,
+    contact_kinematics,
+    contact_rate,
+)
+from sim.contact.inactive_impulses import add_far_wrenches, far_impulses
+from sim.contact.pairs.inactive_pairs import far_pair_impulses
+from sim.contact.pairs.pair_contact import pair_kinematics
+from sim.contact.pairs.pair_jacobian import pair_rate
+from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.contact.restitution import subtract_floors
+from sim.contact.terrain_contact import add_frame_matrix
+from sim.dynamics.elimination import dot_six, subtree_sums
+from sim.dynamics.joints.limits import (
     add_limit_blocks,
     add_limit_impulse,
     limit_constants,
@@ -38,16 +42,12 @@ from sim.joints.limits import (
     resume_limits,
     return_limits,
 )
-from sim.model import Matrix, Model
-from sim.options import SOFT, Goal
-from sim.pairs.contact import pair_kinematics
-from sim.pairs.far import far_pair_impulses
-from sim.pairs.jacobian import pair_rate
-from sim.pairs.stiffness import apply_pairs, condense_pairs, pair_constants
-from sim.pose_jacobians import add_slip_jacobian
-from sim.slots import Slot
-from sim.terrain.contact import add_frame_matrix
-from sim.work import Work
+from sim.dynamics.loops.closure import keep_loops, move_loops
+from sim.dynamics.pose_jacobians import add_slip_jacobian
+from sim.model.data import Work
+from sim.model.model import Matrix, Model
+from sim.model.options import SOFT, Goal
+from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
 

@@ -3,16 +3,16 @@
 Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
 * The friction cone is no variable of the interior point. On the central path it is a smooth law of the slip, solved for
-  beta by Newton, at a `smoothing` that follows down to kappa (contacts/friction.py); only gaps and normal impulses have
+  beta by Newton, at a `smoothing` that follows down to kappa (contact_law.py); only gaps and normal impulses have
   to stay positive. Conic scalings jam on thin cones.
 * The start is on the central path of a kappa0 fit for the predicted overlap. Only a motion that all but balances with
   the impulses of kappa itself, a robot at rest or a good guess, starts there; and one that goes on, at what the step
   linearised there predicts (prediction.py).
-* The boundary of the cones stops no step: pairs that would leave return to the central path (line_search.py).
+* The boundary of the cones stops no step: pairs that would leave return to the central path (step_length.py).
 * No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more (direction.py).
 * Which faces, edges and corners of two shapes touch is chosen where an attempt starts; a solution at which others
-  overlap is none (pairs/choice.py).
+  overlap is none (pairs/active_features.py).
 * Nor is one that gains energy (energy_balance.py): impulses and large turns can wind one another up.
 * An attempt that ends in a fold all the same is given up, and the next starts elsewhere: a share of the incoming
   velocity, or beyond the fold; at another kappa0. Some solutions lie beyond folds (legs that jam between a joint limit
@@ -23,12 +23,15 @@ Eight things decide (60,000 random extreme states, `benchmarks/robustness.py`, s
 
 from __future__ import annotations
 
-from sim.contacts.far import came_near, choose_far, sunk_contact
-from sim.contacts.friction import slip_noise
-from sim.contacts.restitution import find_impacts, impacts_gained
-from sim.energy_balance import step_gained
-from sim.model import Model, Vector
-from sim.options import (
+from sim.contact.contact_law import slip_noise
+from sim.contact.inactive import came_near, choose_far, sunk_contact
+from sim.contact.pairs.active_features import overlapping
+from sim.contact.pairs.inactive_pairs import begin_pairs
+from sim.contact.pairs.pair_energy import pairs_gained
+from sim.contact.restitution import find_impacts, impacts_gained
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import (
     ASTRAY,
     AT_EVERY_POSE,
     AT_START,
@@ -41,17 +44,14 @@ from sim.options import (
     Options,
     Outcome,
 )
-from sim.pairs.choice import overlapping
-from sim.pairs.far import begin_pairs
-from sim.pairs.work import pairs_gained
-from sim.slots import Slot
+from sim.model.slots import Slot
 from sim.solve.central_path import AGAIN, Beginning, begin, start
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
-from sim.solve.line_search import search
+from sim.solve.energy_balance import step_gained
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
-from sim.work import Work
+from sim.solve.step_length import search
 from solvers.jit import inlined, kernel
 from solvers.optional import optional
 from solvers.status import Status

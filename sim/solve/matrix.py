@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from sim.dynamics import momentum_balance_jacobian
-from sim.elimination import factor
-from sim.joints.terms import joint_blocks
-from sim.kinematics import velocity_columns
-from sim.model import Model, Vector
-from sim.work import Work
+from sim.dynamics.elimination import factor
+from sim.dynamics.joints.terms import joint_blocks
+from sim.dynamics.kinematics import velocity_columns
+from sim.dynamics.momentum_balance import momentum_balance_jacobian
+from sim.model.data import Work
+from sim.model.model import Model, Vector
 from solvers.jit import kernel
 
 

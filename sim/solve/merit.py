@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.coupling.loops import apply_loops
-from sim.model import Model, Vector
+from sim.dynamics.loops.closure import apply_loops
+from sim.model.data import Work
+from sim.model.model import Model, Vector
 from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
-from sim.work import Work
 from solvers.jit import kernel
 
 _NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from sim.coupling.loops import apply_loops, keep_loops, move_loops
-from sim.coupling.system import factor_coupling, solve_coupling
-from sim.dynamics import momentum_balance
-from sim.elimination import solve
-from sim.model import Model, Vector
-from sim.moves import turn_bodies
-from sim.options import FAILED, Guess, Options, Outcome
-from sim.slots import Slot
+from sim.dynamics.displacements import turn_bodies
+from sim.dynamics.elimination import solve
+from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops
+from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
+from sim.dynamics.momentum_balance import momentum_balance
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import FAILED, Guess, Options, Outcome
+from sim.model.slots import Slot
 from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
-from sim.work import Work
 from solvers.jit import inlined, kernel
 from solvers.optional import optional
 from solvers.status import Status

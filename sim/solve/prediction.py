@@ -10,21 +10,21 @@ with the residual there and the matrices of before, costs less than an iteration
 
 from __future__ import annotations
 
-from sim.contacts.contact import contact_jacobian, contact_rate
-from sim.contacts.friction import law_of
-from sim.elimination import solve
-from sim.model import Law, Model, Vector
-from sim.options import Options
-from sim.rotation import Vec3
+from sim.contact.contact_law import law_of
+from sim.contact.ground_contact import contact_jacobian, contact_rate
+from sim.dynamics.elimination import solve
+from sim.model.data import Work
+from sim.model.model import Law, Model, Vector
+from sim.model.options import Options
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
-from sim.solve.placing import NOWHERE, place
 from sim.solve.residual import residual_scale
-from sim.work import Work
+from sim.solve.trial_velocity import NOWHERE, place
 from solvers.gauss_seidel import gauss_seidel
 from solvers.jit import kernel
+from solvers.rotation import Vec3
 
 _LINEAR = int(Law.LINEAR)
 _NONLINEAR = int(Law.NONLINEAR)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sim.coupling.gears import apply_gears
-from sim.elimination import project, subtree_sums
-from sim.joints.terms import joint_impulses
-from sim.model import Model, Vector
-from sim.rotation import cross
-from sim.work import Work
+from sim.dynamics.elimination import project, subtree_sums
+from sim.dynamics.joints.terms import joint_impulses
+from sim.dynamics.loops.gears import apply_gears
+from sim.model.data import Work
+from sim.model.model import Model, Vector
 from solvers.jit import kernel
+from solvers.rotation import cross
 
 
 @kernel

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from sim.model import Model, Vector
-from sim.options import Guess, Options, Outcome
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import Guess, Options, Outcome
 from sim.solve.interior_point import interior_point
 from sim.solve.newton import newton
-from sim.work import Work
 from solvers.jit import kernel
 
 

@@ -11,7 +11,7 @@ from mechanisms import chain_with, random_state
 import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.accuracy.reference import Motion, pendulum
-from sim.build import pack
+from sim.mechanism.pack import pack
 
 
 def test_a_pendulum_in_absolute_angles_is_that_of_the_tree() -> None:

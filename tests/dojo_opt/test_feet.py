@@ -7,7 +7,7 @@ from hills import WAVES
 from dojo_opt import Terrain, models
 from dojo_opt.feet import Feet
 from dojo_opt.rest import equilibrium, potential_gradient
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from dojo_opt import gaits, models
 from dojo_opt.feet import Feet
 from dojo_opt.rest import equilibrium
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 PERIODIC = {
     "trot": {"period": 0.4},

@@ -8,7 +8,7 @@ from dojo_opt import gaits, models, plots, problems
 from dojo_opt.feet import Feet
 from dojo_opt.motion import motion
 from dojo_opt.planner import ilqr
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 
 @pytest.mark.parametrize("damping, iterations", [(5.0, 8), (0.5, 30)])

@@ -12,8 +12,8 @@ from dojo_opt.report.mechanics import Mechanics, collisions, joints, parameters
 from dojo_opt.report.mechanics.situations import CASES
 from dojo_opt.report.mechanics.study import QUICK_CASES, QUICK_PAIRS
 from dojo_opt.report.study import Progress, study
-from sim.collision.kinds import OUT
-from sim.parts import KINDS
+from sim.mechanism.parts import KINDS
+from sim.model.shape_kinds import OUT
 
 
 @pytest.mark.parametrize("kind", ["fixed", "revolute", "planar_orbital", "spherical"])

@@ -9,8 +9,8 @@ import pytest
 from jacobians import check_jacobian
 
 from dojo_opt import models
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 H = 0.01
 HEAVY = {"atlas", "humanoid", "quadruped", "youbot"}

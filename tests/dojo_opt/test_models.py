@@ -10,11 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from dojo_opt import models
 from dojo_opt.plots import thumbnail
-from sim.build import mechanism_sizes, pack
-from sim.kinematics import tree_poses
-from sim.layout import allocate_work, model_view, sizes_of, table, work_view
-from sim.mechanism import Mechanism
-from sim.model import Vector
+from sim.dynamics.kinematics import tree_poses
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import mechanism_sizes, pack
+from sim.model.layout import allocate_work, model_view, sizes_of, table, work_view
+from sim.model.model import Vector
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -7,9 +7,9 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
-from sim.mechanism import Mechanism
-from sim.model import Model
-from sim.parts import Body, Contact, Input, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.model.model import Model
 
 mujoco = pytest.importorskip("mujoco")
 

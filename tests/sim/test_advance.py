@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
 
 
 def ball_chain() -> Mechanism:

@@ -11,7 +11,7 @@ import pytest
 from urdf_files import collision, inertial, joint, link, write
 
 import dojo_opt as dojo
-from sim.urdf.drawing import largest
+from sim.io.urdf.drawing import largest
 
 LEFT_OUT = "a body keeps one collision shape, its largest.*left out of those"
 TRUNK = '<box size="0.4 0.1 0.12"/>'

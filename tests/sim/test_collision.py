@@ -11,10 +11,10 @@ from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 from shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
-from sim.collision.axes import OPEN
-from sim.collision.broad import bounding_radius
-from sim.collision.collide import arrange, choose, collide, collide_chosen, open_sides
-from sim.collision.kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
+from sim.contact.collision.collide import arrange, choose, collide, collide_chosen, open_sides
+from sim.contact.collision.edge_axes import OPEN
+from sim.mechanism.bounding_spheres import bounding_radius
+from sim.model.shape_kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
 
 Array = np.ndarray
 ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are a radius around the core

@@ -6,7 +6,7 @@ import pytest
 
 from dojo_opt.report.mechanics.collisions import bar, check
 from dojo_opt.report.mechanics.solids import PAIRS
-from sim.collision.kinds import Pair
+from sim.model.shape_kinds import Pair
 
 POLYTOPES = ["sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope"]
 ON_CYLINDERS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder"]

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
 from shape_pairs import features
 
-from sim.collision.kinds import SIZES, Pair
+from sim.model.shape_kinds import SIZES, Pair
 
 Array = np.ndarray
 EYE = np.eye(3)

@@ -11,9 +11,9 @@ from naive import rotation as rot
 from scenes import random_state
 
 import dojo_opt as dojo
-from sim.calls import REPORT, refuse
-from sim.contacts.confined import IDLE, SUNK
-from sim.mechanism import Mechanism
+from sim.mechanism.confined import IDLE, SUNK
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.calls import REPORT, refuse
 
 SUNKEN = dojo.Status.CONTACT_SUNK
 CUBE = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mechanisms import CASES, chain_with, random_state
 
-from sim.parts import KINDS
-from sim.simulator import Simulator
+from sim.mechanism.parts import KINDS
+from sim.simulator.simulator import Simulator
 
 
 @pytest.mark.parametrize("kind", KINDS)

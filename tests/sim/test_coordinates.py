@@ -7,13 +7,13 @@ import pytest
 from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
-from sim.build import pack
-from sim.coordinates import maximal_states, minimal_states
-from sim.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
-from sim.layout import allocate_work, sizes_of, table
-from sim.link import link_poses
-from sim.mechanism import Mechanism
-from sim.state import integrate_states, state_differences
+from sim.dynamics.coordinates import maximal_states, minimal_states
+from sim.dynamics.coordinates_jacobian import maximal_jacobian_at, minimal_jacobian_at
+from sim.dynamics.state import integrate_states, state_differences
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import pack
+from sim.model.layout import allocate_work, sizes_of, table
+from sim.simulator.link import link_poses
 
 Floats = NDArray[np.float64]
 H = 0.05

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.settings import free_parts
+from sim.simulator.settings import free_parts
 
 
 def test_it_follows_weight_and_time_step() -> None:

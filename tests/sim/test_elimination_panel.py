@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.elimination import solve
-from sim.elimination_panel import column_count, solve_panel
-from sim.layout import model_view, work_view
-from sim.slots import Slot
+from sim.dynamics.elimination import solve
+from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.model.layout import model_view, work_view
+from sim.model.slots import Slot
 from solvers.jit import local_kernel
 
 

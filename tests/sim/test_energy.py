@@ -8,13 +8,13 @@ from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from dojo_opt import models
-from sim.build import pack
-from sim.coordinates import maximal_states
-from sim.energy import energies, momenta
-from sim.layout import allocate_work, sizes_of, table
-from sim.link import link_poses
-from sim.mechanism import Mechanism
-from sim.shapes import rotation_matrix
+from sim.dynamics.coordinates import maximal_states
+from sim.dynamics.energy import energies, momenta
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import pack
+from sim.mechanism.shapes import rotation_matrix
+from sim.model.layout import allocate_work, sizes_of, table
+from sim.simulator.link import link_poses
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from naive import rotation as rot
 from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
-from sim.energy_balance import arriving_energy, constraint_work, work_at_node
-from sim.layout import model_view, work_view
-from sim.link import link_step
+from sim.model.layout import model_view, work_view
+from sim.simulator.link import link_step
+from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
 from solvers.jit import local_kernel
 
 

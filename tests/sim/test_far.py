@@ -14,7 +14,7 @@ from naive import rotation as rot
 from scenes import LAWS, ball, block, chain, gaps, pendulum
 
 import dojo_opt as dojo
-from sim.contacts.left_out import reach
+from sim.simulator.omitted_contacts import reach
 
 TOLERANCE = 1e-8
 EXACT = 1e-13

@@ -12,10 +12,10 @@ from linkage import fourbar
 from urdf_files import joint, link, write
 
 import dojo_opt as dojo
-from sim.gear import Gear
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.shapes import Box
+from sim.mechanism.gear import Gear
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import Box
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 

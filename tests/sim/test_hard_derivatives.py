@@ -17,7 +17,7 @@ from scenes import block
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.case import kind_of
 from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
-from sim.shapes import String
+from sim.mechanism.shapes import String
 
 FREE = dojo.Joint("floating", None, "b")
 

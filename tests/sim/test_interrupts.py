@@ -10,7 +10,7 @@ import pytest
 from interrupts import heard
 
 import dojo_opt as dojo
-from sim import pace
+from sim.model import pace
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
 QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.layout import (
+from sim.model.data import Work
+from sim.model.layout import (
     MODEL_FIELDS,
     MODEL_INTS,
     WORK_FIELDS,
@@ -22,8 +23,7 @@ from sim.layout import (
     table,
     work_view,
 )
-from sim.model import Model
-from sim.work import Work
+from sim.model.model import Model
 from solvers.jit import kernel
 from solvers.record import Table
 

@@ -10,8 +10,8 @@ from linkage import fourbar
 from urdf_files import SKEWED, inertial, joint, link, write
 
 import dojo_opt as dojo
-from sim.parts import KINDS
-from sim.urdf.pose import roll_pitch_yaw
+from sim.mechanism.parts import KINDS
+from sim.mechanism.pose import roll_pitch_yaw
 
 BAR = "<axis xyz='0 1 0'/>"
 

@@ -11,9 +11,9 @@ from jacobians import check_jacobian
 from linkage import COUPLER, CRANK, ROCKER, bar, fourbar
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.shapes import Sphere, rotation_matrix
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
+from sim.mechanism.shapes import Sphere, rotation_matrix
 
 Y = (0.0, 1.0, 0.0)
 ACTIONS: dict[str, dict[str, Any]] = {

@@ -10,7 +10,7 @@ import pytest
 from linkage import COUPLER, CRANK, ROCKER, fourbar, plain_fourbar, worst_gap
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 BRANCHES = (-1.0, 1.0)
 

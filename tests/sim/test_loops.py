@@ -9,8 +9,8 @@ from linkage import worst_gap
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
 
 
 def ring(kind: str = "spherical") -> Mechanism:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mechanisms import BALL, INF, hip, two
 
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box
 
 ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("", shape=BALL), r"Body\(name=\.\.\.\): expected a name"),

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
-from sim.simulator import Simulator
+from sim.io.mjcf import MjcfMechanism, MjcfWarning, load_mjcf
+from sim.simulator.simulator import Simulator
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -7,8 +7,8 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from sim.mjcf import MjcfWarning, load_mjcf
-from sim.simulator import Simulator
+from sim.io.mjcf import MjcfWarning, load_mjcf
+from sim.simulator.simulator import Simulator
 
 pytest.importorskip("mujoco")
 

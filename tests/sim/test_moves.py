@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mechanisms import CASES, chain_with, random_state
 
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 FAR = 100.0  # [m]
 

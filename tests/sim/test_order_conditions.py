@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from branches import ORDERS
 
-from sim.high_order.tableau import tableau
+from sim.integrators.tableau import tableau
 
 
 def trees(size: int) -> list[tuple]:

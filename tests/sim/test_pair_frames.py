@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.pairs.contact import tangents
-from sim.pairs.jacobian import frame_turn
-from sim.parts import Body, Joint
-from sim.polytope import Polytope
-from sim.shapes import Box
+from sim.contact.pairs.pair_contact import tangents
+from sim.contact.pairs.pair_jacobian import frame_turn
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box
 
 
 def frame(n: np.ndarray) -> np.ndarray:

@@ -10,11 +10,11 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from dojo_opt.report.stability.stacks import tower
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.polytope import Polytope
-from sim.shapes import Box, Cylinder, HalfSpace, Sphere, String
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, Cylinder, HalfSpace, Sphere, String
 
 
 def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:

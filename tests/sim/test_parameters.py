@@ -13,7 +13,7 @@ import dojo_opt as dojo
 from dojo_opt.report.mechanics.case import Case
 from dojo_opt.report.mechanics.parameters import error
 from dojo_opt.report.mechanics.situations import CASES
-from sim.parameters.parameters import KINDS
+from sim.derivatives.parameters.parameters import KINDS
 
 ALL = {**CASES, **COUPLED}
 case_of = functools.cache(lambda name: ALL[name]())

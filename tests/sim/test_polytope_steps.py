@@ -11,11 +11,11 @@ from jacobians import check_jacobian
 
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.encounters import ROCK, SHAPES, approaching, two
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.polytope import Polytope
-from sim.shapes import Box
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box
 
 OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.contacts.contact import add_contact_wrench, contact_rate
-from sim.elimination import solve, subtree_sums
-from sim.layout import model_view, work_view
-from sim.link import link_step
+from sim.contact.ground_contact import add_contact_wrench, contact_rate
+from sim.dynamics.elimination import solve, subtree_sums
+from sim.model.layout import model_view, work_view
+from sim.simulator.link import link_step
 from sim.solve.delassus import delassus
 from solvers.jit import local_kernel
 

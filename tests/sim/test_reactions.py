@@ -13,9 +13,9 @@ from naive.lagrangian import arriving_momentum, leaving_momentum
 
 import dojo_opt as dojo
 from dojo_opt import models
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box, Sphere
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box, Sphere
 
 G = 9.81
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

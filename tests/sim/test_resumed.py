@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from sim.contacts.cone import condense_sliding, condense_sticking
+from sim.contact.cone import condense_sliding, condense_sticking
 
 B, KAPPA = 0.3, 1e-7  # mu gamma [N s], central path [N s m]
 FRICTION = np.array([0.1, -0.2])

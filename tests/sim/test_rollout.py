@@ -8,8 +8,8 @@ from scenes import block
 
 from dojo_opt import models
 from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
 PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)

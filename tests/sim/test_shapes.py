@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from sim.polytope import Polytope
-from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
 
 
 def inside(shape: Shape, p: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dojo_opt import models
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 SIM = Simulator(models.raiberthopper(), time_step=0.01)
 PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)

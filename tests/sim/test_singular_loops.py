@@ -9,7 +9,7 @@ import pytest
 from linkage import plain_fourbar, worst_gap
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 from solvers.status import Status
 
 SIDEWAYS = (9.81, 0.0, 0.0)  # gravity along the ground link: the lowest pose is the one with all links in line

@@ -7,10 +7,10 @@ import pytest
 from mechanisms import CASES, chain_with, random_state
 
 from dojo_opt import models
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.results import SimulationError
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.simulator.results import SimulationError
+from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
 

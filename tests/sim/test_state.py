@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import chain_with
 
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 SIM = Simulator(chain_with("planar_free", on_world=False))
 PROPERTY = settings(deadline=None, derandomize=True, max_examples=60)

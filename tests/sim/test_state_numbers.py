@@ -12,7 +12,7 @@ import pytest
 from linkage import plain_fourbar
 
 import dojo_opt as dojo
-from sim.results import SimulationError
+from sim.simulator.results import SimulationError
 
 
 @cache

@@ -11,10 +11,10 @@ from jacobians import check_jacobian
 import dojo_opt as dojo
 from dojo_opt.report.mechanics.case import Case
 from dojo_opt.report.mechanics.parameters import error
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.shapes import String
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import String
 
 
 def test_a_string_holds_and_does_not_push() -> None:

@@ -11,10 +11,10 @@ import pytest
 from urdf_files import AXIS, BALL, SKEWED, arm, inertial, joint, link, write
 
 import dojo_opt as dojo
-from sim import parts
-from sim.poses import poses
-from sim.shapes import rotation_matrix
-from sim.urdf.pose import Pose, quaternion, roll_pitch_yaw, turn
+from sim.mechanism import parts
+from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw, turn
+from sim.mechanism.poses import poses
+from sim.mechanism.shapes import rotation_matrix
 
 KINDS = {  # type in the file: (kind, nq, nv)
     "revolute": ("revolute", 1, 1),

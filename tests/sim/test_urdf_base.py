@@ -9,7 +9,7 @@ import pytest
 from urdf_files import AXIS, BALL, arm, inertial, joint, link, write
 
 import dojo_opt as dojo
-from sim.poses import poses
+from sim.mechanism.poses import poses
 
 
 def test_a_fixed_base_stands_where_it_is_put(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import pytest
 from urdf_files import branched, compare_with_mujoco, inertial, joint, link, write
 
 import dojo_opt as dojo
-from sim.poses import poses
-from sim.shapes import rotation_matrix
-from sim.urdf.inertia import BALL_MASS, BALL_RADIUS, RigidInertia, combined, fault, repaired
-from sim.urdf.pose import roll_pitch_yaw
+from sim.io.urdf.inertia import BALL_MASS, BALL_RADIUS, RigidInertia, combined, fault, repaired
+from sim.mechanism.pose import roll_pitch_yaw
+from sim.mechanism.poses import poses
+from sim.mechanism.shapes import rotation_matrix
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.urdf.report.UrdfWarning")
 

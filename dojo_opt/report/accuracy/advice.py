@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from dojo_opt.report.accuracy.robot import Trial

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dojo_opt.report.accuracy.scenes import SAMPLES, Scene
 from dojo_opt.report.engines import Engine, Ours, Run, installed
 from dojo_opt.report.engines.run import observe
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import solveh_banded
 
-from sim.model import InputKind, Model
+from sim.model.model import InputKind, Model
 
 Floats = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from dojo_opt.report.accuracy.start import start
 from dojo_opt.report.engines import Engine, Ours, installed
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

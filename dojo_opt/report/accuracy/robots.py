@@ -8,7 +8,7 @@ from dojo_opt import models
 from dojo_opt.report.accuracy import robot
 from dojo_opt.report.accuracy.start import start
 from dojo_opt.report.result import Cell, Report, Table
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 ROBOTS: dict[str, Callable[[], Mechanism]] = {
     "raiberthopper": models.raiberthopper,

@@ -13,9 +13,9 @@ import dojo_opt as dojo
 from dojo_opt.report.accuracy.reference import Motion, pendulum
 from dojo_opt.report.engines import Run
 from dojo_opt.report.engines.run import observe
-from sim.bodies import rotated
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.dynamics.bodies import rotated
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.bodies import rotated
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.dynamics.bodies import rotated
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from dojo_opt.models.block import block
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
 from dojo_opt.report.engines import Engine, Run
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 G = 9.81  # [m/s^2]
 SPEED, FRICTION = 3.0, 0.3  # of the sliding block

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.result import Cell, Row, Table
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box, Sphere
-from sim.simulator import Simulator
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box, Sphere
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -21,9 +21,9 @@ from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.bullet_scene import World
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_scene import is_free
-from sim.mechanism import Mechanism
-from sim.model import InputKind, Model
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.model.model import InputKind, Model
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dojo_opt.report.mujoco_scene import POINT_RADIUS, is_free
-from sim.model import InputKind, Model
+from sim.model.model import InputKind, Model
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from dojo_opt.report.engines import drake_scene
 from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.drake_scene import Plant
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
-from sim.mechanism import Mechanism
-from sim.model import InputKind, Model
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.model.model import InputKind, Model
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

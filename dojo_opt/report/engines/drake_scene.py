@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.mujoco_scene import POINT_RADIUS, is_free
-from sim.model import InputKind, Model
+from sim.model.model import InputKind, Model
 
 Floats = NDArray[np.float64]
 

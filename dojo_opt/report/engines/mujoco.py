@@ -13,8 +13,8 @@ from dojo_opt.report import mujoco_scene
 from dojo_opt.report.engines.apart import apart
 from dojo_opt.report.engines.run import Run, clocked, ended, held, nodes, observe
 from dojo_opt.report.mujoco_warnings import quiet
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines.run import Run, clocked, held, nodes, observe
-from sim.mechanism import Mechanism
-from sim.results import SimulationError
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.results import SimulationError
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.engines.apart import ProcessEnded
-from sim import bodies
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.dynamics import bodies
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 Simulate = TypeVar("Simulate", bound=Callable[..., Any])

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Matrix = NDArray[np.float64]
 

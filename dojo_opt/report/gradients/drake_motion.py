@@ -7,7 +7,7 @@ import numpy as np
 from dojo_opt.report.gradients.drake_step import DrakeStep
 from dojo_opt.report.gradients.sliding import SETTLE, Derivative, Motion, derivative
 from dojo_opt.report.gradients.touchdown import RADIUS, SPEED, Curve, H, Vector, ball
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 CARRIED = "AutoDiffXd, carried"
 

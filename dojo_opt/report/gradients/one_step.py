@@ -19,8 +19,8 @@ from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.gradients import drake_step
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

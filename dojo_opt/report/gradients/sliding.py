@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 import dojo_opt as dojo
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.engines import Engine
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

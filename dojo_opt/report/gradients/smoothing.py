@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from sim.simulator import Simulator
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

@@ -16,7 +16,7 @@ from dojo_opt.report.gradients.figure import draw
 from dojo_opt.report.gradients.tables import motion_table, resting_table, smoothing_table, step_table
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 from solvers.parallel import threads
 
 KAPPAS = (1e-6, 1e-8, 1e-10)  # of whole motions

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 

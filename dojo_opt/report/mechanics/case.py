@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.parameters.parameters import KINDS
-from sim.simulator import Simulator
+from sim.derivatives.parameters.parameters import KINDS
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

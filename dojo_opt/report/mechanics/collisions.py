@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.mechanics.solids import PAIRS, Case, distance, features, off_surface, random_case, shapes
-from sim.collision.axes import OPEN
-from sim.collision.collide import arrange, choose, collide_chosen
-from sim.collision.cylinders import choose_on_cylinder, collide_with_cylinder
-from sim.collision.kinds import OUT, Pair, Shape
+from sim.contact.collision.collide import arrange, choose, collide_chosen
+from sim.contact.collision.cylinders import choose_on_cylinder, collide_with_cylinder
+from sim.contact.collision.edge_axes import OPEN
+from sim.model.shape_kinds import OUT, Pair, Shape
 
 Floats = NDArray[np.float64]
 

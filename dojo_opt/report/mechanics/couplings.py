@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.mechanics.case import Case, turned
-from sim.collisions import Collision
-from sim.gear import Gear
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
-from sim.polytope import Polytope
-from sim.shapes import Box, HalfSpace, Solid, Sphere, String
-from sim.simulator import Simulator
+from sim.mechanism.collision import Collision
+from sim.mechanism.gear import Gear
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, HalfSpace, Solid, Sphere, String
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.polytope import Polytope
-from sim.shapes import Box, Capsule, Cylinder, Shape, Sphere
-from sim.simulator import Simulator
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from sim.simulator.simulator import Simulator
 
 SHAPES: dict[str, Shape] = {
     "sphere": Sphere(0.2),

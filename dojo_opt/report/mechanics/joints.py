@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism import Mechanism
-from sim.parts import KINDS, Body, Input, Joint
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import KINDS, Body, Input, Joint
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.report.mechanics.case import Case, turned
 from dojo_opt.report.mechanics.couplings import STONE, colliding, geared, loop, touching
-from sim.bodies import rotated
-from sim.mechanism import Mechanism
-from sim.parts import KINDS as JOINTS
-from sim.parts import Body, Contact, Input, Joint
-from sim.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
-from sim.simulator import Simulator
-from sim.terrain.terrain import Terrain
+from sim.dynamics.bodies import rotated
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import KINDS as JOINTS
+from sim.mechanism.parts import Body, Contact, Input, Joint
+from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
+from sim.mechanism.terrain import Terrain
+from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.collision.kinds import CROSSINGS, EDGES, RIM_POINTS, SIZES, SPARE, Pair, Shape, count, pair
-from sim.polytope import Polytope, hull_table
-from sim.shapes import Box, Capsule, Cylinder, Sphere
+from sim.mechanism.polytope import Polytope, hull_table
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Sphere
+from sim.model.shape_kinds import CROSSINGS, EDGES, RIM_POINTS, SIZES, SPARE, Pair, Shape, count, pair
 
 Floats = NDArray[np.float64]
 

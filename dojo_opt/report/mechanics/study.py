@@ -11,8 +11,8 @@ from dojo_opt.report.mechanics.situations import CASES
 from dojo_opt.report.mechanics.solids import PAIRS
 from dojo_opt.report.result import Report, Row, Table
 from dojo_opt.report.study import Progress
-from sim.parameters.parameters import KINDS as PARAMETERS
-from sim.parts import KINDS
+from sim.derivatives.parameters.parameters import KINDS as PARAMETERS
+from sim.mechanism.parts import KINDS
 
 QUICK_PAIRS = ("sphere_capsule", "box_halfspace", "cylinder_halfspace")
 QUICK_CASES = ("touching", "sliding")

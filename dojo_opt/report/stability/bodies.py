@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import Trial
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
 
 Three = tuple[float, float, float]
 

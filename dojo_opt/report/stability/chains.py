@@ -9,8 +9,8 @@ import numpy as np
 
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import Trial
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
 
 G = 9.81  # [m/s^2]
 WHY = "tension acts along the links at the start of a step, which limits h to 2/omega, omega = 2 sqrt(tension / (m l))"

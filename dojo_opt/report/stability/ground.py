@@ -11,8 +11,8 @@ from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import Trial
-from sim.mechanism import Mechanism
-from sim.parts import Body, Contact, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Contact, Joint
 
 G = 9.81  # [m/s^2]
 TILTED = (0.8, 0.36, 0.48, 0.0)

@@ -7,8 +7,8 @@ import numpy as np
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import Trial
-from sim.mechanism import Mechanism
-from sim.parts import Body, Input, Joint
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
 
 
 def slider(*, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), **joint: object) -> Mechanism:

@@ -7,7 +7,7 @@ import numpy as np
 from dojo_opt.report import gauge
 from dojo_opt.report.engines import Run
 from dojo_opt.report.stability.trial import Measure
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 
 def energy_error(scale: float) -> Measure:

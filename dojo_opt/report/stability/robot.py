@@ -6,8 +6,8 @@ import numpy as np
 
 from dojo_opt.report.stability import measures
 from dojo_opt.report.stability.trial import Trial
-from sim.mechanism import Mechanism
-from sim.simulator import Simulator
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.simulator import Simulator
 
 TIME_STEPS = (1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2)  # [s]
 RAISED = 0.1  # [m] above where it stands

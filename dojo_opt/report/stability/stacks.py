@@ -6,10 +6,10 @@ import numpy as np
 
 from dojo_opt.report.engines import Run
 from dojo_opt.report.stability.trial import Trial
-from sim.collisions import Collision
-from sim.mechanism import Mechanism
-from sim.parts import Body, Joint
-from sim.shapes import Box, HalfSpace, Shape, Sphere
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Joint
+from sim.mechanism.shapes import Box, HalfSpace, Shape, Sphere
 
 EDGE = 0.2  # [m] height of every body
 

@@ -16,7 +16,7 @@ from dojo_opt.report.stability.picture import picture
 from dojo_opt.report.stability.robot import robot_trials
 from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
 from dojo_opt.report.study import Progress
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 SUMMARY = (
     "Scenes at the edge of what a simulator can do, each with the rule by which it passes, stated before it runs. "

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.report.engines import Engine, Run
 from dojo_opt.report.gauge import complete
-from sim.mechanism import Mechanism
+from sim.mechanism.mechanism import Mechanism
 
 Measure = Callable[[Mechanism, Run], float]
 

@@ -1,1 +1,0 @@
-"""Contact geometry of two shapes: distance, normal, point and their derivatives, without mechanisms or steps."""

@@ -1,0 +1,1 @@
+"""Narrow phase: distance, normal and point of two shapes, with derivatives; knows no mechanism and no step."""

@@ -1,0 +1,90 @@
+"""A convex polytope: corners, edges and faces in rows of a table, and the nearest of them to a point.
+
+    row o                   number of corners, edges, faces
+    rows from o + 1         corners (x, y, z, 0), then edges (first corner, second corner, face, face), then faces
+                            (outward unit normal n, n.x of its points)
+
+Corners are counted from the first corner, faces from the first face. Coplanar facets are one face.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact.collision.witness import NOWHERE, TIE, dot
+from sim.model.model import Matrix
+from solvers.jit import inner_kernel
+from solvers.rotation import Vec3, cross
+
+_NONE = -1
+
+
+@inner_kernel
+def row(hull: Matrix, k: int) -> Vec3:
+    """The first three numbers of a row."""
+    return hull[k, 0], hull[k, 1], hull[k, 2]
+
+
+@inner_kernel
+def edge(hull: Matrix, o: int, e: int) -> tuple[Vec3, Vec3, float]:
+    """First corner, direction and length of edge e."""
+    k = o + 1 + int(hull[o, 0]) + e
+    x, y = row(hull, o + 1 + int(hull[k, 0])), row(hull, o + 1 + int(hull[k, 1]))
+    d = (y[0] - x[0], y[1] - x[1], y[2] - x[2])
+    length = sqrt(dot(d, d))
+    return x, (d[0] / length, d[1] / length, d[2] / length), length
+
+
+@inner_kernel
+def edge_faces(hull: Matrix, o: int, e: int) -> tuple[int, int]:
+    """Rows of the two faces of edge e; -1 for the edge of a capsule, which has none."""
+    k = o + 1 + int(hull[o, 0]) + e
+    if int(hull[o, 2]) == 0:
+        return _NONE, _NONE
+    first = o + 1 + int(hull[o, 0] + hull[o, 1])
+    return first + int(hull[k, 2]), first + int(hull[k, 3])
+
+
+@inner_kernel
+def highest_face(hull: Matrix, o: int, x: Vec3) -> tuple[int, float]:
+    """The row of the face that a point is highest above, and the height; -1 where there are no faces."""
+    first = o + 1 + int(hull[o, 0] + hull[o, 1])
+    best, height = _NONE, -1e300
+    for f in range(first, first + int(hull[o, 2])):
+        d = dot(row(hull, f), x) - hull[f, 3]
+        if d > height + TIE * abs(height):
+            best, height = f, d
+    return best, height
+
+
+@inner_kernel
+def nearest_edge(hull: Matrix, o: int, x: Vec3) -> tuple[int, float, Vec3, bool]:
+    """The edge nearest to a point, its squared distance, its nearest point, and whether that is a corner."""
+    best, d2, where, corner = _NONE, 1e300, NOWHERE, False
+    for e in range(int(hull[o, 1])):
+        y, u, length = edge(hull, o, e)
+        t = dot(u, x) - dot(u, y)
+        s = min(max(t, 0.0), length)
+        z = (y[0] + s * u[0], y[1] + s * u[1], y[2] + s * u[2])
+        c = (x[0] - z[0], x[1] - z[1], x[2] - z[2])
+        e2 = dot(c, c)
+        if e2 < d2 * (1.0 - TIE):
+            best, d2, where, corner = e, e2, z, t <= 0.0 or t >= length
+    return best, d2, where, corner
+
+
+@inner_kernel
+def above(hull: Matrix, o: int, face: int, x: Vec3) -> bool:
+    """Whether a point is above a face (its row): on the inner side of all its edges, seen along its normal."""
+    n = row(hull, face)
+    for e in range(int(hull[o, 1])):
+        f, g = edge_faces(hull, o, e)
+        if face != f and face != g:
+            continue
+        y, u, _ = edge(hull, o, e)
+        m = cross(u[0], u[1], u[2], n[0], n[1], n[2])
+        side = dot(m, (x[0] - y[0], x[1] - y[1], x[2] - y[2]))
+        # outwards is where the other face turns to
+        if (side if dot(m, row(hull, g if face == f else f)) > 0.0 else -side) > 0.0:
+            return False
+    return True

@@ -1,0 +1,160 @@
+"""Polytope a (a box or a capsule is one, too) against cylinder b.
+
+    feature k < na      corner k of a against the element of the cylinder that is nearest to it
+    na to na + 7        where a has faces: points of the rims (rim.py) below the face of a that separates the two most
+    the rest            CROSSINGS edges of a across the side or a rim of b; or the point of a rim that is nearest to a
+
+Every normal is a lower bound of the distance, by the reach of the two shapes along it; of the normals of all pairs of
+elements that may be nearest the best is the distance, apart as well as inside. What is deeper is no contact.
+
+Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with its side and its sector on a rim.
+"""
+
+from __future__ import annotations
+
+from sim.contact.collision.aligned import from_polytope
+from sim.contact.collision.box import to_b
+from sim.contact.collision.cylinder import SIDE, TOP, nearest, reach, vertex_on_cylinder
+from sim.contact.collision.hull import above, row
+from sim.contact.collision.kept import original
+from sim.contact.collision.polytope_cylinder_crossings import (
+    corner_of,
+    crossings,
+    nearest_rim_point,
+    put_crossing,
+    separation_along,
+)
+from sim.contact.collision.rim import (
+    plane_rim,
+    rim_below,
+)
+from sim.contact.collision.witness import TIE, absent, dot
+from sim.model.model import Integers, Matrix, Vector
+from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
+from solvers.jit import inner_kernel
+from solvers.rotation import Vec3
+
+MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
+
+END, FACE, CORNER, CROSS, ALIGNED = 0, 1, 2, 3, 4
+Survey = tuple[float, int, int, int, int]  # separation, what gives it, which, face of a (row), end of b (TOP, BOTTOM)
+
+
+@inner_kernel
+def face_plane(hull: Matrix, face: int, R: Vector, r: Vector) -> tuple[Vec3, float]:
+    """n, s of the plane n.x = s of a face of a (its row), n into a."""
+    m = to_b(R, row(hull, face))
+    return (-m[0], -m[1], -m[2]), -hull[face, 3] - dot(m, (r[0], r[1], r[2]))
+
+
+@inner_kernel
+def survey(
+    sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector, codes: Integers, first: int, room: int
+) -> Survey:
+    """How far the two are apart, negative inside, and along the normal of which elements; uses up `out`."""
+    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    na = int(hull[o, 0])
+    best, kind, which, face, end = -1e300, END, 0, 0, TOP
+    for k in range(2):
+        s = separation_along((0.0, 0.0, 1.0 if k == 0 else -1.0), sizes, hull, R, r)
+        if s > best:
+            best, end = s, TOP + k
+    highest = -1e300
+    for f in range(o + 1 + na + int(hull[o, 1]), o + 1 + na + int(hull[o, 1]) + int(hull[o, 2])):
+        n, s = face_plane(hull, f, R, r)
+        s -= reach(n, rho, half)
+        if s > highest:
+            highest, face = s, f
+    if highest > best:
+        best, kind = highest, FACE
+    s, code = crossings(sizes, hull, R, r, out, codes, first, room)
+    if s > best + TIE * rho:
+        best, kind, which = s, CROSS, code
+    for k in range(na):
+        x = corner_of(hull, o, k, R, r)
+        where = nearest(x, rho, half)
+        where = SIDE if where < SIDE else where
+        vertex_on_cylinder(where, x, 0.0, rho, half, out)
+        s = separation_along((out[1], out[2], out[3]), sizes, hull, R, r)
+        if s > best + TIE * rho:
+            best, kind, which = s, CORNER, 8 * k + where
+    if best < sizes[1]:
+        s = from_polytope(sizes, hull, R, r)
+        if s > best + TIE * rho:
+            best, kind, which = s, ALIGNED, 0
+    return best, kind, which, face, end
+
+
+@inner_kernel
+def choose_elements(
+    sizes: Vector, hull: Matrix, R: Vector, r: Vector, codes: Integers, first: int, out: Vector
+) -> None:
+    """codes[first:] = the elements of all contact points at this pose; uses up `out`."""
+    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    na = int(hull[o, 0])
+    rims = RIM_POINTS if int(hull[o, 2]) > 0 else 0
+    begin = first + na + rims
+    for k in range(CROSSINGS):
+        codes[begin + k] = 0
+    s, kind, which, face, end = survey(sizes, hull, R, r, out, codes, begin + 1, CROSSINGS - 1)
+    deepest = min(s, 0.0) - TIE * (rho + half)
+    for k in range(na):
+        x = corner_of(hull, o, k, R, r)
+        where = nearest(x, rho, half)
+        low = (x[2] if end == TOP else -x[2]) < half and x[0] * x[0] + x[1] * x[1] <= rho * rho
+        if s < 0.0 and kind == END and low:
+            where = end
+        if kind == CORNER and which >> 3 == k:
+            where = which & 7
+        codes[first + k] = 16 + where
+    for k in range(rims):
+        codes[first + na + k] = rim_at_face(k, face, deepest, sizes, hull, R, r)
+    if kind == CROSS:
+        codes[begin] = which
+    for k in range(begin + 1, begin + CROSSINGS):
+        if codes[k] == 0 or codes[k] == codes[begin]:
+            codes[k] = 0
+            continue
+        put_crossing(codes[k], sizes, hull, R, r, out)
+        d = out[0] + sizes[1]
+        if d < 0.0 and (s > 0.0 or d < deepest):
+            codes[k] = 0
+    least = 1e300
+    for k in range(first, begin + CROSSINGS):
+        put_elements(k - first, codes[k], sizes, hull, R, r, out)
+        least = min(least, out[0] + sizes[1])
+    if least > s + MISSED * rho:
+        codes[begin] = nearest_rim_point(sizes, hull, R, r, out)
+
+
+@inner_kernel
+def rim_at_face(k: int, face: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """Code of point k of the rims where it is below the face of a, and no deeper than the shapes are; 0 elsewhere."""
+    below, x = rim_below(k, face_plane(hull, face, R, r), (sizes[4], sizes[5]), deepest, R, r)
+    return 16 + 8 * (face - int(sizes[0])) if below and above(hull, int(sizes[0]), face, x) else 0
+
+
+@inner_kernel
+def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector) -> None:
+    """Contact of the elements `code`."""
+    feature, code = original(feature, code)
+    o, rho, half = int(sizes[0]), sizes[4], sizes[5]
+    na = int(hull[o, 0])
+    if code == 0:
+        absent(out)
+    elif feature < na:
+        vertex_on_cylinder(code & 7, corner_of(hull, o, feature, R, r), sizes[1], rho, half, out)
+    elif int(hull[o, 2]) > 0 and feature < na + RIM_POINTS:
+        n, s = face_plane(hull, o + (code >> 3) - 2, R, r)
+        plane_rim(feature - na, n, s, rho, half, out)
+    else:
+        put_crossing(code, sizes, hull, R, r, out)
+
+
+@inner_kernel
+def corner_instead(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
+    """Code of the element of b nearest to corner `feature` of a; 0 for what is no corner."""
+    o = int(sizes[0])
+    if feature >= int(hull[o, 0]):
+        return 0
+    return 16 + nearest(corner_of(hull, o, feature, R, r), sizes[4], sizes[5])

@@ -1,0 +1,151 @@
+"""The exact friction cone on the central path, as a law of the slip.
+
+    mu gamma v_t + psi beta = 0,      psi = a + sqrt(a^2 + |v_t|^2),   a = kappa / (2 mu gamma)
+
+is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma follows from it, so the
+cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method, in columns 2:4 of
+`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law as a change of -beta.
+
+With b = mu gamma the same path is also
+
+    (b^2 - |beta|^2) v_t + kappa beta = 0
+
+which is linear in v_t: of a contact that sticks Newton's method finds the slip by this form in one step, by the other
+in several.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from solvers.jit import kernel
+
+_INSIDE = 0.1  # least share of b^2 that b^2 - |beta|^2 has of a contact that sticks
+
+
+@kernel
+def cone_slip(b0: float, x: float, y: float, kappa: float) -> tuple[float, float]:
+    """psi = a + r and r = sqrt(a^2 + |v_t|^2), a = kappa/(2 b0): the smoothed slip speed of the central path."""
+    a = 0.5 * kappa / b0
+    r = sqrt(a * a + x * x + y * y)
+    return a + r, r
+
+
+@kernel
+def start_cone(model: Model, work: Work, c: int, kappa: float) -> None:
+    """beta on the central path of kappa at the present slip and normal impulse."""
+    z = work.cone[c]
+    k = work.contact_kin[c]
+    b0 = model.contact_friction[c] * z[1]
+    psi, _ = cone_slip(b0, k[1], k[2], kappa)
+    z[2] = -b0 * k[1] / psi
+    z[3] = -b0 * k[2] / psi
+
+
+@kernel
+def cone_violation(model: Model, work: Work, c: int, kappa: float) -> float:
+    """|mu gamma v_t + psi beta|, in units of kappa."""
+    z = work.cone[c]
+    k = work.contact_kin[c]
+    b0 = model.contact_friction[c] * z[1]
+    psi, _ = cone_slip(b0, k[1], k[2], kappa)
+    return max(abs(b0 * k[1] + psi * z[2]), abs(b0 * k[2] + psi * z[3]))
+
+
+@kernel
+def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
+    """(x, y) shortened to b0: after a shortened Newton step the friction may stick out of its cone."""
+    n = sqrt(x * x + y * y)
+    if n > b0:
+        return x * b0 / n, y * b0 / n
+    return x, y
+
+
+@kernel
+def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, linear: bool) -> None:
+    """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
+
+    Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
+    the other.
+    """
+    z = work.cone[c]
+    k = work.contact_kin[c]
+    W = work.contact_W[c]
+    q = work.contact_scale[c]
+    mu = model.contact_friction[c]
+    b0 = mu * z[1]
+    room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
+    if linear and room > _INSIDE * b0 * b0:
+        condense_sticking(z, k, b0, kappa, share, W, q)
+    else:
+        condense_sliding(z, k, b0, kappa, share, W, q)
+    W[3] = mu * W[0] * q[0]
+    W[6] = mu * W[0] * q[1]
+
+
+@kernel
+def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+    """psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual,   r = psi - a"""
+    psi, r = cone_slip(b0, k[1], k[2], kappa)
+    a = psi - r
+    b1, b2 = within_cone(b0, z[2], z[3])
+    i = 1.0 / psi
+    W[4] = -i * (b0 + b1 * k[1] / r)
+    W[5] = -i * b1 * k[2] / r
+    W[7] = -i * b2 * k[1] / r
+    W[8] = -i * (b0 + b2 * k[2] / r)
+    g = -(a / b0) * (1.0 + a / r)  # dpsi/db
+    q[0] = -i * share * (k[1] + b1 * g)
+    q[1] = -i * share * (k[2] + b2 * g)
+    q[2] = i * (b0 * k[1] + psi * z[2])
+    q[3] = i * (b0 * k[2] + psi * z[3])
+
+
+@kernel
+def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
+    """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
+
+    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where that is near what the
+    law says, against beta and at most twice as fast, and otherwise what it says, -kappa beta/c: the matrix is definite.
+    """
+    x, y, b1, b2 = k[1], k[2], z[2], z[3]
+    n = b1 * b1 + b2 * b2
+    c = b0 * b0 - n
+    r1, r2 = c * x + kappa * b1, c * y + kappa * b2
+    s1, s2 = x, y
+    f = kappa / c
+    if x * b1 + y * b2 > 0.0 or x * x + y * y > 4.0 * f * f * n:
+        s1, s2 = -f * b1, -f * b2
+    e = 2.0 / (kappa - 2.0 * (s1 * b1 + s2 * b2))
+    g = -c / kappa
+    W[4] = g * (1.0 + e * s1 * b1)
+    W[5] = g * e * s1 * b2
+    W[7] = g * e * s2 * b1
+    W[8] = g * (1.0 + e * s2 * b2)
+    q[0] = -share * b0 * e * s1
+    q[1] = -share * b0 * e * s2
+    d = e * (b1 * r1 + b2 * r2)
+    q[2] = (r1 + s1 * d) / kappa
+    q[3] = (r2 + s2 * d) / kappa
+
+
+@kernel
+def cone_constant(model: Model, work: Work, c: int) -> None:
+    """Friction part of contact_w, after its normal part."""
+    w = work.contact_w[c]
+    q = work.contact_scale[c]
+    b = model.contact_friction[c] * w[0]
+    w[1] = b * q[0] - q[2]
+    w[2] = b * q[1] - q[3]
+
+
+@kernel
+def recover_cone(work: Work, c: int, a: float, x: float, y: float) -> None:
+    """Step of beta from the rates (a, x, y) of gap and slip."""
+    d = work.cone_step[c]
+    W = work.contact_W[c]
+    w = work.contact_w[c]
+    d[2] = W[3] * a + W[4] * x + W[5] * y + w[1]
+    d[3] = W[6] * a + W[7] * x + W[8] * y + w[2]

@@ -1,0 +1,248 @@
+"""The contact laws on the central path: residuals, condensation to W d(gap, slip) + w, recovery of the cone steps.
+
+Columns of `cone` (and of its steps): 0 s, 1 gamma, the gap slack and the normal impulse, s gamma = kappa; from 2 on
+those of the friction law (cone.py, pyramid.py). A contact without friction has the first line only: the cone would be
+degenerate, and costs nothing when left out.
+"""
+
+from __future__ import annotations
+
+from sim.contact.cone import condense_cone, cone_constant, cone_violation, recover_cone, start_cone, within_cone
+from sim.contact.pyramid import (
+    condense_pyramid,
+    pyramid_boundary,
+    pyramid_constant,
+    pyramid_error,
+    pyramid_products,
+    pyramid_products_ahead,
+    recover_pyramid,
+    return_pyramid,
+    start_pyramid,
+)
+from sim.contact.softening import soften
+from sim.model.data import Work
+from sim.model.model import Law, Model, Vector
+from sim.model.options import LINEAR, SOFT, Goal
+from solvers.cones import onto_path, orthant_step, return_pair
+from solvers.jit import kernel
+from solvers.rotation import Vec3
+
+_IMPACT = int(Law.IMPACT)
+_LINEAR = int(Law.LINEAR)
+_NONLINEAR = int(Law.NONLINEAR)
+
+
+@kernel
+def law_of(model: Model, c: int) -> int:
+    """Law of contact c: without friction it is an impact law."""
+    return model.contact_law[c] if model.contact_friction[c] > 0.0 else _IMPACT
+
+
+@kernel
+def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) -> None:
+    """Variables of contact c on the central path of kappa at its gap (at least `floor`) and slip: gamma = kappa / s."""
+    z = work.cone[c]
+    z[0] = max(work.contact_kin[c, 0], floor)
+    z[1] = kappa / z[0]
+    _start_friction(model, work, c, kappa)
+
+
+@kernel
+def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float, predicted: bool) -> None:
+    """Variables of contact c on the central path of kappa, near its gap and the impulse that it had (in cone_trial).
+
+    predicted: near the impulse that it has now; where that presses, it stays, with its friction, and gives the slack.
+    """
+    z = work.cone[c]
+    weight = h * _response(model, c)
+    impulse = z[1] if predicted else work.cone_trial[c, 1]
+    if predicted and weight * impulse * impulse > kappa:
+        z[0] = kappa / impulse
+    else:
+        z[0], z[1] = onto_path(work.contact_kin[c, 0], impulse, weight, kappa)
+        _start_friction(model, work, c, kappa)
+
+
+@kernel
+def _start_friction(model: Model, work: Work, c: int, kappa: float) -> None:
+    """Friction of contact c on the central path of kappa at its slip."""
+    law = law_of(model, c)
+    if law == _NONLINEAR:
+        start_cone(model, work, c, kappa)
+    elif law == _LINEAR:
+        start_pyramid(model, work, c, kappa)
+
+
+@kernel
+def _response(model: Model, c: int) -> float:
+    """1/m, m the mass of the body of contact c (1 kg where it has none): the change of speed that an impulse makes to a
+    free body.
+    """
+    m = model.body_mass[model.contact_body[c]]
+    return 1.0 / m if m > 0.0 else 1.0
+
+
+@kernel
+def contact_error(model: Model, work: Work, c: int) -> float:
+    """Largest equality residual of contact c: |gap - s|, and those of the pyramid."""
+    r = abs(work.contact_kin[c, 0] - work.cone[c, 0])
+    if law_of(model, c) == _LINEAR:
+        r = max(r, pyramid_error(model, work, c))
+    return r
+
+
+@kernel
+def contact_impulse(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+    """Impulse (normal, t1, t2) of the present cone variables."""
+    z = work.cone[c]
+    law = law_of(model, c)
+    if law == _NONLINEAR:
+        return z[1], z[2], z[3]
+    if law == _LINEAR:
+        return z[1], z[4] - z[5], z[6] - z[7]
+    return z[1], 0.0, 0.0
+
+
+@kernel
+def contact_products(model: Model, work: Work, c: int) -> tuple[float, float, float, float]:
+    """(sum, count, low, high) of the complementarity products of contact c; all equal kappa on the central path."""
+    p = work.cone[c, 0] * work.cone[c, 1]
+    if law_of(model, c) == _LINEAR:
+        total, lo, hi = pyramid_products(model, work, c)
+        return p + total, 6.0, min(p, lo), max(p, hi)
+    return p, 1.0, p, p
+
+
+@kernel
+def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
+    """Violation of the law of the exact cone, in units of kappa; 0 for the others."""
+    return cone_violation(model, work, c, kappa) if law_of(model, c) == _NONLINEAR else 0.0
+
+
+@kernel
+def slip_noise(model: Model, work: Work, h: float) -> float:
+    """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
+    e = 0.0
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            i = model.contact_body[c]
+            k = work.contact_kin[c]
+            length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
+            length += abs(k[3]) + abs(k[4]) + abs(k[5])
+            speed = length / h + abs(k[1]) + abs(k[2])
+            e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, 1] * speed)
+    return e
+
+
+@kernel
+def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tuple[float, float]:
+    """(sum, count) of the complementarity products after a step of length alpha."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    p = (z[0] + alpha * d[0]) * (z[1] + alpha * d[1])
+    if law_of(model, c) == _LINEAR:
+        return p + pyramid_products_ahead(model, work, c, alpha), 6.0
+    return p, 1.0
+
+
+@kernel
+def keep_in_cone(model: Model, work: Work, c: int) -> None:
+    """Shorten the friction of the exact cone to mu gamma."""
+    if law_of(model, c) == _NONLINEAR:
+        z = work.cone[c]
+        z[2], z[3] = within_cone(model.contact_friction[c] * z[1], z[2], z[3])
+
+
+@kernel
+def contact_boundary(model: Model, work: Work, c: int) -> float:
+    """Largest step that keeps the cone variables of contact c in their cones, or 1e30."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    a = min(orthant_step(z[0], d[0]), orthant_step(z[1], d[1]))
+    if law_of(model, c) == _LINEAR:
+        a = min(a, pyramid_boundary(model, work, c))
+    return a
+
+
+@kernel
+def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
+    """The pairs of contact c that left their cones put back onto the central path of kappa.
+
+    Gaps weigh against impulses as h/m, slips as 1/m.
+    """
+    weight = _response(model, c)
+    return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
+    if law_of(model, c) == _LINEAR:
+        return_pyramid(model, work, c, weight, kappa)
+
+
+@kernel
+def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, share: float, form: int) -> None:
+    """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
+
+    share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
+    form: in the LINEAR one a contact that sticks takes the form of its law that is linear in the slip; the SOFT one is
+    that of derivatives (softening.py).
+    """
+    W = work.contact_W[c]
+    for e in range(9):
+        W[e] = 0.0
+    W[0] = -work.cone[c, 1] / work.cone[c, 0]
+    law = law_of(model, c)
+    if law == _NONLINEAR:
+        condense_cone(model, work, c, kappa, share, form == LINEAR)
+    elif law == _LINEAR:
+        condense_pyramid(model, work, c)
+    if form == SOFT:
+        soften(model, work, h, c)
+
+
+@kernel
+def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
+    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the goal.
+
+    `goal.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
+    """
+    z = work.cone[c]
+    d = work.cone_step[c]
+    w = work.contact_w[c]
+    r = goal.kappa - z[0] * z[1]
+    if goal.corrected > 0.0:
+        r -= goal.corrected * d[0] * d[1]
+    w[0] = (r - z[1] * goal.share * (work.contact_kin[c, 0] - z[0])) / z[0]
+    w[1] = 0.0
+    w[2] = 0.0
+    law = law_of(model, c)
+    if law == _NONLINEAR:
+        cone_constant(model, work, c)
+    elif law == _LINEAR:
+        pyramid_constant(model, work, c, goal)
+
+
+@kernel
+def recover_contact(model: Model, work: Work, c: int, rate: Vec3, share: float) -> None:
+    """cone_step of contact c, where its gap and slip change by `rate`: contact_rate, or pair_rate between bodies."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    a, x, y = rate
+    d[0] = a + share * (work.contact_kin[c, 0] - z[0])
+    d[1] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
+    law = law_of(model, c)
+    if law == _NONLINEAR:
+        recover_cone(work, c, a, x, y)
+    elif law == _LINEAR:
+        recover_pyramid(model, work, c, x, y, share)
+
+
+@kernel
+def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+    """One row, with the frame F of its normal and tangents."""
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    fn, f1, f2 = contact_impulse(model, work, c)
+    for e in range(3):
+        out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
+        out[3 + e] = work.pos3[i, e] + k[3 + e]
+        out[8 + e] = F[e]
+    out[6] = k[0] + work.bounce[c, 0]
+    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5

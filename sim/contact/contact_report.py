@@ -1,0 +1,49 @@
+"""What a step has to say about its contacts, near and far."""
+
+from __future__ import annotations
+
+from sim.contact.contact_law import contact_error, report_contact, slip_violation
+from sim.contact.ground_contact import contact_kinematics
+from sim.contact.inactive import sunk_contact
+from sim.contact.pairs.pair_report import report_pairs
+from sim.model.data import Work
+from sim.model.model import Matrix, Model
+from sim.model.slots import Slot
+from solvers.optional import optional
+
+
+@optional(Slot.WORST_CONTACT, default=-1.0)
+def worst_contact(model: Model, work: Work, kappa: float) -> float:
+    """Index of the contact that cannot leave the ground, or of the one furthest from its law; -1 when a limit is worse
+    or there is none.
+    """
+    sunk = sunk_contact(model)
+    if sunk >= 0:
+        return float(sunk)
+    worst = -1.0
+    error = 0.0
+    for k in range(model.limit_dof.shape[0]):
+        error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
+            if e > error:
+                error = e
+                worst = float(c)
+    return worst
+
+
+@optional(Slot.REPORT_CONTACTS)
+def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
+    """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
+
+    (ncontact, 11)
+    """
+    for m in range(work.counts[1]):
+        first = work.far_first[m]
+        contact_kinematics(model, work, h, first, model.cluster_end[first])
+    for c in range(model.contact_height.shape[0]):
+        if model.contact_hold[c] != 0:
+            contact_kinematics(model, work, h, c, c + 1)
+        report_contact(model, work, c, work.contact_frame[c], out[c])
+    report_pairs(model, work, out)

@@ -1,0 +1,163 @@
+"""Geometry of a sphere or point against the ground at configuration 3, and its part of the Newton matrix.
+
+    gap   phi = n.(x3 + R3 p) - radius - height
+    slip  v_t = T ((x3 - x2)/h + omega x r),   r = R3 p - radius n,   omega = (2/h) s   with (c, s) the turn from 2 to 3
+
+The impulse f = n gamma + T^T beta acts at r from the centre of mass, as the wrench (f, r x f) in world axes (expressing
+the torque in the frame of configuration 3, as Dojo does, breaks angular momentum at O(h |omega|)).
+
+Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, then rows of the Jacobian of (gap, slip), 9:18 by the
+rotation about O, 18:27 by the translation, which of a half-space are n, T/h.
+
+contact_frame holds the rows n, T: those of the half-space, or on terrain those of the place (terrain_contact.py).
+"""
+
+from __future__ import annotations
+
+from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
+from sim.model.data import Work
+from sim.model.model import Matrix, Model
+from solvers.jit import kernel
+from solvers.rotation import cross, rotate, transposed_times
+
+
+@kernel
+def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int) -> None:
+    """Gap, slip and arms at configuration 3 of the contacts from first up to last."""
+    g = 2.0 / h
+    for c in range(first, last):
+        i = model.contact_body[c]
+        k = work.contact_kin[c]
+        f = work.contact_frame[c]
+        curved = model.contact_terrain[c] > 0
+        if curved:
+            place_on_terrain(model, work, c)
+        point = model.contact_point[c]
+        px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
+        rho = model.contact_radius[c]
+        x, y, z = px - rho * f[0], py - rho * f[1], pz - rho * f[2]
+        ox, oy, oz = g * work.turn[i, 1], g * work.turn[i, 2], g * work.turn[i, 3]
+        vx, vy, vz = cross(ox, oy, oz, x, y, z)
+        vx += (work.pos3[i, 0] - work.pos2[i, 0]) / h
+        vy += (work.pos3[i, 1] - work.pos2[i, 1]) / h
+        vz += (work.pos3[i, 2] - work.pos2[i, 2]) / h
+        if not curved:
+            X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
+            k[0] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
+        k[1] = f[3] * vx + f[4] * vy + f[5] * vz
+        k[2] = f[6] * vx + f[7] * vy + f[8] * vz
+        k[3], k[4], k[5] = x, y, z
+        k[6], k[7], k[8] = px, py, pz
+
+
+@kernel
+def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
+    """d(gap, slip)/d(twist of configuration 3), about O: by the translation, and by the rotation
+
+    gap     n        (d3 + R3 p) x n
+    slip    t/h      (d3 x t + c y + s x y)/h - R3 p x (omega x t),   y = r x t
+
+    and what a terrain adds because its frame changes from place to place.
+    """
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    f = work.contact_frame[c]
+    dx = work.pos3[i, 0] - work.origin[0]
+    dy = work.pos3[i, 1] - work.origin[1]
+    dz = work.pos3[i, 2] - work.origin[2]
+    k[9], k[10], k[11] = cross(dx + k[6], dy + k[7], dz + k[8], f[0], f[1], f[2])
+    w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
+    g = 2.0 / h
+    for e in range(3):
+        k[18 + e], k[21 + e], k[24 + e] = f[e], f[3 + e] / h, f[6 + e] / h
+    for e in range(1, 3):
+        tx, ty, tz = f[3 * e], f[3 * e + 1], f[3 * e + 2]
+        ax, ay, az = cross(dx, dy, dz, tx, ty, tz)
+        yx, yy, yz = cross(k[3], k[4], k[5], tx, ty, tz)
+        bx, by, bz = cross(sx, sy, sz, yx, yy, yz)
+        ux, uy, uz = cross(sx, sy, sz, tx, ty, tz)
+        mx, my, mz = cross(k[6], k[7], k[8], ux, uy, uz)
+        k[9 + 3 * e] = (ax + w * yx + bx) / h - g * mx
+        k[10 + 3 * e] = (ay + w * yy + by) / h - g * my
+        k[11 + 3 * e] = (az + w * yz + bz) / h - g * mz
+    if model.contact_terrain[c] > 0:
+        turn_on_terrain(model, work, h, c)
+
+
+@kernel
+def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[body] -= wrench about O of the impulse n fn + t1 f1 + t2 f2 at contact c (accumulated)."""
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
+    ax = work.pos2[i, 0] - work.origin[0] + k[3]
+    ay = work.pos2[i, 1] - work.origin[1] + k[4]
+    az = work.pos2[i, 2] - work.origin[2] + k[5]
+    tx, ty, tz = cross(ax, ay, az, x, y, z)
+    out[i, 0] -= x
+    out[i, 1] -= y
+    out[i, 2] -= z
+    out[i, 3] -= tx
+    out[i, 4] -= ty
+    out[i, 5] -= tz
+
+
+@kernel
+def add_contact_law(model: Model, work: Work, c: int, out: Matrix) -> None:
+    """out[body] -= B^T W C, about O (accumulated):
+
+    C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench.
+    """
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    F = work.contact_frame[c]
+    W = work.contact_W[c]
+    A = out[i]
+    ax = work.pos2[i, 0] - work.origin[0] + k[3]
+    ay = work.pos2[i, 1] - work.origin[1] + k[4]
+    az = work.pos2[i, 2] - work.origin[2] + k[5]
+    x0, y0, z0 = transposed_times(F, W[0], W[3], W[6])  # columns of F^T W
+    x1, y1, z1 = transposed_times(F, W[1], W[4], W[7])
+    x2, y2, z2 = transposed_times(F, W[2], W[5], W[8])
+    for j in range(6):
+        q = 18 + j if j < 3 else 6 + j
+        c0, c1, c2 = k[q], k[q + 3], k[q + 6]
+        x = x0 * c0 + x1 * c1 + x2 * c2
+        y = y0 * c0 + y1 * c1 + y2 * c2
+        z = z0 * c0 + z1 * c1 + z2 * c2
+        A[j] -= x
+        A[6 + j] -= y
+        A[12 + j] -= z
+        A[18 + j] -= ay * z - az * y
+        A[24 + j] -= az * x - ax * z
+        A[30 + j] -= ax * y - ay * x
+
+
+@kernel
+def add_contact_turn(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[body] -= [f] [R3 p] on rotations: the arm of the impulse turns with the body, d(r x f) = [f] [R3 p] dphi."""
+    k = work.contact_kin[c]
+    A = out[model.contact_body[c]]
+    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
+    px, py, pz = k[6], k[7], k[8]
+    dot = x * px + y * py + z * pz
+    A[21] -= px * x - dot
+    A[22] -= px * y
+    A[23] -= px * z
+    A[27] -= py * x
+    A[28] -= py * y - dot
+    A[29] -= py * z
+    A[33] -= pz * x
+    A[34] -= pz * y
+    A[35] -= pz * z - dot
+
+
+@kernel
+def contact_rate(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+    """d(gap, slip) = C twist, with the twists of the last solve."""
+    k = work.contact_kin[c]
+    t = work.twist[model.contact_body[c]]
+    d0 = k[18] * t[0] + k[19] * t[1] + k[20] * t[2] + k[9] * t[3] + k[10] * t[4] + k[11] * t[5]
+    d1 = k[21] * t[0] + k[22] * t[1] + k[23] * t[2] + k[12] * t[3] + k[13] * t[4] + k[14] * t[5]
+    d2 = k[24] * t[0] + k[25] * t[1] + k[26] * t[2] + k[15] * t[3] + k[16] * t[4] + k[17] * t[5]
+    return d0, d1, d2

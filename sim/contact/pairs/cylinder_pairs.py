@@ -1,0 +1,106 @@
+"""Collisions of cylinders with polytopes and cylinders (cylinders.py): what active_features.py and pair_contact.py
+do for the others. Scenes without such collisions do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from sim.contact.collision.cylinders import (
+    choose_on_cylinder,
+    collide_with_cylinder,
+    instead_on_cylinder,
+    separation_of_cylinder,
+)
+from sim.contact.pairs.previous_features import keep, last_point, left_behind
+from sim.model.data import Work
+from sim.model.model import Model
+from sim.model.options import BESIDE_KEPT
+from sim.model.shape_kinds import SWAPPED, Pair
+from sim.model.slots import Slot
+from solvers.jit import inner_kernel
+from solvers.optional import optional
+
+
+@inner_kernel
+def on_cylinder(kind: int) -> bool:
+    """Whether a kind of pair is one of these."""
+    return kind % SWAPPED >= Pair.POLYTOPE_CYLINDER
+
+
+@optional(Slot.CYLINDER_DISTANCE, default=0.0)
+def cylinder_distance(model: Model, work: Work, first: int) -> float:
+    """Distance of the shapes of a collision at pair_relative."""
+    pose = work.pair_relative[first]
+    return separation_of_cylinder(
+        model.pair_kind[first],
+        model.pair_sizes[first],
+        model.hull,
+        pose[:9],
+        pose[9:],
+        work.pair_scratch[:12],
+        work.pair_code,
+        work.pair_trial[0],
+    )
+
+
+@inner_kernel
+def put_all(model: Model, work: Work, first: int) -> None:
+    """pair_out of all points of a collision at pair_relative, with the elements that were chosen."""
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
+    turned = work.pair_scratch[:12]
+    for j in range(first, last_point(model, first)):
+        code = work.pair_code[j]
+        collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_out[j])
+
+
+@optional(Slot.COLLIDE_CYLINDERS)
+def collide_cylinders(model: Model, work: Work, first: int) -> None:
+    """`put_all`"""
+    put_all(model, work, first)
+
+
+@optional(Slot.CHOOSE_CYLINDERS)
+def choose_cylinders(model: Model, work: Work, first: int) -> None:
+    """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
+    the step began; where that leaves a point without, those of the beginning.
+    """
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
+    before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
+    R, r = before[:9], before[9:12]
+    missing = False
+    choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
+    for j in range(first, last_point(model, first)):
+        k = j - first
+        code = work.pair_code[j]
+        collide_with_cylinder(kind, k, code, sizes, model.hull, R, r, turned, g)
+        lost = g[0] < before[12]
+        if lost:
+            collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
+            lost = left_behind(work, kind, g, pose, before, before[12])
+        if lost:
+            work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
+            collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
+            if g[0] < before[12]:
+                work.pair_code[j] = 0
+            missing = missing or work.pair_code[j] == 0
+    if missing:
+        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
+    if work.pair_free[0] == BESIDE_KEPT:
+        keep(model, work, first)
+    put_all(model, work, first)
+
+
+@optional(Slot.CYLINDER_BEFORE)
+def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
+    """pair_trial: the elements of point j where the step began."""
+    before = work.pair_before[first]
+    collide_with_cylinder(
+        model.pair_kind[first],
+        j - first,
+        work.pair_code[j],
+        model.pair_sizes[first],
+        model.hull,
+        before[:9],
+        before[9:12],
+        work.pair_scratch[:12],
+        work.pair_trial[0],
+    )

@@ -1,0 +1,197 @@
+"""Contacts between two bodies a and b, or of a with fixed obstacles: geometry at configuration 3, and wrench.
+
+    gap    phi, normal n (from b to a) and contact point p of a pair of shapes: sim/contact/collision
+    slip   v_t = T u,   u = u_a - u_b,   u_i = (x_i3 - x_i2)/h + omega_i x (p - x_i3)
+    force  f = n gamma + T^T beta on a, -f on b, both at P = p - w_a (x_a3 - x_a2) - w_b (x_b3 - x_b2)
+
+Both wrenches about O are opposite because they act at one point, P: momentum is exact. P is the point p carried back
+to configuration 2, where the balance of momenta is taken, mostly by the lighter body (`shares`); of a fixed obstacle, a
+alone carries it. Taut strings pull along where they lay at configuration 2: string.py.
+
+Derivatives: pair_jacobian.py.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from sim.contact.collision.collide import collide_chosen
+from sim.contact.pairs.active_features import choose_shapes
+from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
+from sim.contact.pairs.pair_pose import place_shapes
+from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
+from sim.model.data import Work
+from sim.model.model import Matrix, Model
+from sim.model.options import AT_EVERY_POSE
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross, rotate, transposed_times
+
+POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
+_TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole
+_FIRST = (1.0 - _TO_POLE * POLE[0] * POLE[0], -_TO_POLE * POLE[0] * POLE[1], -POLE[0])
+_NO_POINT = 1e8  # [m] a gap beyond it says that the shapes have no such point now
+
+
+@kernel
+def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3]:
+    """t1, t2: the frame of the pole a, turned the shortest way to n: t1 = b - (b.n)/(1 + a.n) (a + n), t2 = n x t1.
+
+    Continuous but at n = -a, so that a pyramid of friction does not jump from one iterate to the next. At n = z it is
+    x and y, as of contacts with the ground. A pole that nobody would build along keeps -a out of the way.
+    """
+    a, b = POLE, _FIRST
+    p = (b[0] * nx + b[1] * ny + b[2] * nz) / max(1.0 + a[0] * nx + a[1] * ny + a[2] * nz, 1e-12)
+    x, y, z = b[0] - p * (a[0] + nx), b[1] - p * (a[1] + ny), b[2] - p * (a[2] + nz)
+    s = x * nx + y * ny + z * nz  # rounding: on a floor the frame lies in it exactly
+    t1 = (x - s * nx, y - s * ny, z - s * nz)
+    return t1, cross(nx, ny, nz, t1[0], t1[1], t1[2])
+
+
+@kernel
+def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity over the interval of the point (x, y, z), world axes, that moves with body i; 0 for the world."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    a = work.pos3[i]
+    b = work.pos2[i]
+    w = work.turn[i]
+    vx, vy, vz = cross(w[1], w[2], w[3], x - a[0], y - a[1], z - a[2])
+    return (a[0] - b[0] + 2.0 * vx) / h, (a[1] - b[1] + 2.0 * vy) / h, (a[2] - b[2] + 2.0 * vz) / h
+
+
+@kernel
+def collide_shapes(model: Model, work: Work, first: int) -> None:
+    """pair_out of all points of the collision whose first pair this is, at configuration 3."""
+    place_shapes(model, work, first, work.pos3, work.rot3)
+    kind = model.pair_kind[first]
+    sizes = model.pair_sizes[first]
+    pose = work.pair_relative[first]
+    if work.pair_free[0] == AT_EVERY_POSE:
+        choose_shapes(model, work, first)
+    elif on_cylinder(kind):
+        collide_cylinders(model, work, first)
+        return
+    end = first
+    while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
+        if work.pair_free[0] != AT_EVERY_POSE:
+            collide_chosen(
+                kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
+            )
+        end += 1
+
+
+@kernel
+def is_absent(work: Work, j: int) -> bool:
+    """Whether the shapes have no such point now (a corner cut off): it has a gap of 1 m then, and no wrench."""
+    return work.pair_out[j, 0] > _NO_POINT
+
+
+@optional(Slot.PAIR_KINEMATICS)
+def pair_kinematics(model: Model, work: Work, h: float) -> None:
+    """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
+    ground = model.contact_height.shape[0]
+    for m in range(work.counts[0], work.counts[2]):
+        for j in range(work.near[m, 0] - ground, work.near[m, 1] - ground):
+            if model.pair_feature[j] == 0:
+                collide_shapes(model, work, j)
+            point_kinematics(model, work, h, j)
+
+
+@kernel
+def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
+    """Gap, slip, frame and point of pair j, from pair_out."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    g = work.pair_out[j]
+    F = work.pair_frame[j]
+    s = shape_b(model, j)
+    t1, t2 = tangents(g[1], g[2], g[3])
+    F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
+    F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
+    F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
+    F[9], F[10], F[11] = rotate(work.shape_rot, s, g[4], g[5], g[6])
+    for k in range(3):
+        F[9 + k] += work.shape_pos[s, k]
+    ax, ay, az = point_velocity(work, h, a, F[9], F[10], F[11])
+    bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
+    x, y, z = ax - bx, ay - by, az - bz
+    kin = work.contact_kin[model.contact_height.shape[0] + j]
+    kin[0] = 1.0 if is_absent(work, j) else g[0]
+    kin[1] = F[3] * x + F[4] * y + F[5] * z
+    kin[2] = F[6] * x + F[7] * y + F[8] * z
+    kin[3] = F[9] - work.pos3[a, 0]
+    kin[4] = F[10] - work.pos3[a, 1]
+    kin[5] = F[11] - work.pos3[a, 2]
+    if is_taut(model, work, j):
+        pull_from_before(model, work, j)
+
+
+@kernel
+def shape_b(model: Model, j: int) -> int:
+    """Row of shape b of pair j: all points of a collision share their shapes."""
+    return 2 * (j - model.pair_feature[j]) + 1
+
+
+@kernel
+def shares(model: Model, j: int) -> tuple[float, float]:
+    """Parts of a and b in carrying the contact point of pair j back to configuration 2: m_b/(m_a + m_b) and the rest.
+
+    The point of a ball that rolls moves with the ball; carried by half, it presses ahead of the centre and brakes.
+    """
+    k = model.pair_coupling[j]
+    b = model.coupling_body[k, 1]
+    if b < 0:
+        return 1.0, 0.0
+    m = model.body_mass[model.coupling_body[k, 0]]
+    both = m + model.body_mass[b]
+    return (1.0 - m / both, m / both) if both > 0.0 else (0.5, 0.5)
+
+
+@kernel
+def pair_arm(model: Model, work: Work, j: int) -> Vec3:
+    """P - O."""
+    if is_taut(model, work, j):
+        return string_arm(model, work, j)
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    wa, wb = shares(model, j)
+    F = work.pair_frame[j]
+    x = F[9] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
+    y = F[10] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])
+    z = F[11] - work.origin[2] - wa * (work.pos3[a, 2] - work.pos2[a, 2])
+    if b >= 0:
+        x -= wb * (work.pos3[b, 0] - work.pos2[b, 0])
+        y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])
+        z -= wb * (work.pos3[b, 2] - work.pos2[b, 2])
+    return x, y, z
+
+
+@kernel
+def gap_normal(model: Model, work: Work, j: int) -> Vec3:
+    """Derivative of the gap of pair j by a displacement of a; where a string pulls along is another direction."""
+    F = work.pair_frame[j]
+    return (F[3], F[4], F[5]) if is_taut(model, work, j) else (F[0], F[1], F[2])
+
+
+@kernel
+def pair_force(work: Work, j: int, fn: float, f1: float, f2: float) -> Vec3:
+    """n fn + t1 f1 + t2 f2."""
+    return transposed_times(work.pair_frame[j], fn, f1, f2)
+
+
+@kernel
+def add_pair_wrench(model: Model, work: Work, j: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+    """out[a] -= (f, (P - O) x f), out[b] += the same."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    f = pair_force(work, j, fn, f1, f2)
+    x, y, z = pair_arm(model, work, j)
+    m = cross(x, y, z, f[0], f[1], f[2])
+    for k in range(3):
+        out[a, k] -= f[k]
+        out[a, 3 + k] -= m[k]
+        if b >= 0:
+            out[b, k] += f[k]
+            out[b, 3 + k] += m[k]

@@ -1,0 +1,98 @@
+"""The work of the impulses of collisions in a step: none, where the shapes touch with the elements that were chosen.
+
+An impulse acts along the normal at the end of a step. Where shapes that were apart have passed through one another, or
+an element was chosen that is none there, that normal points where the bodies came from, and the step gives them energy
+that they never had. So no solution is accepted whose impulses do both, over all near collisions j, P: where they act,
+
+    sum f.(u + u')/2 > allowed,    sum f.u' > allowed,    u, u' the relative velocities at P before and after
+
+Of the two the first is the kinetic energy that the impulses add. The second leaves out what other forces do: they may
+press bodies together that were moving apart. Impacts with restitution are looked at by contacts/restitution.py.
+Taut strings pass through nothing.
+
+    allowed = share (T + T') + sum of (2 kappa + f_n (overlap where the step began + what may be left at its end))/h
+"""
+
+from __future__ import annotations
+
+from sim.contact.contact_law import contact_impulse
+from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
+from sim.contact.pairs.previous_features import least_size, overlap_before, rounding_of_rims
+from sim.contact.pairs.string import is_taut
+from sim.contact.restitution import impulse_work
+from sim.dynamics.energy import twice_kinetic
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import Options
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross
+
+_SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
+_LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (active_features.py)
+_THROWN = 2e-2  # the same of shapes that are thrown out, not pushed: they overlapped more where the step began
+
+
+@kernel
+def velocity_after(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity over the interval 2-3 of the point (x, y, z) of body i at configuration 2; 0 for the world."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    m, w, o = work.move[i], work.turn[i], work.pos2[i]
+    vx, vy, vz = cross(w[1], w[2], w[3], x - o[0], y - o[1], z - o[2])
+    return (m[0] + 2.0 * vx) / h, (m[1] + 2.0 * vy) / h, (m[2] + 2.0 * vz) / h
+
+
+@kernel
+def power_after(model: Model, work: Work, h: float, j: int) -> float:
+    """f.u' of pair j [J]."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    fn, f1, f2 = contact_impulse(model, work, model.contact_height.shape[0] + j)
+    o = work.origin
+    x, y, z = pair_arm(model, work, j)
+    ux, uy, uz = velocity_after(work, h, a, o[0] + x, o[1] + y, o[2] + z)
+    vx, vy, vz = velocity_after(work, h, b, o[0] + x, o[1] + y, o[2] + z)
+    f = pair_force(work, j, fn, f1, f2)
+    return f[0] * (ux - vx) + f[1] * (uy - vy) + f[2] * (uz - vz)
+
+
+@kernel
+def _overlapped(model: Model, work: Work, j: int) -> float:
+    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond what is rounding [m]."""
+    return max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
+
+
+@optional(Slot.PAIR_SLACK, default=0.0)
+def pair_slack(model: Model, work: Work) -> float:
+    """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
+    total, overlap = 0.0, 0.0
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0:
+            overlap = _overlapped(model, work, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
+        if not is_absent(work, j):
+            total += work.cone[model.contact_height.shape[0] + j, 1] * overlap
+    return total
+
+
+@optional(Slot.PAIRS_GAINED, default=False)
+def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
+    """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
+    h = options.h
+    ground = model.contact_height.shape[0]
+    gain, power, allowed, slack = 0.0, 0.0, 0.0, 0.0
+    counts = False
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0:
+            size = least_size(model, j)
+            overlap = _overlapped(model, work, j)
+            slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
+            counts = work.pair_apart[j] == 0.0 and overlap < _THROWN * size
+        if not counts or is_absent(work, j) or is_taut(model, work, j) or work.bounce[ground + j, 1] > 0.0:
+            continue
+        gain += impulse_work(model, work, h, ground + j)
+        power += power_after(model, work, h, j)
+        allowed += (2.0 * options.kappa + work.cone[ground + j, 1] * slack) / h
+    least = min(gain, power)
+    return least > allowed and least > allowed + 0.5 * _SHARE * twice_kinetic(model, work, h, v)

@@ -1,0 +1,159 @@
+"""Derivatives of gap, slip, frame and contact point of a pair by the twists of its bodies about O at configuration 3.
+
+Everything moves with b, plus what the motion of a relative to b does:
+
+    dn = phi_b x n + N zeta,   dp = v_b + phi_b x (p - O) + M zeta,   zeta = zeta_a - zeta_b
+"""
+
+from __future__ import annotations
+
+from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross
+
+
+@kernel
+def shape_to_world(X: Vector, first: int, work: Work, s: int, x: float, y: float, z: float, out: Vector) -> None:
+    """out (3 x 6) = R X diag(R^T, R^T) shifted from the origin of shape s to O: rotation columns -= translation [c]."""
+    R = work.shape_rot[s]
+    for r in range(3):
+        for k in range(6):
+            q = 3 * (k // 3)
+            c = k - q
+            t = 0.0
+            for i in range(3):
+                row = X[first + 6 * i + q] * R[3 * c] + X[first + 6 * i + q + 1] * R[3 * c + 1]
+                t += R[3 * r + i] * (row + X[first + 6 * i + q + 2] * R[3 * c + 2])
+            out[6 * r + k] = t
+        a, b, c3 = out[6 * r], out[6 * r + 1], out[6 * r + 2]
+        out[6 * r + 3] -= b * z - c3 * y
+        out[6 * r + 4] -= c3 * x - a * z
+        out[6 * r + 5] -= a * y - b * x
+
+
+@kernel
+def frame_turn(g: Vector, out: Vector) -> None:
+    """out (3 x 6): rotation of the contact frame, n x dn + n (spin of t1), both in the frame of shape b.
+
+    t2.dt1 = (n x a).dn / (1 + a.n), a the pole of `tangents`
+    """
+    nx, ny, nz = g[1], g[2], g[3]
+    spin = 1.0 / max(1.0 + POLE[0] * nx + POLE[1] * ny + POLE[2] * nz, 1e-12)
+    sx, sy, sz = cross(nx, ny, nz, POLE[0], POLE[1], POLE[2])
+    for k in range(6):
+        x, y, z = g[7 + k], g[13 + k], g[19 + k]
+        a, b, c = cross(nx, ny, nz, x, y, z)
+        s = spin * (sx * x + sy * y + sz * z)
+        out[k] = a + nx * s
+        out[6 + k] = b + ny * s
+        out[12 + k] = c + nz * s
+
+
+@kernel
+def _slip_rows(work: Work, h: float, i: int, sign: float, r: Vec3, t: Vec3, row: Vector) -> None:
+    """row (6,) = sign d(t.u_i)/d(twist of body i) at a fixed point p = x_i3 + r and direction t.
+
+    u_i = (x3 - x2)/h + omega x (p - x3)    ->    t/h - t x omega on dx3,   (c y + s x y)/h on dphi,   y = r x t
+    """
+    w = work.turn[i]
+    g = 2.0 / h
+    ox, oy, oz = cross(t[0], t[1], t[2], g * w[1], g * w[2], g * w[3])
+    vx, vy, vz = sign * (t[0] / h - ox), sign * (t[1] / h - oy), sign * (t[2] / h - oz)
+    yx, yy, yz = cross(r[0], r[1], r[2], t[0], t[1], t[2])
+    sx, sy, sz = cross(w[1], w[2], w[3], yx, yy, yz)
+    dx, dy, dz = (
+        work.pos3[i, 0] - work.origin[0],
+        work.pos3[i, 1] - work.origin[1],
+        work.pos3[i, 2] - work.origin[2],
+    )
+    mx, my, mz = cross(dx, dy, dz, vx, vy, vz)
+    row[0] = vx
+    row[1] = vy
+    row[2] = vz
+    row[3] = mx + sign * (w[0] * yx + sx) / h
+    row[4] = my + sign * (w[0] * yy + sy) / h
+    row[5] = mz + sign * (w[0] * yz + sz) / h
+
+
+@kernel
+def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
+    """pair_turn, pair_shift: Omega and M about O;  pair_C: d(gap, slip) by the twists of a, then of b."""
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    s = shape_b(model, j)
+    o = work.origin
+    x, y, z = work.shape_pos[s, 0] - o[0], work.shape_pos[s, 1] - o[1], work.shape_pos[s, 2] - o[2]
+    g = work.pair_out[j]
+    frame_turn(g, work.pair_scratch)
+    shape_to_world(work.pair_scratch, 0, work, s, x, y, z, work.pair_turn[j])
+    shape_to_world(g, 25, work, s, x, y, z, work.pair_shift[j])
+    Omega = work.pair_turn[j]
+    M = work.pair_shift[j]
+    F = work.pair_frame[j]
+    px, py, pz = F[9] - o[0], F[10] - o[1], F[11] - o[2]
+    Ca = work.pair_Ca[j]
+    Cb = work.pair_Cb[j]
+    n = gap_normal(model, work, j)
+    m = cross(px, py, pz, n[0], n[1], n[2])
+    for k in range(3):
+        Ca[k] = n[k]
+        Ca[3 + k] = m[k]
+        Cb[k] = -n[k]
+        Cb[3 + k] = -m[k]
+    va = point_velocity(work, h, a, F[9], F[10], F[11])
+    vb = point_velocity(work, h, b, F[9], F[10], F[11])
+    q = 2.0 / h
+    wx, wy, wz = q * work.turn[a, 1], q * work.turn[a, 2], q * work.turn[a, 3]
+    if b >= 0:
+        wx -= q * work.turn[b, 1]
+        wy -= q * work.turn[b, 2]
+        wz -= q * work.turn[b, 3]
+    ra = (F[9] - work.pos3[a, 0], F[10] - work.pos3[a, 1], F[11] - work.pos3[a, 2])
+    for e in range(1, 3):
+        t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
+        rows = work.pair_rows
+        _slip_rows(work, h, a, 1.0, ra, t, rows[0])
+        for k in range(6):
+            rows[1, k] = 0.0
+        if b >= 0:
+            rb = (F[9] - work.pos3[b, 0], F[10] - work.pos3[b, 1], F[11] - work.pos3[b, 2])
+            _slip_rows(work, h, b, -1.0, rb, t, rows[1])
+        gp = cross(t[0], t[1], t[2], wx, wy, wz)
+        gm = cross(px, py, pz, gp[0], gp[1], gp[2])
+        ge = cross(t[0], t[1], t[2], va[0] - vb[0], va[1] - vb[1], va[2] - vb[2])
+        for k in range(6):
+            rel = 0.0
+            for r in range(3):
+                rel += M[6 * r + k] * gp[r] + Omega[6 * r + k] * ge[r]
+            Ca[6 * e + k] = rows[0, k] + rel
+            Cb[6 * e + k] = rows[1, k] - rel
+        for k in range(3):
+            Cb[6 * e + k] += gp[k]
+            Cb[6 * e + 3 + k] += gm[k] + ge[k]
+
+
+@optional(Slot.PAIR_RATE, default=(0.0, 0.0, 0.0))
+def pair_rate(model: Model, work: Work, c: int) -> Vec3:
+    """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
+    j = c - model.contact_height.shape[0]
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    x, y, z = _row_product(work.pair_Ca[j], work.twist[a])
+    if b >= 0:
+        d = _row_product(work.pair_Cb[j], work.twist[b])
+        return x + d[0], y + d[1], z + d[2]
+    return x, y, z
+
+
+@kernel
+def _row_product(C: Vector, t: Vector) -> Vec3:
+    """C t, C (3 x 6)."""
+    return (
+        C[0] * t[0] + C[1] * t[1] + C[2] * t[2] + C[3] * t[3] + C[4] * t[4] + C[5] * t[5],
+        C[6] * t[0] + C[7] * t[1] + C[8] * t[2] + C[9] * t[3] + C[10] * t[4] + C[11] * t[5],
+        C[12] * t[0] + C[13] * t[1] + C[14] * t[2] + C[15] * t[3] + C[16] * t[4] + C[17] * t[5],
+    )

@@ -1,0 +1,22 @@
+"""What a step has to say about bodies that touch each other."""
+
+from __future__ import annotations
+
+from sim.contact.contact_law import report_contact
+from sim.contact.pairs.pair_contact import is_absent
+from sim.model.data import Work
+from sim.model.model import Matrix, Model
+from sim.model.slots import Slot
+from solvers.optional import optional
+
+
+@optional(Slot.REPORT_PAIRS)
+def report_pairs(model: Model, work: Work, out: Matrix) -> None:
+    """The rows of the pairs: impulse on the first body."""
+    for j in range(model.pair_kind.shape[0]):
+        c = model.contact_height.shape[0] + j
+        report_contact(model, work, c, work.pair_frame[j], out[c])
+        if is_absent(work, j):
+            out[c, 6] = work.pair_out[j, 0]
+            for e in range(3):
+                out[c, e] = 0.0

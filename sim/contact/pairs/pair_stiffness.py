@@ -1,0 +1,163 @@
+"""Derivatives of the wrenches of pairs by the twists of their bodies, summed over the pairs of the same two bodies.
+
+    F = (f, (P - O) x f),   f = n gamma + T^T beta        dF = K_a zeta_a + K_b zeta_b
+
+with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows of coupling_K: K_a, K_b, each 6 x 6.
+"""
+
+from __future__ import annotations
+
+from sim.contact.contact_law import condense_contact, contact_constant, contact_error, contact_impulse
+from sim.contact.pairs.inactive_pairs import add_far_pairs
+from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
+from sim.contact.pairs.pair_jacobian import pair_jacobian
+from sim.contact.pairs.string import is_taut
+from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
+from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from sim.model.options import Goal
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross
+
+
+@kernel
+def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
+    """W times column k of C (3 x 6)."""
+    W = work.contact_W[c]
+    x, y, z = C[k], C[6 + k], C[12 + k]
+    return (
+        W[0] * x + W[1] * y + W[2] * z,
+        W[3] * x + W[4] * y + W[5] * z,
+        W[6] * x + W[7] * y + W[8] * z,
+    )
+
+
+@kernel
+def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
+    """coupling_K += pair j, condensed; share: of the turning of its impulse."""
+    if is_taut(model, work, j):
+        add_string_stiffness(model, work, j)
+        return
+    a = model.coupling_body[model.pair_coupling[j], 0]
+    b = model.coupling_body[model.pair_coupling[j], 1]
+    c = model.contact_height.shape[0] + j
+    wa, wb = shares(model, j)
+    n, t1, t2 = contact_impulse(model, work, c)
+    f = pair_force(work, j, share * n, share * t1, share * t2)
+    P = pair_arm(model, work, j)
+    Ka = work.coupling_K[2 * model.pair_coupling[j]]
+    Kb = work.coupling_K[2 * model.pair_coupling[j] + 1]
+    Omega = work.pair_turn[j]
+    M = work.pair_shift[j]
+    F = work.pair_frame[j]
+    o = work.origin
+    for k in range(6):
+        turn = (Omega[k], Omega[6 + k], Omega[12 + k])
+        shift = (M[k], M[6 + k], M[12 + k])
+        g = impulse_rate(work, c, work.pair_Ca[j], k)
+        e = pair_force(work, j, g[0], g[1], g[2])
+        r = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
+        x = centre_shift(work, work.pos3, a, k)
+        df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
+        dP = (shift[0] - wa * x[0], shift[1] - wa * x[1], shift[2] - wa * x[2])
+        add_wrench_column(Ka, k, f, df, P, dP)
+        if b < 0:
+            continue
+        g = impulse_rate(work, c, work.pair_Cb[j], k)
+        e = pair_force(work, j, g[0], g[1], g[2])
+        u = unit_vector(k - 3)
+        r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
+        p = point_shift(k, F[9] - o[0], F[10] - o[1], F[11] - o[2])
+        x = centre_shift(work, work.pos3, b, k)
+        df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
+        dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
+        add_wrench_column(Kb, k, f, df, P, dP)
+
+
+@optional(Slot.CONDENSE_PAIRS)
+def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
+    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
+    ground = model.contact_height.shape[0]
+    for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
+        if work.coupling_live[k] == 1:
+            for e in range(36):
+                work.coupling_K[2 * k, e] = 0.0
+                work.coupling_K[2 * k + 1, e] = 0.0
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            pair_jacobian(model, work, h, c - ground)
+            condense_contact(model, work, h, c, kappa, share, form)
+            if not is_absent(work, c - ground):
+                add_pair_stiffness(model, work, c - ground, share)
+
+
+@optional(Slot.APPLY_PAIRS, default=0.0)
+def apply_pairs(model: Model, work: Work) -> float:
+    """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
+    ground = model.contact_height.shape[0]
+    r = 0.0
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            n, t1, t2 = contact_impulse(model, work, c)
+            if not is_absent(work, c - ground):
+                add_pair_wrench(model, work, c - ground, n, t1, t2, work.wrench)
+            r = max(r, contact_error(model, work, c))
+    add_far_pairs(work)
+    return r
+
+
+@optional(Slot.PAIR_CONSTANTS)
+def pair_constants(model: Model, work: Work, goal: Goal) -> None:
+    """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
+    ground = model.contact_height.shape[0]
+    for m in range(work.counts[0], work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            contact_constant(model, work, c, goal)
+            w = work.contact_w[c]
+            if not is_absent(work, c - ground):
+                add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)
+
+
+@kernel
+def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> None:
+    """K2 (2, 36) += dF by the twists of a and b at configuration 2, of pair j.
+
+    slip    -t/h on dx2,  (-c y + s x y)/h on dphi2,  y = r x t        P follows the centres of mass at 2
+    """
+    if is_taut(model, work, j):
+        add_string_turn(model, work, j, K2)
+        return
+    c = model.contact_height.shape[0] + j
+    weight = shares(model, j)
+    n, t1, t2 = contact_impulse(model, work, c)
+    f = pair_force(work, j, n, t1, t2)
+    P = pair_arm(model, work, j)
+    F = work.pair_frame[j]
+    W = work.contact_W[c]
+    for side in range(2):
+        i = model.coupling_body[model.pair_coupling[j], side]
+        if i < 0:
+            continue
+        sign = 1.0 if side == 0 else -1.0
+        w = work.turn[i]
+        r = (F[9] - work.pos3[i, 0], F[10] - work.pos3[i, 1], F[11] - work.pos3[i, 2])
+        for k in range(6):
+            x = centre_shift(work, work.pos2, i, k)
+            e = unit_vector(k - 3)
+            s1 = slip_rate(F[3], F[4], F[5], r, w, x, e) * sign / h
+            s2 = slip_rate(F[6], F[7], F[8], r, w, x, e) * sign / h
+            df = pair_force(work, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
+            q = weight[0] if side == 0 else weight[1]
+            add_wrench_column(K2[side], k, f, df, P, (q * x[0], q * x[1], q * x[2]))
+
+
+@kernel
+def slip_rate(tx: float, ty: float, tz: float, r: Vec3, w: Vector, x: Vec3, e: Vec3) -> float:
+    """-t.x + (-c y + s x y).e"""
+    yx, yy, yz = cross(r[0], r[1], r[2], tx, ty, tz)
+    sx, sy, sz = cross(w[1], w[2], w[3], yx, yy, yz)
+    along = tx * x[0] + ty * x[1] + tz * x[2]
+    return (sx - w[0] * yx) * e[0] + (sy - w[0] * yy) * e[1] + (sz - w[0] * yz) * e[2] - along

@@ -1,0 +1,141 @@
+"""What collisions remember of the beginning of a step, and by how much elements may overlap there; and elements that
+pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those of the other in
+the first. Collisions of polytopes and of cylinders have room for them (sim/contact/collision/kept.py).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact.collision.box import to_a, to_b
+from sim.contact.collision.kept import elsewhere
+from sim.contact.collision.rim import LEVEL
+from sim.contact.collision.witness import dot
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
+from solvers.jit import inner_kernel, kernel
+from solvers.rotation import Vec3
+
+NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses
+
+
+@inner_kernel
+def last_point(model: Model, first: int) -> int:
+    """End of the points of the collision whose first pair this is."""
+    end = first + 1
+    while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
+        end += 1
+    return end
+
+
+@kernel
+def least_size(model: Model, j: int) -> float:
+    """The smallest of the sizes of the shapes of pair j."""
+    least = 1e300
+    for k in range(8):
+        if model.pair_sizes[j, k] > 0.0:
+            least = min(least, model.pair_sizes[j, k])
+    return least
+
+
+@kernel
+def rounding_of_rims(model: Model, j: int) -> float:
+    """How much deeper than their contact points say the shapes of pair j may overlap: the point of a rim that is
+    farthest along a normal is rounded by LEVEL of its radius (sim/contact/collision/rim.py). 0 without cylinders.
+    """
+    kind, sizes = model.pair_kind[j] % SWAPPED, model.pair_sizes[j]
+    if kind == Pair.CYLINDER_CYLINDER:
+        return LEVEL * max(sizes[0], sizes[4])
+    return LEVEL * sizes[4] if kind == Pair.POLYTOPE_CYLINDER else 0.0
+
+
+@kernel
+def overlap_before(model: Model, j: int) -> float:
+    """By how much elements of pair j may overlap where a step begins, and still be chosen [m]."""
+    return NEAR * least_size(model, j) + rounding_of_rims(model, j)
+
+
+@inner_kernel
+def has_no_room(kind: int) -> bool:
+    """Whether a kind of pair is none of polytopes or cylinders: points of the others have sides that stay open."""
+    return kind % SWAPPED < Pair.POLYTOPE_POLYTOPE
+
+
+@inner_kernel
+def room(kind: int, sizes: Vector, hull: Matrix) -> int:
+    """First of the points of a collision that may be made of any elements; very many where there is none."""
+    kind %= SWAPPED
+    if kind == Pair.CYLINDER_CYLINDER:
+        return 2 * RIM_POINTS
+    if kind == Pair.POLYTOPE_CYLINDER:
+        a = int(sizes[0])
+        return int(hull[a, 0]) + (RIM_POINTS if hull[a, 2] > 0.0 else 0)
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return int(hull[int(sizes[0]), 0] + hull[int(sizes[4]), 0])
+    return 1 << 40
+
+
+@inner_kernel
+def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
+    """How far the two points of a contact at `pose` have moved past each other since the pose `before`.
+
+    p' = R' R^T (p - r) + r' of a point p of shape a, in the frame of b; of one of b in the frame of a, where the two
+    have changed places, p' = R'^T (R p + r - r').
+    """
+    R, r = pose[:9], (pose[9], pose[10], pose[11])
+    p = (out[4], out[5], out[6])
+    if kind < SWAPPED:
+        q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
+        return p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11]
+    q = to_b(R, p)
+    q = to_a(before[:9], (q[0] + r[0] - before[9], q[1] + r[1] - before[10], q[2] + r[2] - before[11]))
+    return p[0] - q[0], p[1] - q[1], p[2] - q[2]
+
+
+@kernel
+def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector, least: float) -> bool:
+    """Whether the two points of a contact at `pose` were closer than `least` at the pose `before`, along the normal at
+    `pose`: they have moved apart since then, whatever the normal was on the way.
+
+    Where nothing else was found, the normal of shapes that were apart may have turned by the angle of the two poses:
+    the points seem to have been closer than they were by that angle times their motion.
+    """
+    moved = moved_since(kind, out, pose, before)
+    if work.pair_free[1] == 1:
+        turn = 0.0
+        for k in range(9):
+            turn += (pose[k] - before[k]) ** 2
+        least -= sqrt(0.5 * turn * dot(moved, moved))
+    return out[0] - dot((out[1], out[2], out[3]), moved) < least
+
+
+@kernel
+def remember(model: Model, work: Work, first: int) -> None:
+    """pair_kept: the elements of the points of a collision that press; 0 for the others."""
+    close = NEAR * least_size(model, first)
+    ground = model.contact_height.shape[0]
+    for j in range(first, last_point(model, first)):
+        pressing = work.pair_code[j] != 0 and work.cone[ground + j, 0] < close
+        work.pair_kept[j] = work.pair_code[j] if pressing else 0
+
+
+@kernel
+def keep(model: Model, work: Work, first: int) -> None:
+    """Elements of pair_kept that were not chosen again take the places of points that there are not now."""
+    end = last_point(model, first)
+    begin = first + room(model.pair_kind[first], model.pair_sizes[first], model.hull)
+    free = begin
+    for j in range(first, end):
+        kept = work.pair_kept[j]
+        if kept == 0 or kept == work.pair_code[j]:
+            continue
+        if j < begin:
+            kept = elsewhere(j - first, kept)
+        for k in range(begin, end):
+            if work.pair_code[k] == kept:
+                kept = 0
+        while free < end and work.pair_code[free] != 0:
+            free += 1
+        if kept != 0 and free < end:
+            work.pair_code[free] = kept

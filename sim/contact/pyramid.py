@@ -1,0 +1,192 @@
+"""Friction in a four-sided pyramid on the central path.
+
+Columns of `cone`:  2 psi, 3 s_psi, 4:8 beta, 8:12 s       psi s_psi = kappa,    s_psi = mu gamma - sum beta
+                                                           beta_i s_i = kappa,   s_i = d_i.v_t + psi
+with the directions d = (t1, -t1, t2, -t2). Columns of contact_scale, k_i = beta_i/s_i: 0:4 k_i, 4:6 e = sum k_i d_i
+along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:12 those of dbeta.
+"""
+
+from __future__ import annotations
+
+from sim.model.data import Work
+from sim.model.model import Model
+from sim.model.options import Goal
+from sim.model.slots import Slot
+from solvers.cones import orthant_step, return_pair
+from solvers.jit import kernel
+from solvers.optional import optional
+
+
+@kernel
+def side(k: int, x: float, y: float) -> float:
+    """d_k . (x, y) for the four directions t1, -t1, t2, -t2."""
+    a = x if k < 2 else y
+    return a if k % 2 == 0 else -a
+
+
+@kernel
+def _pyramid_slip(x: float, y: float, a: float) -> float:
+    """psi > max(|x|, |y|) with 1/psi + sum_i 1/(psi + d_i) = 1/a: on the central path mu gamma = s_psi + sum beta.
+
+    Newton on the convex decreasing function from the left end of the bracket (m + a/5 .. m + 5 a), monotone.
+    """
+    m = max(abs(x), abs(y))
+    psi = m + 0.2 * a
+    for _ in range(60):
+        f = 1.0 / psi - 1.0 / a
+        g = 1.0 / (psi * psi)
+        for e in range(4):
+            r = 1.0 / (psi + side(e, x, y))
+            f += r
+            g += r * r
+        step = f / g
+        psi += step
+        if abs(step) < 1e-14 * psi:
+            break
+    return psi
+
+
+@optional(Slot.START_PYRAMID)
+def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
+    """Variables on the central path of kappa at the present slip and gap slack."""
+    z = work.cone[c]
+    k = work.contact_kin[c]
+    psi = _pyramid_slip(k[1], k[2], z[0] / model.contact_friction[c])
+    z[2] = psi
+    z[3] = kappa / psi
+    for e in range(4):
+        z[8 + e] = side(e, k[1], k[2]) + psi
+        z[4 + e] = kappa / z[8 + e]
+
+
+@kernel
+def cap_error(model: Model, work: Work, c: int) -> float:
+    """mu gamma - sum beta - s_psi of the pyramid."""
+    z = work.cone[c]
+    return model.contact_friction[c] * z[1] - z[4] - z[5] - z[6] - z[7] - z[3]
+
+
+@optional(Slot.PYRAMID_ERROR, default=0.0)
+def pyramid_error(model: Model, work: Work, c: int) -> float:
+    """Largest of |s_psi - (mu gamma - sum beta)| and |s_i - (d_i.v_t + psi)|."""
+    z = work.cone[c]
+    k = work.contact_kin[c]
+    r = abs(cap_error(model, work, c))
+    for e in range(4):
+        r = max(r, abs(side(e, k[1], k[2]) + z[2] - z[8 + e]))
+    return r
+
+
+@optional(Slot.PYRAMID_PRODUCTS, default=(0.0, 0.0, 0.0))
+def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+    """(sum, low, high) of the five products."""
+    z = work.cone[c]
+    total = z[2] * z[3]
+    lo = total
+    hi = total
+    for e in range(4):
+        t = z[4 + e] * z[8 + e]
+        total += t
+        lo = min(lo, t)
+        hi = max(hi, t)
+    return total, lo, hi
+
+
+@optional(Slot.PYRAMID_PRODUCTS_AHEAD, default=0.0)
+def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> float:
+    """Sum of the five products after a step of length alpha."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    total = (z[2] + alpha * d[2]) * (z[3] + alpha * d[3])
+    for e in range(4):
+        total += (z[4 + e] + alpha * d[4 + e]) * (z[8 + e] + alpha * d[8 + e])
+    return total
+
+
+@optional(Slot.PYRAMID_BOUNDARY, default=1e30)
+def pyramid_boundary(model: Model, work: Work, c: int) -> float:
+    """Largest step that keeps all ten variables positive, or 1e30."""
+    a = 1e30
+    for e in range(2, 12):
+        a = min(a, orthant_step(work.cone[c, e], work.cone_step[c, e]))
+    return a
+
+
+@optional(Slot.RETURN_PYRAMID)
+def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float) -> None:
+    """The five pairs put back onto the central path of kappa where they left their cones."""
+    return_pair(work.cone[c], work.cone_trial[c], 2, 3, weight, kappa)
+    for e in range(4):
+        return_pair(work.cone[c], work.cone_trial[c], 8 + e, 4 + e, weight, kappa)
+
+
+@optional(Slot.CONDENSE_PYRAMID)
+def condense_pyramid(model: Model, work: Work, c: int) -> None:
+    """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4).
+
+    On the diagonal K and psi g e^2 nearly cancel where the contact slides, but not as sums of what is positive:
+
+        (k1 + k2) (s_psi + psi (k3 + k4)) g + 4 psi k1 k2 g
+    """
+    z = work.cone[c]
+    W = work.contact_W[c]
+    q = work.contact_scale[c]
+    mu = model.contact_friction[c]
+    total = 0.0
+    for e in range(4):
+        q[e] = z[4 + e] / z[8 + e]
+        total += q[e]
+    q[4] = q[0] - q[1]
+    q[5] = q[2] - q[3]
+    q[6] = 1.0 / (z[3] + z[2] * total)
+    g = z[2] * q[6]
+    x, y = q[0] + q[1], q[2] + q[3]
+    W[4] = -q[6] * (x * (z[3] + z[2] * y) + 4.0 * z[2] * q[0] * q[1])
+    W[5] = g * q[4] * q[5]
+    W[7] = W[5]
+    W[8] = -q[6] * (y * (z[3] + z[2] * x) + 4.0 * z[2] * q[2] * q[3])
+    W[3] = mu * W[0] * g * q[4]
+    W[6] = mu * W[0] * g * q[5]
+
+
+@optional(Slot.PYRAMID_CONSTANT)
+def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
+    """Friction part of contact_w, after its normal part."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    k = work.contact_kin[c]
+    w = work.contact_w[c]
+    q = work.contact_scale[c]
+    total = 0.0
+    for e in range(4):
+        r = goal.kappa - z[4 + e] * z[8 + e]
+        if goal.corrected > 0.0:
+            r -= goal.corrected * d[4 + e] * d[8 + e]
+        q[8 + e] = (r - z[4 + e] * goal.share * (side(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
+        total += q[8 + e]
+    r = goal.kappa - z[2] * z[3]
+    if goal.corrected > 0.0:
+        r -= goal.corrected * d[2] * d[3]
+    q[7] = (r + z[2] * (total - goal.share * cap_error(model, work, c))) * q[6]
+    p = q[7] - z[2] * q[6] * model.contact_friction[c] * w[0]
+    w[1] = q[8] - q[9] - q[4] * p
+    w[2] = q[10] - q[11] - q[5] * p
+
+
+@optional(Slot.RECOVER_PYRAMID)
+def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share: float) -> None:
+    """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
+    z = work.cone[c]
+    d = work.cone_step[c]
+    k = work.contact_kin[c]
+    q = work.contact_scale[c]
+    mu = model.contact_friction[c]
+    p = q[7] - z[2] * q[6] * (mu * d[1] + q[4] * x + q[5] * y)
+    total = 0.0
+    d[2] = p
+    for e in range(4):
+        t = side(e, x, y) + p
+        d[4 + e] = q[8 + e] - q[e] * t
+        d[8 + e] = t + share * (side(e, k[1], k[2]) + z[2] - z[8 + e])
+        total += d[4 + e]
+    d[3] = mu * d[1] - total + share * cap_error(model, work, c)

@@ -1,0 +1,198 @@
+"""Restitution: Moreau's impact law on the velocity of the gap, joined to the condition on the gap itself.
+
+A contact whose gap closes, and would be closed at the next configuration if it went on like that, is an impact:
+
+    phi2 < phi1,   2 phi2 - phi1 < 0        then   phi3 - phi2 >= -e (phi2 - phi1),   complementary to its impulse
+
+The mean velocities of the gap over the two intervals stand for those before and after, so the body turns back at most
+the way of one step above the ground. It is the usual law, with a floor that impacts raise,
+
+    s = phi3 - floor,   s gamma = kappa,      floor = (1 - e) phi2 + e phi1 of an impact, 0 otherwise
+
+so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. What comes
+slower than max(2 g h, sqrt(kappa / (m h))) is no impact: it would be back within a few steps, or the forces of the
+central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
+example); so does the turning of bodies, of first order in the time step: the impulse acts along the normal at the end
+of the step, the gap changes along those on the way. Where the impulses f of a step did work in all,
+
+    sum of 1/2 f.(u + u') > 0,     u, u' the relative velocities of the two bodies where f acts, after and before,
+
+its restitutions are lowered, all of them by the same part, and it is solved again, until they do none: without
+restitution they do not.
+
+What the impulses do not do, the energy at the nodes may, by a part of first order in the time step: an impact is
+somewhere within one. A frictionless chain of three bodies with e = 1 gained up to 1.0e-3 of its energy in two impacts
+at 2 ms, 1.5e-4 at .25 ms, and lost .3 % and .05 % (median of eight falls); between impacts, 1.7e-5 and 3e-7.
+
+Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
+of 2, 14 phi1, 15 phi2, of pairs 16:19 the contact point at 1, 19:22 at 2. Derivatives: restitution_gradient.py.
+
+Scenes without restitution do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact.contact_law import contact_impulse
+from sim.contact.ground_contact import contact_jacobian, contact_kinematics
+from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
+from sim.model.data import Work
+from sim.model.model import Model
+from sim.model.options import AT_EVERY_POSE, AT_START
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross, transposed_times
+
+_NOISE = 1e-6  # of the work of all impulses: what counts as none
+_FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are
+_NEVER = 1e9  # [m]
+
+
+@kernel
+def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
+    """Gaps of the near contacts at an earlier configuration, and their rows; configuration 3 is used up."""
+    first = configuration == 1
+    pos = work.pos1 if first else work.pos2
+    rot = work.rot1 if first else work.rot2
+    for i in range(pos.shape[0]):
+        for k in range(3):
+            work.pos3[i, k] = pos[i, k]
+        for k in range(9):
+            work.rot3[i, k] = rot[i, k]
+    for m in range(work.counts[0]):
+        contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
+    work.pair_free[0] = AT_EVERY_POSE  # what touched there, whatever it is now
+    pair_kinematics(model, work, h)
+    work.pair_free[0] = AT_START
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            k = work.contact_kin[c]
+            b[14 if first else 15] = k[0]
+            row = b[2:8] if first else b[8:14]
+            if c < model.contact_height.shape[0]:
+                contact_jacobian(model, work, h, c)
+                for r in range(3):
+                    row[r], row[3 + r] = k[18 + r], k[9 + r]
+                continue
+            F = work.pair_frame[c - model.contact_height.shape[0]]
+            o = work.origin
+            n = gap_normal(model, work, c - model.contact_height.shape[0])
+            row[0], row[1], row[2] = n
+            row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], n[0], n[1], n[2])
+            for r in range(3):
+                b[16 + r if first else 19 + r] = F[9 + r]
+            if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
+                b[14 if first else 15] = -_NEVER if first else _NEVER
+
+
+@kernel
+def least_closing(model: Model, work: Work, h: float, c: int) -> float:
+    """How much a gap closes in a step, at least, in an impact [m]."""
+    g = model.gravity
+    fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    m = model.body_mass[model.contact_body[c]]
+    return h * sqrt(max(fall, work.far_law[0] / (h * m) if m > 0.0 else 0.0))
+
+
+@kernel
+def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
+    """Floors of the impacts of this step, with a share of the restitution."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            e = share * model.contact_restitution[c]
+            floor = (1.0 - e) * b[15] + e * b[14]
+            fast = b[14] - b[15] > least_closing(model, work, h, c)
+            impact = e > 0.0 and fast and 2.0 * b[15] < b[14] and floor > 0.0
+            b[0] = floor if impact else 0.0
+            b[1] = e if impact else 0.0
+
+
+@optional(Slot.FIND_IMPACTS)
+def find_impacts(model: Model, work: Work, h: float) -> None:
+    """Which near contacts are impacts in this step, and their floors."""
+    for c in range(work.bounce.shape[0]):
+        work.bounce[c, 0] = 0.0
+        work.bounce[c, 1] = 0.0
+    work.bounce_share[0] = 1.0
+    look_back(model, work, h, 1)
+    look_back(model, work, h, 2)
+    raise_floors(model, work, h, 1.0)
+
+
+@optional(Slot.SUBTRACT_FLOORS)
+def subtract_floors(model: Model, work: Work) -> None:
+    """contact_kin: gaps above the floors."""
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            work.contact_kin[c, 0] -= work.bounce[c, 0]
+
+
+@kernel
+def velocity_sum(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity of the point (x, y, z) of body i at configuration 2 over the interval 1-2, plus that over 2-3; 0 for the
+    world.
+    """
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    before, after = work.turn_in[i], work.turn[i]
+    m, n, o = work.move_in[i], work.move[i], work.pos2[i]
+    wx, wy, wz = before[1] + after[1], before[2] + after[2], before[3] + after[3]
+    vx, vy, vz = cross(wx, wy, wz, x - o[0], y - o[1], z - o[2])
+    return (m[0] + n[0] + 2.0 * vx) / h, (m[1] + n[1] + 2.0 * vy) / h, (m[2] + n[2] + 2.0 * vz) / h
+
+
+@kernel
+def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
+    """1/2 f.(u + u') of contact c at the point P where its impulse f acts, at configuration 2."""
+    ground = model.contact_height.shape[0]
+    a = model.contact_body[c]
+    fn, f1, f2 = contact_impulse(model, work, c)
+    if c < ground:
+        k = work.contact_kin[c]
+        p = work.pos2[a]
+        x, y, z = velocity_sum(work, h, a, p[0] + k[3], p[1] + k[4], p[2] + k[5])
+        fx, fy, fz = transposed_times(work.contact_frame[c], fn, f1, f2)
+        return 0.5 * (fx * x + fy * y + fz * z)
+    if is_absent(work, c - ground):
+        return 0.0
+    o = work.origin
+    rx, ry, rz = pair_arm(model, work, c - ground)
+    x, y, z = velocity_sum(work, h, a, o[0] + rx, o[1] + ry, o[2] + rz)
+    b = model.coupling_body[model.pair_coupling[c - ground], 1]
+    u, v, w = velocity_sum(work, h, b, o[0] + rx, o[1] + ry, o[2] + rz)
+    fx, fy, fz = pair_force(work, c - ground, fn, f1, f2)
+    return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
+
+
+@optional(Slot.IMPACTS_GAINED, default=False)
+def impacts_gained(model: Model, work: Work, h: float) -> bool:
+    """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
+
+    Lowering all rebounds by a part r takes some r/2 sum of gamma e |v_n'|. Parts are powers of 1/2: between them the
+    step stays a smooth function of its start, with the derivatives of restitution_gradient.py.
+    """
+    gain = 0.0
+    size = 0.0
+    rebound = 0.0
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            fn, _, _ = contact_impulse(model, work, c)
+            gain += impulse_work(model, work, h, c)
+            gap = work.contact_kin[c, 0] + b[0]
+            size += 0.5 * fn * (abs(gap - b[15]) + abs(b[15] - b[14])) / h
+            rebound += 0.5 * fn * b[1] * abs(b[15] - b[14]) / h
+    if not rebound > 0.0 or not gain > _NOISE * size:
+        return False
+    least = max(gain / rebound, 2.0 * (1.0 - work.bounce_share[0]))
+    lost = _FINEST
+    while lost < least:
+        lost *= 2.0
+    share = max(1.0 - lost, 0.0)
+    work.bounce_share[0] = share
+    raise_floors(model, work, h, share)
+    return True

@@ -1,0 +1,100 @@
+"""How hard the contacts of a derivative are: no harder than digits allow.
+
+The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: what is
+left of the inertia in the directions that the contact leaves free would be its last two digits. A contact that gives a
+little, E = W^-1 - D, has nearly the same derivative: it differs by D/G, G the velocity per impulse that the bodies
+answer with there, and rounding adds 1e-16 M/D, M the same of a body that is free. So
+
+    W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
+
+balances the two; a contact that gives more than D is left alone. 3e-14 M W' is an estimate of what is lost
+(Linearization.accuracy), 1e-6 where M = G. M is 1/m of the bodies that touch, with what is fixed to them. G is known
+from what the impulse gamma has done: it has stopped the speed v of the contact point, or carried weight for h, so
+G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those
+of a foot alone.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.model.data import Work
+from sim.model.model import Law, Model, Vector
+from solvers.jit import kernel
+from solvers.rotation import Vec3, cross
+
+_LINEAR = int(Law.LINEAR)
+_PART = 3e-8
+_PART_OF_IMPACTS = 1e-8  # with restitution, whose rates are summed first (restitution_gradient.py): less is rounded
+_LEAST = 1e-6  # of M, which G is not taken to be below: forces between parts that hold one another stop no speed
+
+
+@kernel
+def free_response(model: Model, i: int) -> float:
+    """1/m of body i and those it is fixed to; 0 for the world, 1/kg for bodies without mass."""
+    m = 0.0
+    while i >= 0:
+        m += model.body_mass[i]
+        if model.body_vadr[i + 1] > model.body_vadr[i]:
+            return 1.0 / m if m > 0.0 else 1.0
+        i = model.body_parent[i]
+    return 0.0
+
+
+@kernel
+def speed_before(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+    """Velocity over interval 1-2 of the point of body i at the arm (x, y, z) from its centre of mass; 0: the world."""
+    if i < 0:
+        return 0.0, 0.0, 0.0
+    s, d = work.turn_in[i], work.move_in[i]
+    u, v, w = cross(2.0 * s[1], 2.0 * s[2], 2.0 * s[3], x, y, z)
+    return (d[0] + u) / h, (d[1] + v) / h, (d[2] + w) / h
+
+
+@kernel
+def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
+    """M and G of contact c [m/s per N s]."""
+    k = work.contact_kin[c]
+    a = model.contact_body[c]
+    M = free_response(model, a)
+    x, y, z = speed_before(work, h, a, k[3], k[4], k[5])
+    j = c - model.contact_height.shape[0]
+    if j >= 0:
+        b = model.coupling_body[model.pair_coupling[j], 1]
+        if b >= 0:
+            M += free_response(model, b)
+            p, o = work.pair_frame[j], work.pos3[b]
+            u, v, w = speed_before(work, h, b, p[9] - o[0], p[10] - o[1], p[11] - o[2])
+            x, y, z = x - u, y - v, z - w
+    g = model.gravity
+    speed = sqrt(x * x + y * y + z * z) + h * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    return M, max(min(M, speed / work.cone[c, 1]), _LEAST * M)
+
+
+@kernel
+def soften(model: Model, work: Work, h: float, c: int) -> None:
+    """W of contact c becomes W', its derivative by friction (contact_scale) what it is then; contact_hard: M W'."""
+    W = work.contact_W[c]
+    q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
+    M, G = responses(model, work, h, c)
+    d = (_PART if work.bounce[c, 1] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
+    _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
+    hard = max(-h * W[0], -W[4], -W[8])
+    work.contact_hard[0] = max(work.contact_hard[0], M * hard)
+
+
+@kernel
+def _compose(W: Vector, q: Vector, normal: float, along: float) -> None:
+    """W = (I - W D)^-1 W and q likewise, D = diag(normal, along, along); the normal impulse does not depend on slip."""
+    n = 1.0 / (1.0 - W[0] * normal)
+    a, b, c, d = 1.0 - W[4] * along, -W[5] * along, -W[7] * along, 1.0 - W[8] * along
+    i = 1.0 / (a * d - b * c)
+    a, b, c, d = i * d, -i * b, -i * c, i * a
+    W[0] *= n
+    q[0], q[1] = a * q[0] + b * q[1], c * q[0] + d * q[1]
+    x, y = n * W[3], n * W[6]
+    W[3], W[6] = a * x + b * y, c * x + d * y
+    x, y = W[4], W[7]
+    W[4], W[7] = a * x + b * y, c * x + d * y
+    x, y = W[5], W[8]
+    W[5], W[8] = a * x + b * y, c * x + d * y

@@ -1,1 +1,0 @@
-"""Contacts of points and spheres with the ground: their laws, and which of them are near."""

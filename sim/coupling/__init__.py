@@ -1,1 +1,0 @@
-"""What couples branches of the tree: closed loops, gears, and the dense system they share with pairs."""

@@ -1,0 +1,117 @@
+"""Parameters of contacts and collisions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.derivatives.parameters.directions import SIDE, Effect, Size
+from sim.derivatives.parameters.parameter import Parameter, Term, vector
+from sim.derivatives.parameters.tree_parameters import frame_turns
+from sim.mechanism.axes import contact_frame
+from sim.mechanism.collision import Collision
+from sim.mechanism.contact_candidates import Touch
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Contact
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
+
+Floats = NDArray[np.float64]
+
+# of the shapes: what they are called, how a step feels them, and how much of it a unit is
+_SIZES: dict[type, dict[str, tuple[Size, float]]] = {
+    Sphere: {"radius": (Size.BALL, 1.0)},
+    Capsule: {"radius": (Size.BALL, 1.0), "length": (Size.ROD, 0.5)},
+    Box: {"x": (Size.SIDE_X, 0.5), "y": (Size.SIDE_Y, 0.5), "z": (Size.SIDE_Z, 0.5)},
+    Cylinder: {"radius": (Size.RIM, 1.0), "length": (Size.LENGTH, 0.5)},
+    Polytope: {"scale": (Size.SCALE, 1.0)},
+}
+
+
+def normal_turns(normal: ArrayLike) -> Floats:
+    """(3, 3) rotation of the frame of a contact by its normal, which is kept at unit length."""
+    n, t1, t2 = contact_frame(normal)
+    return frame_turns(n, t1, t2, np.eye(3)[0 if abs(n[0]) < 0.9 else 1])
+
+
+def contact_parameters(contact: Contact, c: int) -> list[Parameter]:
+    """friction, restitution, contact_point, contact_height, contact_radius; contact_normal of half-spaces."""
+    turns = normal_turns(contact.normal)
+    found = [
+        Parameter("friction", contact.name, "", contact.friction, ((Effect.FRICTION, c, 0, 1.0),)),
+        Parameter("restitution", contact.name, "", contact.restitution, ((Effect.RESTITUTION, c, 0, 1.0),)),
+        *vector("contact_point", contact.name, contact.point, lambda k: [(Effect.POINT, c, k, 1.0)]),
+        Parameter("contact_height", contact.name, "", contact.height, ((Effect.HEIGHT, c, 0, 1.0),)),
+        Parameter("contact_radius", contact.name, "", contact.radius, ((Effect.RADIUS, c, 0, 1.0),)),
+    ]
+    if contact.terrain is not None:
+        return found
+    return found + vector(
+        "contact_normal",
+        contact.name,
+        contact.normal,
+        lambda k: [(Effect.NORMAL, c, j, float(turns[j, k])) for j in range(3)],
+    )
+
+
+def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
+    """friction, restitution, and of both shapes the centres in their bodies (or the world) and the sizes."""
+    ground = len(mech.contacts)
+    index = {name: i for i, name in enumerate(mech.body_names)}
+    for collision in mech.collisions:
+        mine = [j for j, touch in enumerate(mech.touches) if touch.collision == collision.name]
+        if not mine:  # of two parts that are fixed to one another
+            continue
+        for kind, effect, value in (
+            ("friction", Effect.FRICTION, collision.friction),
+            ("restitution", Effect.RESTITUTION, collision.restitution),
+        ):
+            if kind == "restitution" or not isinstance(collision.shape_a, String):  # a string does not rub
+                yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
+        firsts = [j for j in mine if mech.touches[j].feature == 0]  # the corners of a polytope are one by one
+        swapped = mech.touches[mine[0]].bodies[0] != index.get(collision.a, -1)
+        for side, letter in enumerate("ba" if swapped else "ab"):
+            shape = shape_of(mech, collision, letter)
+            yield from _centre(f"shape_{letter}", collision.name, shape, side, firsts)
+            touches = {j: mech.touches[j] for j in firsts}
+            for label, value, terms in _sizes(collision, letter, shape, side, touches):
+                yield Parameter(f"size_{letter}", collision.name, label, value, terms)
+
+
+def _centre(kind: str, name: str, shape: Solid, side: int, firsts: list[int]) -> list[Parameter]:
+    """Where a shape sits, of a collision with these first pairs."""
+    return vector(kind, name, shape.center, lambda k: [(Effect.SHAPE_SHIFT, j, 3 * side + k, 1.0) for j in firsts])
+
+
+def shape_of(mech: Mechanism, collision: Collision, letter: str) -> Solid:
+    """Shape a or b of a collision: its own, or that of the body."""
+    own: Solid | None = collision.shape_a if letter == "a" else collision.shape_b
+    body = collision.a if letter == "a" else collision.b
+    shape = own if own is not None else mech.bodies[mech.body_names.index(body or "")].shape
+    assert shape is not None  # `touches` has checked it
+    return shape
+
+
+def _sizes(
+    collision: Collision, letter: str, shape: Solid, side: int, touches: dict[int, Touch]
+) -> Iterator[tuple[str, float, tuple[Term, ...]]]:
+    """(component, value, terms) of the sizes of a shape; a polytope has a factor of its corners, 1 as it is."""
+    if isinstance(shape, String):
+        if letter == "a":  # that of b has no meaning
+            ends = [(Effect.SHAPE_SIZE, j, SIDE * s + Size.STRING, 1.0) for j in touches for s in (0, 1)]
+            yield "length", shape.length, tuple(ends)
+        return
+    against = collision.shape_b if letter == "a" else collision.shape_a
+    if isinstance(shape, Polytope) and isinstance(against, HalfSpace):  # each corner is a point at its place
+        moves = [
+            (Effect.SHAPE_SHIFT, j, 3 * side + k, float(x))
+            for j, touch in touches.items()
+            for k, x in enumerate(touch.places[side, :3] - np.asarray(shape.center))
+        ]
+        yield "scale", 1.0, tuple(moves)
+        return
+    for label, (size, unit) in _SIZES.get(type(shape), {}).items():
+        value = float(getattr(shape, label, 1.0))
+        yield label, value, tuple((Effect.SHAPE_SIZE, j, SIDE * side + size, unit) for j in touches)

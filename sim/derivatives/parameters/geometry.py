@@ -1,0 +1,195 @@
+"""Parameters of the geometry of joints: where a joint sits, and how it is turned.
+
+Such a change moves the subtree of the joint like one more degree of freedom: by twists T1, T2, T3 at the three
+configurations, about O. So its column is that of `residual_derivatives` with T in the place of S:
+
+    above the joint    S2_d.F,                       F = A3 T3 + A2 T2 + A1 T1 of its body
+    the joint          S2_d.F + (B x S2_d).r         B: how its own columns move
+    below              S2_d.(A3 T3 + A2 T2 + A1 T1) + (T2 x S2_d).r       of the body of d
+
+The coordinates of the joint stay what they are.
+"""
+
+from __future__ import annotations
+
+from sim.contact.pairs.wrench_columns import unit_vector
+from sim.derivatives.parameters.body_columns import add_wrench
+from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.restitution_gradient import gap_wrench
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from solvers.jit import kernel
+from solvers.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
+
+_PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)
+_ORIENTATION = int(Effect.ORIENTATION)
+_PRODUCT = 9  # row of At.twists with F
+
+
+@kernel
+def _add_rotation(out: Vector, p: Vec3, a: Vec3) -> None:
+    """out += (p x a, a), a rotation about the axis a through p."""
+    v = cross(p[0], p[1], p[2], a[0], a[1], a[2])
+    for k in range(3):
+        out[k] += v[k]
+        out[3 + k] += a[k]
+
+
+@kernel
+def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: Matrix) -> None:
+    """The directions of motion of joint i turn by a, its body on them by -b, so that only what it does is changed.
+
+    o: joint point on the child; t: from that on the parent to it.
+    """
+    if 0 < model.joint_ntrans[i] < 3:
+        x = cross(a[0], a[1], a[2], t[0], t[1], t[2])
+        for k in range(3):
+            out[0, k] = x[k]
+            out[2, k] = x[k]
+            out[1, 3 + k] = a[k]
+    if 0 < model.joint_nrot[i] < 3:
+        _add_rotation(out[0], o, (a[0] - b[0], a[1] - b[1], a[2] - b[2]))
+        _add_rotation(out[2], o, a)
+
+
+@kernel
+def _joint_twist(
+    model: Model,
+    work: Work,
+    effect: int,
+    i: int,
+    k: int,
+    q: Vector,
+    pos: Matrix,
+    quat: Matrix,
+    rot: Matrix,
+    out: Matrix,
+) -> None:
+    """out[0] = T at one configuration, out[1], out[2] = B of the translation and the rotation columns of joint i."""
+    for r in range(3):
+        for j in range(6):
+            out[r, j] = 0.0
+    p = model.body_parent[i]
+    e = unit_vector(k)
+    b = rotate(rot, i, e[0], e[1], e[2])
+    if effect == _CHILD_POINT:
+        for j in range(3):
+            out[0, j] = -b[j]
+        return
+    if effect == _PARENT_POINT:
+        if p >= 0:
+            e = rotate(rot, p, e[0], e[1], e[2])
+        for r in range(3):
+            for j in range(3):
+                out[r, j] = e[j]
+        return
+    f = model.joint_offset[i]
+    g0, g1, g2, g3 = f[0], f[1], f[2], f[3]
+    if p >= 0:
+        g0, g1, g2, g3 = quat_mul(quat[p, 0], quat[p, 1], quat[p, 2], quat[p, 3], f[0], f[1], f[2], f[3])
+    Q = quat_matrix(g0, g1, g2, g3)
+    a = (Q[0] * e[0] + Q[1] * e[1] + Q[2] * e[2], Q[3] * e[0] + Q[4] * e[1] + Q[5] * e[2],
+         Q[6] * e[0] + Q[7] * e[1] + Q[8] * e[2])  # fmt: skip
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    for j in range(model.joint_ntrans[i]):
+        y = q[model.body_qadr[i] + j]
+        x = model.joint_trans_axes[i, 3 * j : 3 * j + 3]
+        s0 += y * x[0]
+        s1 += y * x[1]
+        s2 += y * x[2]
+    t = (Q[0] * s0 + Q[1] * s1 + Q[2] * s2, Q[3] * s0 + Q[4] * s1 + Q[5] * s2, Q[6] * s0 + Q[7] * s1 + Q[8] * s2)
+    c = model.joint_child_point[i]
+    c0, c1, c2 = rotate(rot, i, c[0], c[1], c[2])
+    O = work.origin
+    o = (pos[i, 0] + c0 - O[0], pos[i, 1] + c1 - O[1], pos[i, 2] + c2 - O[2])
+    if effect == _ORIENTATION:
+        for r in range(3):
+            _add_rotation(out[r], (o[0] - t[0], o[1] - t[1], o[2] - t[2]), a)
+    else:
+        _axis_twist(model, i, a, b, o, t, out)
+
+
+@kernel
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@kernel
+def _mark_below(model: Model, i: int, below: Vector) -> None:
+    """below = 1 for body i and those that hang on it."""
+    for b in range(below.shape[0]):
+        p = model.body_parent[b]
+        below[b] = 1.0 if b == i or (p >= 0 and below[p] > 0.0) else 0.0
+
+
+@kernel
+def add_geometry(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: float, col: int) -> None:
+    """The column of a change of the geometry of joint i."""
+    T = at.twists
+    _joint_twist(model, work, effect, i, k, work.theta1, work.pos1, work.quat1, work.rot1, T[0:3])
+    _joint_twist(model, work, effect, i, k, work.theta3, work.pos3, work.quat3, work.rot3, T[6:9])
+    _joint_twist(model, work, effect, i, k, at.q, work.pos2, work.quat2, work.rot2, T[3:6])
+    T1, T2, T3, F = T[0], T[3], T[6], T[_PRODUCT]
+    for r in range(6):
+        A1, A2, A3 = work.A1[i, 6 * r : 6 * r + 6], work.A2[i, 6 * r : 6 * r + 6], work.A3[i, 6 * r : 6 * r + 6]
+        F[r] = _dot(A1, T1) + _dot(A2, T2) + _dot(A3, T3)
+    X = work.columns
+    first_rotation = model.body_vadr[i] + model.joint_ntrans[i]
+    for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+        B = T[4] if d < first_rotation else T[5]
+        X[d, col] -= w * (_dot(work.S2[d], F) + _dot(B, work.F[d, 12:18]))
+    p = model.body_parent[i]
+    while p >= 0:
+        for d in range(model.body_vadr[p], model.body_vadr[p + 1]):
+            X[d, col] -= w * _dot(work.S2[d], F)
+        p = model.body_parent[p]
+    _mark_below(model, i, at.below)
+    for b in range(i + 1, at.below.shape[0]):
+        if at.below[b] > 0.0:
+            for d in range(model.body_vadr[b], model.body_vadr[b + 1]):
+                G = work.G[d]
+                X[d, col] -= w * (_dot(G[0:6], T1) + _dot(G[6:12], T2) + _dot(G[12:18], T3))
+    add_coupled_geometry(model, work, at, w, col)
+
+
+@kernel
+def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -> None:
+    """What a change of geometry does to couplings across branches: wrench F on a and -F on b, gaps of loops."""
+    T2, T3, F = at.twists[3], at.twists[6], at.twists[_PRODUCT]
+    loops = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
+    for k in range(model.coupling_body.shape[0]):
+        for side in range(2):
+            i = model.coupling_body[k, side]
+            other = model.coupling_body[k, 1 - side]
+            far = k < loops and work.coupling_live[k] == 0  # its rows are those of an earlier step
+            if i < 0 or at.below[i] == 0.0 or far:
+                continue
+            K2 = work.coupling_K2[2 * k + side]
+            for r in range(6):
+                F[r] = _dot(K2[6 * r : 6 * r + 6], T2)
+            for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+                t = _dot(work.couple_R[row, 6 * side : 6 * side + 6], T3)
+                if k >= loops:
+                    work.couple_panel[row, col] += w * t
+                    continue
+                if work.couple_E[row] == 0.0:  # no row
+                    continue
+                for r in range(6):
+                    F[r] += work.couple_B[row, r] * t / work.couple_E[row]
+            add_wrench(model, work, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
+    for j in range(model.pair_kind.shape[0]):
+        if work.bounce[model.contact_height.shape[0] + j, 1] > 0.0:
+            _add_coupled_impact(model, work, at, j, w, col)
+
+
+@kernel
+def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col: int) -> None:
+    """As `add_bounce_derivatives`: a floor that the motion of one body raises pushes the other."""
+    c = model.contact_height.shape[0] + j
+    b = work.bounce[c]
+    rise = b[1] * _dot(b[2:8], at.twists[0]) + (1.0 - b[1]) * _dot(b[8:14], at.twists[3])
+    f, t = gap_wrench(model, work, c)
+    for side in range(2):
+        i = model.coupling_body[model.pair_coupling[j], side]
+        if i >= 0 and at.below[i] > 0.0:
+            add_wrench(model, work, model.coupling_body[model.pair_coupling[j], 1 - side], f, t, -w * rise, col)

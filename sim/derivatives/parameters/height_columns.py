@@ -1,0 +1,118 @@
+"""Parameters of terrain: the heights of its grid, by the coefficients of its spline (terrain/height_field.py).
+
+A contact feels the ground by three numbers, F, F_x and F_y at its place: dphi = -dF/w - (phi/w^2) grad F.dgrad F, and
+the frame turns. Each has a column of dR; the coefficients around the place have shares in the three, so that a step
+costs the same for any number of heights. An impact (contacts/restitution.py) feels F also where the contact was before:
+
+    dgap = -(e dphi1 + (1 - e) dphi2), which stands in the column of F as dF = w (e dphi1 + (1 - e) dphi2)
+
+From coefficients to heights, outside of kernels: terrain_parameters.py.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact.height_field import cell, height_field, weight
+from sim.contact.terrain_contact import centre
+from sim.derivatives.parameters.columns import clear_columns
+from sim.derivatives.parameters.directions import At
+from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
+from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
+from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.dynamics.loops.coupling_system import solve_coupling_panel
+from sim.model.data import Work
+from sim.model.layout import model_view, work_view
+from sim.model.model import Matrix, Model, Vector
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.record import Table
+from solvers.rotation import Vec3
+
+
+@kernel
+def spread(model: Model, k: int, at: Vec3, s: Vec3, X: Matrix, first: int, out: Matrix) -> None:
+    """out += the columns of X from `first` on times their derivatives by the coefficients of terrain k.
+
+    Columns F, F_x, F_y of the ground below `at`; where s is not zero, s.(F, F_x, F_y) in that of F only.
+    """
+    p = model.terrain_place[k]
+    start, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
+    C, S = p[0], p[1]
+    i, a = cell(p[4] * (C * (at[0] - p[2]) + S * (at[1] - p[3])), nx)
+    j, b = cell(p[5] * (C * (at[1] - p[3]) - S * (at[0] - p[2])), ny)
+    for r in range(4):
+        u, du, _ = weight(r, a)
+        for c in range(4):
+            v, dv, _ = weight(c, b)
+            f, fs, ft = u * v, p[4] * du * v, p[5] * u * dv
+            fx, fy = C * fs - S * ft, S * fs + C * ft
+            if s[0] != 0.0:
+                f, fx, fy = s[0] * f + s[1] * fx + s[2] * fy, 0.0, 0.0
+            m = start + ny * min(max(i + r, 0), nx - 1) + min(max(j + c, 0), ny - 1)
+            for d in range(out.shape[0]):
+                out[d, m] += f * X[d, first] + fx * X[d, first + 1] + fy * X[d, first + 2]
+
+
+@kernel
+def spread_earlier(model: Model, work: Work, c: int, configuration: int, X: Matrix, out: Matrix) -> None:
+    """What the floor of an impact feels of the ground below configuration 1 or 2."""
+    k = model.contact_terrain[c] - 1
+    b = work.bounce[c]
+    share, phi = (b[1], b[14]) if configuration == 1 else (1.0 - b[1], b[15])
+    pos, rot = (work.pos1, work.rot1) if configuration == 1 else (work.pos2, work.rot2)
+    at = centre(model, c, pos, rot)
+    _, Fx, Fy, _, _, _ = height_field(model, k, at[0], at[1])
+    i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
+    t = -share * i / work.contact_frame[c, 2]
+    if share != 0.0:
+        spread(model, k, at, (t, t * phi * i * Fx, t * phi * i * Fy), X, 3 * c, out)
+
+
+@kernel
+def spread_contacts(model: Model, work: Work, X: Matrix, out: Matrix) -> None:
+    """out (n, ncoefficient) += d/d(coefficients) from the columns X (n, 3 nground) by F, F_x and F_y."""
+    for c in range(model.contact_terrain.shape[0]):
+        if is_on_terrain(model, work, c):
+            at = centre(model, c, work.pos3, work.rot3)
+            spread(model, model.contact_terrain[c] - 1, at, (0.0, 0.0, 0.0), X, 3 * c, out)
+            if work.bounce[c, 1] > 0.0:
+                spread_earlier(model, work, c, 1, X, out)
+                spread_earlier(model, work, c, 2, X, out)
+
+
+@kernel
+def height_jacobian(model_at: Table, work_at: Table, at: At, places: Matrix, out: Matrix) -> None:
+    """out (2 nv, ncoefficient) += d(next state)/d(coefficients), of the step that `linearize` left in the Work.
+
+    places: (2 nv, 3 nground), the same by F, F_x, F_y of every contact; overwritten.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    width = column_count(model, work)
+    first = 0
+    while first < places.shape[1]:
+        count = min(width, places.shape[1] - first)
+        clear_columns(work)
+        for m in range(count):
+            add_ground_place(model, work, at.h, (first + m) // 3, (first + m) % 3, m)
+        solve_panel(model, work)
+        solve_coupling_panel(model, work)
+        coordinate_rows(model, work, at.h, first, count, places)
+        first += width
+    spread_contacts(model, work, places, out)
+
+
+@optional(Slot.ADD_HEIGHT_GRADIENT)
+def add_height_gradient(model: Model, work: Work, h: float, y: Vector, places: Matrix, out: Matrix) -> None:
+    """out (1, ncoefficient) += y.(-dR/d(coefficients)); places: (1, 3 nground), overwritten."""
+    for m in range(places.shape[1]):
+        for d in range(work.columns.shape[0]):
+            work.columns[d, 0] = 0.0
+        add_ground_place(model, work, h, m // 3, m % 3, 0)
+        s = 0.0
+        for d in range(work.columns.shape[0]):
+            s += y[d] * work.columns[d, 0]
+        places[0, m] = s
+    spread_contacts(model, work, places, out)

@@ -1,0 +1,85 @@
+"""Derivatives of the next state by parameters, by the implicit function theorem: dv25 = -H^-1 dR/d(parameter).
+
+The minimal state x = (q2, v15) and the input are held fixed; what hangs on them moves with the parameter: poses at all
+three configurations, so also the momentum that enters the step. The factors of H are those that the derivatives by
+state and input have left in `work`.
+
+By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv = dv25/dv15
+
+    dv25/dh = -v25/h + A_vv v15/h - H^-1 dR/dh,      dq3/dh = v25 + h dv25/dh
+"""
+
+from __future__ import annotations
+
+from sim.derivatives.parameters.columns import fill_columns
+from sim.derivatives.parameters.directions import At, Effect
+from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.dynamics.loops.coupling_system import solve_coupling_panel
+from sim.model.data import Work
+from sim.model.layout import model_view, work_view
+from sim.model.model import IntegerMatrix, Matrix, Model, Vector
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.rotation import left_jacobian
+
+_TIME_STEP = int(Effect.TIME_STEP)
+
+
+@kernel
+def add_time_rates(work: Work, at: At, A: Matrix, w: float, m: int) -> None:
+    """columns[:, m] += w (A_vv v15 - v25)/h"""
+    nv = at.v.shape[0]
+    for d in range(nv):
+        t = -work.nu[d]
+        for k in range(nv):
+            t += A[nv + d, nv + k] * at.v[k]
+        work.columns[d, m] += w * t / at.h
+
+
+@kernel
+def coordinate_rows(model: Model, work: Work, h: float, first: int, count: int, out: Matrix) -> None:
+    """out[:nv] = h dv25, h J(h w)^T dw of quaternions; out[nv:] = dv25; columns from `first` on."""
+    nv = work.columns.shape[0]
+    X = work.columns
+    for d in range(nv):
+        for m in range(count):
+            out[nv + d, first + m] = X[d, m]
+            out[d, first + m] = h * X[d, m]
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] != 3:
+            continue
+        d = model.body_vadr[i + 1] - 3
+        J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+        for r in range(3):
+            for m in range(count):
+                out[d + r, first + m] = h * (J[r] * X[d, m] + J[3 + r] * X[d + 1, m] + J[6 + r] * X[d + 2, m])
+
+
+@kernel
+def parameter_jacobian(
+    model_at: Table, work_at: Table, at: At, A: Matrix, terms: IntegerMatrix, weights: Vector, out: Matrix
+) -> None:
+    """out = d(next state)/d(parameters), (2 nv, nparameter), of the step that `linearize` left in the Work.
+
+    A: (2 nv, 2 nv) of that step.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    nv = at.v.shape[0]
+    width = column_count(model, work)
+    first = 0
+    start = 0
+    while first < out.shape[1]:
+        end = fill_columns(model, work, at, terms, weights, first, start)
+        solve_panel(model, work)
+        solve_coupling_panel(model, work)
+        for t in range(start, end):
+            if terms[t, 0] == _TIME_STEP:
+                add_time_rates(work, at, A, weights[t], terms[t, 3] - first)
+        coordinate_rows(model, work, at.h, first, min(width, out.shape[1] - first), out)
+        for t in range(start, end):
+            if terms[t, 0] == _TIME_STEP:
+                for d in range(nv):
+                    out[d, terms[t, 3]] += weights[t] * work.nu[d]
+        first += width
+        start = end

@@ -1,0 +1,89 @@
+"""Parameters of a mechanism by name: what they are, what they are now, and how a step feels them.
+
+    kind:part[component]     mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
+
+A name without a component stands for all of them, one without a part for all parts, in this order. `kind:*` is one
+parameter that adds the same to all parts: the height of the ground is `contact_height:*`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.derivatives.parameters.contact_parameters import collision_parameters, contact_parameters
+from sim.derivatives.parameters.directions import Effect
+from sim.derivatives.parameters.parameter import KINDS, Parameter
+from sim.derivatives.parameters.terrain_parameters import terrain_parameters
+from sim.derivatives.parameters.tree_parameters import (
+    body_parameters,
+    gear_parameters,
+    geometry_parameters,
+    input_parameters,
+    joint_parameters,
+    limit_parameters,
+)
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.closing import is_weld
+from sim.mechanism.mechanism import Mechanism
+from sim.model.model import IntegerMatrix, Vector
+
+__all__ = ["KINDS", "Parameter", "Parameters", "Plan", "all_parameters"]
+
+Floats = NDArray[np.float64]
+
+
+class Parameters(NamedTuple):
+    """The parameters of a selection, in order; `rows` says which of them each of its names stands for."""
+
+    names: tuple[str, ...]
+    values: Floats  # (n,)
+    rows: dict[str, slice]
+
+    def __repr__(self) -> str:
+        return brief_repr(self)
+
+    def __getitem__(self, name: str) -> Floats:  # type: ignore[override]
+        """Values of one name of the selection."""
+        return self.values[self.rows[name]]
+
+
+class Plan(NamedTuple):
+    """Parameters as kernels need them, see columns.py; heights of terrain apart, see terrain_parameters.py."""
+
+    terms: IntegerMatrix  # (m, 4)
+    weights: Vector  # (m,)
+    size: int
+    heights: IntegerMatrix  # (k, 2) height, column
+    height_weights: Vector  # (k,)
+
+
+def all_parameters(mech: Mechanism, time_step: float) -> list[Parameter]:
+    """Every parameter of the mechanism, kind by kind in the order of KINDS."""
+    found: list[Parameter] = []
+    shares = {joint.child for joint in mech.loops if is_weld(joint)}
+    for body in mech.bodies:
+        if body.mass > 0.0 and body.name not in shares:
+            found += body_parameters(mech, body)
+    first = 0
+    limit = 0
+    for index, joint in enumerate(mech.joints):
+        found += geometry_parameters(joint, index, False) + joint_parameters(joint, first)
+        bounds = list(limit_parameters(joint, limit))
+        found += bounds
+        first += joint.nv
+        limit += len(bounds)
+    for index, joint in enumerate(mech.loops):
+        if not is_weld(joint):
+            found += geometry_parameters(joint, index, True)
+    found += [*gear_parameters(mech), *input_parameters(mech)]
+    for index, contact in enumerate(mech.contacts):
+        found += contact_parameters(contact, index)
+    found += [*terrain_parameters(mech), *collision_parameters(mech)]
+    for k in range(3):
+        value = float(np.asarray(mech.gravity)[k])
+        found.append(Parameter("gravity", "", str(k), value, ((Effect.GRAVITY, 0, k, 1.0),)))
+    found.append(Parameter("time_step", "", "", time_step, ((Effect.TIME_STEP, 0, 0, 1.0),)))
+    return sorted(found, key=lambda p: KINDS.index(p.kind))

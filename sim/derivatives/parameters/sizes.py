@@ -1,0 +1,106 @@
+"""Parameters of collisions: sizes of their shapes; columns[:, col] -= w dR/d(size).
+
+Distance, normal and point depend on a shape by the surface that is touched, and near it by the corner, edge, face or
+ball that is there. When a size grows by ds, that element moves by e ds, as if the whole shape did: a corner of a box
+away from the middle, an edge with it (along itself it may move as it likes), the surface of a ball along its normal. So
+a size costs what a shift costs, by an e of its own for every point, and no pair of shapes needs more derivatives.
+"""
+
+from __future__ import annotations
+
+from sim.contact.collision.witness import dot
+from sim.contact.pairs.pair_contact import gap_normal
+from sim.contact.pairs.pair_pose import place_shape
+from sim.contact.pairs.string import is_taut
+from sim.derivatives.parameters.directions import SIDE, Size
+from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
+from sim.derivatives.parameters.string_columns import add_moved_end
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.shape_kinds import SWAPPED, Pair
+from solvers.jit import kernel
+from solvers.rotation import Vec3
+
+_BALL, _ROD, _SIDE_X, _SIDE_Z = int(Size.BALL), int(Size.ROD), int(Size.SIDE_X), int(Size.SIDE_Z)
+_RIM, _LENGTH, _SCALE, _STRING = int(Size.RIM), int(Size.LENGTH), int(Size.SCALE), int(Size.STRING)
+_POLYTOPES, _ON_CYLINDER = int(Pair.POLYTOPE_POLYTOPE), int(Pair.POLYTOPE_CYLINDER)
+
+
+@kernel
+def shape_sizes(model: Model, j: int, side: int) -> tuple[float, float]:
+    """(radius, half length) of the shape of a (side 0) or b, of a capsule or cylinder."""
+    kind = model.pair_kind[j]
+    o = 4 * side if kind < SWAPPED else 4 * (1 - side)
+    if kind % SWAPPED == _POLYTOPES or (kind % SWAPPED == _ON_CYLINDER and o == 0):
+        return model.pair_sizes[j, o + 1], 0.0
+    return model.pair_sizes[j, o], model.pair_sizes[j, o + 1]
+
+
+@kernel
+def axis_and_side(work: Work, s: int, k: int, x: Vec3) -> tuple[Vec3, float]:
+    """Axis k of shape s, and the sign of x, from its centre, along it."""
+    R = work.shape_rot[s]
+    axis = (R[k], R[3 + k], R[6 + k])
+    return axis, 1.0 if dot(axis, x) >= 0.0 else -1.0
+
+
+@kernel
+def element_shift(
+    model: Model, work: Work, j: int, which: int, phi: float, n: Vec3, p: Vec3, configuration: int
+) -> Vec3:
+    """e, world axes, of the shape and size `which` of pair j at configuration 1, 2 or 3.
+
+    phi, n, p: distance, normal from b to a, and middle of the two nearest points there.
+    """
+    side, way = which // SIDE, which % SIDE
+    out = 1.0 if side == 0 else -1.0  # n points into a, and out of b
+    if way == _BALL:
+        return -out * n[0], -out * n[1], -out * n[2]
+    if way == _STRING:  # both ends by half of it
+        return 0.5 * out * n[0], 0.5 * out * n[1], 0.5 * out * n[2]
+    first = j - model.pair_feature[j]
+    s = 2 * first + side
+    pos = work.pos1 if configuration == 1 else (work.pos2 if configuration == 2 else work.pos3)
+    rot = work.rot1 if configuration == 1 else (work.rot2 if configuration == 2 else work.rot3)
+    place_shape(model, work, s, model.coupling_body[model.pair_coupling[j], side], pos, rot)
+    radius, half = shape_sizes(model, j, side)
+    r = 0.5 * phi + (radius if way == _ROD else 0.0)  # from the middle to the surface, or to the segment inside
+    o = row(work.shape_pos[s], 0)
+    x = (p[0] + out * r * n[0] - o[0], p[1] + out * r * n[1] - o[1], p[2] + out * r * n[2] - o[2])
+    if way == _SCALE:
+        return x
+    axis, end = axis_and_side(work, s, way - _SIDE_X if _SIDE_X <= way <= _SIDE_Z else 2, x)
+    if way == _RIM:
+        z = end * half
+        return (x[0] - z * axis[0]) / radius, (x[1] - z * axis[1]) / radius, (x[2] - z * axis[2]) / radius
+    return end * axis[0], end * axis[1], end * axis[2]
+
+
+@kernel
+def earlier_shift(model: Model, work: Work, j: int, which: int, b: Vector, configuration: int) -> Vec3:
+    """`element_shift` at configuration 1 or 2, from what `look_back` (contacts/restitution.py) has kept of it in b."""
+    first = configuration == 1
+    n = row(b, 2 if first else 8)
+    p = row(b, 16 if first else 19)
+    return element_shift(model, work, j, which, b[14 if first else 15], n, p, configuration)
+
+
+@kernel
+def add_shapes_size(model: Model, work: Work, h: float, first: int, which: int, w: float, col: int) -> None:
+    """A size of a shape of the collision whose first pair this is; which: SIDE side + Size."""
+    j = first
+    while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
+        if is_felt(model, work, j):
+            c = model.contact_height.shape[0] + j
+            b = work.bounce[c]
+            floor = 0.0
+            if b[1] > 0.0:
+                e1, e2 = earlier_shift(model, work, j, which, b, 1), earlier_shift(model, work, j, which, b, 2)
+                floor = pair_floor(work, c, which // SIDE, e1, e2)
+            p = row(work.pair_frame[j], 9)
+            e = element_shift(model, work, j, which, work.pair_out[j, 0], gap_normal(model, work, j), p, 3)
+            if is_taut(model, work, j):  # where it pulls along stays
+                add_moved_end(model, work, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
+            else:
+                add_moved_shape(model, work, h, j, which // SIDE, e, floor, w, col)
+        j += 1

@@ -1,0 +1,192 @@
+"""Derivatives of a step with impacts (restitution.py): the floor of an impact moves with configurations 1 and 2.
+
+    d(impulse)/d(floor) = -d(impulse)/d(gap),      dfloor = e dphi1 + (1 - e) dphi2
+
+of the branch that was taken. Much of it cancels: a body that starts a little higher lands as much later, and bounces as
+fast. So of impacts on the ground the changes of gap, floor and slip by a column are summed before the stiffness of the
+contact, up to 1e8 times the inertia over h, multiplies them: it is in the matrix that is eliminated, work.A, but not in
+A2 and A3. Scenes without restitution do not compile these kernels.
+"""
+
+from __future__ import annotations
+
+from sim.contact.ground_contact import add_contact_law
+from sim.contact.pairs.pair_contact import pair_arm, pair_force
+from sim.contact.pairs.pair_stiffness import slip_rate
+from sim.derivatives.coupling_gradient import add_column
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from sim.model.slots import Slot
+from solvers.dense import dot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.rotation import Vec3, cross, join, transposed_times
+
+
+@kernel
+def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
+    """Wrench about O, on the first body, of contact c per unit of its gap, by its condensed law."""
+    W = work.contact_W[c]
+    ground = model.contact_height.shape[0]
+    if c >= ground:
+        f = pair_force(work, c - ground, W[0], W[3], W[6])
+        a = pair_arm(model, work, c - ground)
+    else:
+        k = work.contact_kin[c]
+        i = model.contact_body[c]
+        f = transposed_times(work.contact_frame[c], W[0], W[3], W[6])
+        o = work.origin
+        p = work.pos2[i]
+        a = (p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5])
+    return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
+
+
+@optional(Slot.ADD_BOUNCE_COMPOSITES, default=False)
+def add_bounce_composites(model: Model, work: Work) -> bool:
+    """Of pairs A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O.
+
+    A = A3 with the laws of impacts on the ground, if there are any; returns whether.
+    """
+    impacts = False
+    ground = model.contact_height.shape[0]
+    for i in range(work.A.shape[0]):
+        for k in range(36):
+            work.A[i, k] = work.A3[i, k]
+    for m in range(work.counts[2]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            b = work.bounce[c]
+            if b[1] == 0.0:
+                continue
+            if c < ground:
+                impacts = True
+                add_contact_law(model, work, c, work.A)
+                continue
+            f, t = gap_wrench(model, work, c)
+            for side in range(2):
+                i = model.coupling_body[model.pair_coupling[c - ground], side]
+                if i >= 0:
+                    _add_outer(work.A1[i], f, t, b[1], b[2:8])
+                    _add_outer(work.A2[i], f, t, 1.0 - b[1], b[8:14])
+    return impacts
+
+
+@kernel
+def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
+    """A (6 x 6) += scale (f, t) row^T."""
+    for k in range(6):
+        x = scale * row[k]
+        for r in range(3):
+            A[6 * r + k] += f[r] * x
+            A[18 + 6 * r + k] += t[r] * x
+
+
+@optional(Slot.ADD_BOUNCE_DERIVATIVES)
+def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
+    """dR_dq, dR_dv of impacts with the ground; of pairs, -= the same across the two bodies."""
+    ground = model.contact_height.shape[0]
+    for m in range(work.counts[0]):
+        for c in range(work.near[m, 0], work.near[m, 1]):
+            if work.bounce[c, 1] != 0.0:
+                _add_ground(model, work, h, c)
+                _add_composites(model, work, h, c)
+    for j in range(model.pair_kind.shape[0]):
+        b = work.bounce[ground + j]
+        one = model.coupling_body[model.pair_coupling[j], 0]
+        two = model.coupling_body[model.pair_coupling[j], 1]
+        if b[1] == 0.0 or two < 0:
+            continue
+        f, t = gap_wrench(model, work, ground + j)
+        for side in range(2):
+            i = one if side == 0 else two
+            k = two if side == 0 else one
+            join(work.couple_wrench, f, t)
+            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dq)
+            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dv)
+            _across(model, work, (i, k), b[1] - 1.0, b[8:14], work.S2, work.dR_dq)
+
+
+@kernel
+def _rates(model: Model, work: Work, h: float, c: int, twists: tuple[Vector, Vector, Vector]) -> Vec3:
+    """d(gap - floor, slip) of an impact on the ground by the twists of configurations 1, 2 and 3."""
+    s1, s, t = twists
+    b, k, F = work.bounce[c], work.contact_kin[c], work.contact_frame[c]
+    i = model.contact_body[c]
+    o, p = work.origin, work.pos2[i]
+    e = (s[3], s[4], s[5])
+    u, v, w = cross(s[3], s[4], s[5], p[0] - o[0], p[1] - o[1], p[2] - o[2])
+    x = (s[0] + u, s[1] + v, s[2] + w)
+    r = (k[3], k[4], k[5])
+    gap = dot(k[18:21], t[:3]) + dot(k[9:12], t[3:]) - b[1] * dot(b[2:8], s1) - (1.0 - b[1]) * dot(b[8:14], s)
+    one = dot(k[21:24], t[:3]) + dot(k[12:15], t[3:]) + slip_rate(F[3], F[4], F[5], r, work.turn[i], x, e) / h
+    two = dot(k[24:27], t[:3]) + dot(k[15:18], t[3:]) + slip_rate(F[6], F[7], F[8], r, work.turn[i], x, e) / h
+    return gap, one, two
+
+
+@kernel
+def _impulse_wrench(model: Model, work: Work, c: int, g: Vec3) -> None:
+    """couple_wrench = what W (gap, slip) does about O."""
+    W, k, o = work.contact_W[c], work.contact_kin[c], work.origin
+    p = work.pos2[model.contact_body[c]]
+    fn = W[0] * g[0] + W[1] * g[1] + W[2] * g[2]
+    f1 = W[3] * g[0] + W[4] * g[1] + W[5] * g[2]
+    f2 = W[6] * g[0] + W[7] * g[1] + W[8] * g[2]
+    f = transposed_times(work.contact_frame[c], fn, f1, f2)
+    t = cross(p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5], f[0], f[1], f[2])
+    join(work.couple_wrench, f, t)
+
+
+@kernel
+def _add_ground(model: Model, work: Work, h: float, c: int) -> None:
+    """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, dR_dv -= that by configuration 1, of one contact."""
+    none = work.pair_rows[0]
+    for k in range(6):
+        none[k] = 0.0
+    i = model.contact_body[c]
+    while i >= 0:
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            s1 = work.S1[d]
+            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, work.S2[d], work.S3[d])))
+            add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dq)
+            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, none, none)))
+            add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dv)
+        i = model.body_parent[i]
+
+
+@kernel
+def _add_composites(model: Model, work: Work, h: float, c: int) -> None:
+    """A1, A2, A3 of the body of one contact and those above it, once they are composites: for parameters."""
+    none, unit = work.pair_rows[0], work.pair_rows[1]
+    for k in range(6):
+        none[k] = unit[k] = 0.0
+    for k in range(6):
+        unit[k] = 1.0
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (unit, none, none)))
+        _subtract_column(model, work, c, k, work.A1)
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, unit, none)))
+        _subtract_column(model, work, c, k, work.A2)
+        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, none, unit)))
+        _subtract_column(model, work, c, k, work.A3)
+        unit[k] = 0.0
+
+
+@kernel
+def _subtract_column(model: Model, work: Work, c: int, k: int, A: Matrix) -> None:
+    """Column k of A[i] -= couple_wrench, i from the body of contact c up to the root."""
+    i = model.contact_body[c]
+    while i >= 0:
+        for r in range(6):
+            A[i, 6 * r + k] -= work.couple_wrench[r]
+        i = model.body_parent[i]
+
+
+@kernel
+def _across(
+    model: Model, work: Work, bodies: tuple[int, int], scale: float, row: Vector, S: Matrix, out: Matrix
+) -> None:
+    """out[j, k] += scale (S2[j].w) (row.S[k]), w in couple_wrench; j and k from the bodies up to the root."""
+    k = bodies[1]
+    while k >= 0:
+        for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
+            x = scale * dot(row, S[e])
+            add_column(model, work, bodies[0], x, e, out)
+        k = model.body_parent[k]

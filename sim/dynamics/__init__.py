@@ -1,0 +1,1 @@
+"""Motion of the tree: kinematics, momentum balance, elimination, energy, coordinates."""

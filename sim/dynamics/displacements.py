@@ -1,0 +1,206 @@
+"""How far the bodies move over an interval: the poses at configurations 3 and 1 from those at 2, down the tree.
+
+A velocity is a displacement over h. As a difference of two poses it would carry their rounding, eps |x|/h; here every
+displacement is that of the parent plus that of the joint, rounded to eps |h v|:
+
+    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  of a swing see joints/swing.py
+    rotation   R = R2 + E R2,   E = R(T) - I
+    joint      dx = dx_parent + E_parent (R_parent p_parent) + sum_k q_k E_parent t_k + h v_k (t_k + E_parent t_k)
+    body       dx - E (R2 p_child)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.dynamics.joints.swing import swing_pose, swing_turn
+from sim.dynamics.kinematics import axis_column, displace
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from solvers.jit import inlined, kernel
+from solvers.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
+
+
+class Increment(NamedTuple):
+    """Coordinates at configuration 2, and h v, by which they change."""
+
+    q: Vector  # (nq,)
+    v: Vector  # (nv,)
+    h: float  # time step [s], negative for the way back to configuration 1
+
+
+@kernel
+def joint_turn(model: Model, work: Work, by: Increment, i: int) -> Quat:
+    """Rotation of joint i by its increment, world axes at configuration 2."""
+    n = model.joint_nrot[i]
+    d = model.body_vadr[i + 1] - n
+    if n == 2:
+        a = model.body_qadr[i + 1] - 2
+        c, x, y, z = swing_turn(model, i, by.q[a], by.q[a + 1], by.h * by.v[d], by.h * by.v[d + 1])
+        x, y, z = rotate(work.rot2, i, x, y, z)
+        return c, x, y, z
+    x, y, z = 0.0, 0.0, 0.0
+    for e in range(d, d + n):
+        s = work.S2[e]
+        a = by.h * by.v[e]
+        x, y, z = x + a * s[3], y + a * s[4], z + a * s[5]
+    return quat_exp(x, y, z)
+
+
+@kernel
+def turn_matrix(T: Quat) -> Mat3:
+    """E = R(T) - I = 2 (c [s] + [s]^2),   T = (c, s)"""
+    c, x, y, z = T
+    return (
+        -2.0 * (y * y + z * z), 2.0 * (x * y - c * z), 2.0 * (x * z + c * y),
+        2.0 * (x * y + c * z), -2.0 * (x * x + z * z), 2.0 * (y * z - c * x),
+        2.0 * (x * z - c * y), 2.0 * (y * z + c * x), -2.0 * (x * x + y * y),
+    )  # fmt: skip
+
+
+@kernel
+def slide(model: Model, work: Work, by: Increment, i: int, E: Mat3, dx: Vec3, S: Matrix) -> Vec3:
+    """dx + sum_k q_k E t_k + h v_k (t_k + E t_k) over the translations of joint i; E of the parent, S their columns."""
+    x, y, z = dx
+    for k in range(model.joint_ntrans[i]):
+        d = model.body_vadr[i] + k
+        t = work.S2[d]
+        s = S[d]
+        g0, g1, g2 = times(E, t[0], t[1], t[2])
+        s[0], s[1], s[2] = t[0] + g0, t[1] + g1, t[2] + g2
+        s[3], s[4], s[5] = 0.0, 0.0, 0.0
+        a = by.q[model.body_qadr[i] + k]
+        b = by.h * by.v[d]
+        x, y, z = x + a * g0 + b * s[0], y + a * g1 + b * s[1], z + a * g2 + b * s[2]
+    return x, y, z
+
+
+@inlined
+def turned_columns(model: Model, work: Work, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of the rotations of joint i: their axes at 2 turned with the parent, through o from O; E: of the parent.
+
+    Not those of a joint with two rotations.
+    """
+    for d in range(model.body_vadr[i + 1] - model.joint_nrot[i], model.body_vadr[i + 1]):
+        s = work.S2[d]
+        x, y, z = times(E, s[3], s[4], s[5])
+        axis_column(S, d, s[3] + x, s[4] + y, s[5] + z, o[0], o[1], o[2])
+
+
+@kernel
+def swing_columns(model: Model, work: Work, theta: Vector, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of a joint with two rotations at the coordinates theta, through o from O; E: of its body."""
+    a = model.body_qadr[i + 1] - 2
+    d = model.body_vadr[i + 1] - 2
+    _, first, second = swing_pose(model, i, theta[a], theta[a + 1])
+    x, y, z = rotate(work.rot2, i, first[0], first[1], first[2])
+    e = times(E, x, y, z)
+    axis_column(S, d, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
+    x, y, z = rotate(work.rot2, i, second[0], second[1], second[2])
+    e = times(E, x, y, z)
+    axis_column(S, d + 1, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
+
+
+@kernel
+def tree_moves(model: Model, work: Work, by: Increment, third: bool) -> None:
+    """Positions of all bodies at configuration 3, or 1, from configuration 2, turns, and unit joint columns.
+
+    Fills theta3, pos3, S3, and over the interval 2-3 move and turn; or theta1, pos1, S1, and over the interval 1-2
+    move_in and turn_in; and turn_matrix, with which `turn_bodies` makes rot3 or rot1.
+
+    Columns: the axes at 2 turned with the parent. Those of a quaternion joint, the axes of the body at 2, are then
+    derivatives with respect to a right perturbation of q2 at a constant increment, which follows the perturbed
+    quaternion.
+    """
+    theta = work.theta3 if third else work.theta1
+    pos = work.pos3 if third else work.pos1
+    S = work.S3 if third else work.S1
+    move = work.move if third else work.move_in
+    turn = work.turn if third else work.turn_in
+    O = work.origin
+    displace(model, by.q, by.v, by.h, theta)
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        arm = work.arm[i]
+        t = (1.0, 0.0, 0.0, 0.0)
+        E = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        dx = (0.0, 0.0, 0.0)
+        if p >= 0:
+            t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
+            E = rows_of(work.turn_matrix, p)
+            x, y, z = times(E, arm[0], arm[1], arm[2])
+            dx = (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
+        if model.joint_ntrans[i] > 0:
+            dx = slide(model, work, by, i, E, dx, S)
+        o = (
+            work.pos2[i, 0] - O[0] + arm[3] + dx[0],
+            work.pos2[i, 1] - O[1] + arm[4] + dx[1],
+            work.pos2[i, 2] - O[2] + arm[5] + dx[2],
+        )
+        n = model.joint_nrot[i]
+        if n > 0:
+            e = joint_turn(model, work, by, i)
+            t = quat_mul(t[0], t[1], t[2], t[3], e[0], e[1], e[2], e[3])
+            if t[0] < 0.0:
+                t = (-t[0], -t[1], -t[2], -t[3])
+            if n != 2:
+                turned_columns(model, work, i, E, o, S)
+            E = turn_matrix(t)
+            if n == 2:
+                swing_columns(model, work, theta, i, E, o, S)
+        x, y, z = times(E, arm[3], arm[4], arm[5])
+        dx = (dx[0] - x, dx[1] - y, dx[2] - z)
+        for k in range(9):
+            work.turn_matrix[i, k] = E[k]
+        for k in range(4):
+            turn[i, k] = t[k]
+        for k in range(3):
+            move[i, k] = dx[k]
+            pos[i, k] = work.pos2[i, k] + dx[k]
+
+
+@kernel
+def turn_bodies(work: Work, out: Matrix) -> None:
+    """out = R2 + E R2 of all bodies, with the turn matrices of the last `tree_moves`.   out: (nbody, 9)."""
+    for i in range(out.shape[0]):
+        E = rows_of(work.turn_matrix, i)
+        R = rows_of(work.rot2, i)
+        a = times(E, R[0], R[3], R[6])
+        b = times(E, R[1], R[4], R[7])
+        c = times(E, R[2], R[5], R[8])
+        r = out[i]
+        r[0], r[1], r[2] = R[0] + a[0], R[1] + b[0], R[2] + c[0]
+        r[3], r[4], r[5] = R[3] + a[1], R[4] + b[1], R[5] + c[1]
+        r[6], r[7], r[8] = R[6] + a[2], R[7] + b[2], R[8] + c[2]
+
+
+@kernel
+def move_back(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+    """Configuration 1, and the interval 1-2, of the state (q, v) whose configuration 2 is in `work`."""
+    tree_moves(model, work, Increment(q, v, -h), False)
+    turn_bodies(work, work.rot1)
+    for i in range(work.move_in.shape[0]):  # from 2 to 1 so far
+        for k in range(3):
+            work.move_in[i, k] = -work.move_in[i, k]
+            work.turn_in[i, 1 + k] = -work.turn_in[i, 1 + k]
+
+
+@kernel
+def other_quaternions(work: Work) -> None:
+    """quat1 and quat3, from the turns: what only derivatives by parameters ask for."""
+    for i in range(work.quat2.shape[0]):
+        b = work.quat2[i]
+        t = work.turn_in[i]
+        a = quat_mul(t[0], -t[1], -t[2], -t[3], b[0], b[1], b[2], b[3])
+        c = third_quaternion(work, i)
+        for k in range(4):
+            work.quat1[i, k] = a[k]
+            work.quat3[i, k] = c[k]
+
+
+@kernel
+def third_quaternion(work: Work, i: int) -> Quat:
+    """Orientation of body i at configuration 3."""
+    t = work.turn[i]
+    b = work.quat2[i]
+    return quat_mul(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])

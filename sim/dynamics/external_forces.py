@@ -1,0 +1,115 @@
+"""Wrenches from outside on a tree, gravity and inputs, and their derivatives; about O, in world axes."""
+
+from __future__ import annotations
+
+from sim.dynamics.elimination import add_children
+from sim.model.data import Work
+from sim.model.model import InputKind, Integers, Matrix, Model, Vector
+from solvers.dense import dot
+from solvers.jit import kernel
+from solvers.rotation import cross, rotate
+
+_JOINT = int(InputKind.JOINT)
+_BODY = int(InputKind.BODY)
+
+
+@kernel
+def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
+    """out[:6] = wrench about O per unit of the WORLD or BODY input j, at the configuration in `work`."""
+    i = model.input_index[j]
+    w = model.input_wrench[j]
+    f = (w[0], w[1], w[2])
+    t = (w[3], w[4], w[5])
+    if model.input_kind[j] == _BODY:
+        f = rotate(work.rot2, i, f[0], f[1], f[2])
+        t = rotate(work.rot2, i, t[0], t[1], t[2])
+    o = work.origin
+    x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+    c = cross(x, y, z, f[0], f[1], f[2])
+    for k in range(3):
+        out[k] = f[k]
+        out[3 + k] = t[k] + c[k]
+
+
+@kernel
+def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
+    """out[i] = wrench of gravity and of WORLD and BODY inputs on the subtree of body i.   (nbody, 6)"""
+    n = model.body_parent.shape[0]
+    o, g = work.origin, model.gravity
+    for i in range(n):
+        m = model.body_mass[i]
+        F = out[i]
+        F[0], F[1], F[2] = m * g[0], m * g[1], m * g[2]
+        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        F[3], F[4], F[5] = cross(x, y, z, F[0], F[1], F[2])
+    for j in range(u.shape[0]):
+        if model.input_kind[j] != _JOINT:
+            w = work.wrench[0]
+            input_wrench(model, work, j, w)
+            for k in range(6):
+                out[model.input_index[j], k] += u[j] * w[k]
+    add_children(model, out)
+
+
+@kernel
+def _add_force_slope(f: Vector, x: float, y: float, z: float, out: Vector) -> None:
+    """out += [0 0; -[f]  [f][r]]: a force f that keeps its direction, at r = (x, y, z) from O."""
+    s = f[0] * x + f[1] * y + f[2] * z
+    r = (x, y, z)
+    out[19], out[20] = out[19] + f[2], out[20] - f[1]
+    out[24], out[26] = out[24] - f[2], out[26] + f[0]
+    out[30], out[31] = out[30] + f[1], out[31] - f[0]
+    for a in range(3):  # [f][r] = r f^T - (f.r) I
+        for b in range(3):
+            out[6 * (3 + a) + 3 + b] += r[a] * f[b]
+        out[7 * (3 + a)] -= s
+
+
+@kernel
+def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
+    """out[i] = N of the subtree of body i, (nbody, 36): gravity, WORLD inputs, and BODY inputs, which turn along."""
+    n, o, w = model.body_parent.shape[0], work.origin, work.wrench[0]
+    for i in range(n):
+        for k in range(36):
+            out[i, k] = 0.0
+        for k in range(3):
+            w[k] = model.body_mass[i] * model.gravity[k]
+        _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], out[i])
+    for j in range(u.shape[0]):
+        if model.input_kind[j] == _JOINT:
+            continue
+        i = model.input_index[j]
+        input_wrench(model, work, j, w)
+        for k in range(6):
+            w[k] *= u[j]
+        N = out[i]
+        if model.input_kind[j] != _BODY:
+            _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], N)
+            continue
+        for r in range(3):  # S* w = (-[f] w_S, -[n] w_S - [f] v_S)
+            a, b = (r + 1) % 3, (r + 2) % 3
+            N[6 * r + 3 + a] += w[b]
+            N[6 * r + 3 + b] -= w[a]
+            N[18 + 6 * r + 3 + a] += w[3 + b]
+            N[18 + 6 * r + 3 + b] -= w[3 + a]
+            N[18 + 6 * r + a] += w[b]
+            N[18 + 6 * r + b] -= w[a]
+    add_children(model, out)
+
+
+@kernel
+def input_slopes(model: Model, work: Work, free: Integers, out: Matrix) -> None:
+    """out = df/du: 1 at the dof of a JOINT input, S_d . wrench above the body of the others."""
+    w = work.wrench[0]
+    for j in range(out.shape[1]):
+        for d in range(out.shape[0]):
+            out[d, j] = 0.0
+        i = model.input_index[j]
+        if model.input_kind[j] == _JOINT:
+            out[i, j] = 1.0
+            continue
+        input_wrench(model, work, j, w)
+        while i >= 0:
+            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                out[d, j] = w[d - model.body_vadr[i]] if free[i] == 1 else dot(work.S2[d], w)
+            i = model.body_parent[i]

@@ -1,0 +1,106 @@
+"""Joint limits on the central path: s = gap, s gamma = kappa, generalized impulse d(gap)/d(coordinates) gamma.
+
+    bound    gap = sign (theta3 - bound)    of one coordinate
+    cone     of a quaternion joint, see cone_limit.py
+
+Columns of `bound` (and of its steps): 0 slack s, 1 impulse gamma.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
+from sim.dynamics.joints.terms import add_limit_impulse
+from sim.model.data import Work
+from sim.model.model import Model
+from sim.model.options import Goal
+from sim.model.slots import Slot
+from solvers.cones import onto_path, return_pair
+from solvers.jit import kernel
+from solvers.optional import optional
+
+
+@kernel
+def limit_gaps(model: Model, work: Work, h: float) -> None:
+    """bound_gap, and p of cones."""
+    for k in range(model.limit_dof.shape[0]):
+        if model.limit_cone[k]:
+            cone_gap(model, work, h, k)
+            continue
+        a = model.dof_qadr[model.limit_dof[k]]
+        work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
+
+
+@kernel
+def add_limit_blocks(model: Model, work: Work, h: float) -> None:
+    """joint_block += h gamma/s on the diagonal, and what a cone has in its place."""
+    for k in range(model.limit_dof.shape[0]):
+        d = model.limit_dof[k]
+        i = model.dof_body[d]
+        n = model.body_vadr[i + 1] - model.body_vadr[i]
+        a = d - model.body_vadr[i]
+        if model.limit_cone[k]:
+            cone_block(model, work, h, k)
+        else:
+            work.joint_block[i, a * n + a] += h * work.bound[k, 1] / work.bound[k, 0]
+
+
+@optional(Slot.ADD_LIMIT_DERIVATIVES)
+def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
+    """dR_dq += gamma/s, and what a cone has in its place."""
+    for k in range(model.limit_dof.shape[0]):
+        if model.limit_cone[k]:
+            cone_derivative(model, work, h, k)
+        else:
+            d = model.limit_dof[k]
+            work.dR_dq[d, d] += work.bound[k, 1] / work.bound[k, 0]
+
+
+@kernel
+def limit_constants(model: Model, work: Work, goal: Goal) -> None:
+    """dnu += (impulse of size w), with d gamma = w - (gamma/s) d gap; w kept in bound_w."""
+    for k in range(model.limit_dof.shape[0]):
+        s = work.bound[k, 0]
+        g = work.bound[k, 1]
+        r = goal.kappa - s * g
+        if goal.corrected > 0.0:
+            r -= goal.corrected * work.bound_step[k, 0] * work.bound_step[k, 1]
+        w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
+        work.bound_w[k] = w
+        add_limit_impulse(model, work, k, w, work.dnu)
+
+
+@kernel
+def resume_limits(model: Model, work: Work, weight: float, kappa: float, predicted: bool) -> None:
+    """All pairs on the central path of kappa, near their gaps and the impulses that they had (in bound_trial).
+
+    predicted: near the impulses that they have now; those that press stay and give the slacks.
+    """
+    for k in range(model.limit_dof.shape[0]):
+        b = work.bound[k]
+        impulse = b[1] if predicted else work.bound_trial[k, 1]
+        if predicted and weight * impulse * impulse > kappa:
+            b[0] = kappa / impulse
+        else:
+            b[0], b[1] = onto_path(work.bound_gap[k], impulse, weight, kappa)
+
+
+@kernel
+def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+    """The pairs that left their cones put back onto the central path of kappa."""
+    for k in range(model.limit_dof.shape[0]):
+        return_pair(work.bound[k], work.bound_trial[k], 0, 1, weight, kappa)
+
+
+@kernel
+def recover_limits(model: Model, work: Work, h: float, share: float) -> None:
+    """bound_step from dnu."""
+    for k in range(model.limit_dof.shape[0]):
+        s = work.bound[k, 0]
+        d = model.limit_dof[k]
+        if model.limit_cone[k]:
+            c = work.bound_row[k]
+            t = c[3] * work.dnu[d] + c[4] * work.dnu[d + 1] + c[5] * work.dnu[d + 2]
+        else:
+            t = model.limit_sign[k] * h * work.dnu[d]
+        work.bound_step[k, 0] = t + share * (work.bound_gap[k] - s)
+        work.bound_step[k, 1] = work.bound_w[k] - work.bound[k, 1] / s * t

@@ -1,0 +1,170 @@
+"""Walk down the tree: poses of the bodies, and the joint columns that turn joint rates into body twists.
+
+All twists are about one common point O in world axes, so that a body's twist is the plain sum of the columns of its
+ancestors times their rates, and the wrench on a subtree the plain sum of the wrenches on its bodies: no transports.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from sim.dynamics.joints.swing import swing_pose
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from solvers.jit import kernel
+from solvers.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
+
+
+@kernel
+def displace(model: Model, q: Vector, v: Vector, h: float, out: Vector) -> None:
+    """out = q (+) h v: the exponential map of the joint coordinates.
+
+    scalar coordinates    out = q + h v
+    quaternions           out = q exp(h w), normalised
+    """
+    for i in range(model.body_parent.shape[0]):
+        a = model.body_qadr[i]
+        d = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d
+        quaternion = model.joint_nrot[i] == 3
+        if quaternion:
+            n -= 3
+        for _ in range(n):
+            out[a] = q[a] + h * v[d]
+            a += 1
+            d += 1
+        if quaternion:
+            e = quat_exp(h * v[d], h * v[d + 1], h * v[d + 2])
+            r = quat_mul(q[a], q[a + 1], q[a + 2], q[a + 3], e[0], e[1], e[2], e[3])
+            n = 1.0 / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]) ** 0.5
+            for k in range(4):
+                out[a + k] = r[k] * n
+
+
+@kernel
+def axis_column(S: Matrix, d: int, a0: float, a1: float, a2: float, x: float, y: float, z: float) -> None:
+    """S[d] = (r x a, a): rotation about the axis a through the point r from O."""
+    v0, v1, v2 = cross(x, y, z, a0, a1, a2)
+    S[d, 0] = v0
+    S[d, 1] = v1
+    S[d, 2] = v2
+    S[d, 3] = a0
+    S[d, 4] = a1
+    S[d, 5] = a2
+
+
+@kernel
+def translate(model: Model, q: Vector, i: int, o: Vec3, Q: Quat, S: Matrix) -> Vec3:
+    """o + sum_k q_k R(Q) t_k over the translations of joint i; S: their columns (R(Q) t_k, 0)."""
+    x, y, z = o
+    R = quat_matrix(Q[0], Q[1], Q[2], Q[3])
+    for k in range(model.joint_ntrans[i]):
+        a = q[model.body_qadr[i] + k]
+        s = S[model.body_vadr[i] + k]
+        t = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
+        s[0], s[1], s[2] = times(R, t[0], t[1], t[2])
+        s[3], s[4], s[5] = 0.0, 0.0, 0.0
+        x, y, z = x + a * s[0], y + a * s[1], z + a * s[2]
+    return x, y, z
+
+
+@kernel
+def joint_rotation(model: Model, q: Vector, i: int) -> Quat:
+    """Rotation of joint i at the coordinates q, in its frame on the parent."""
+    a = model.body_qadr[i] + model.joint_ntrans[i]
+    if model.joint_nrot[i] == 1:
+        c = cos(0.5 * q[a])
+        s = sin(0.5 * q[a])
+        t = model.joint_axis[i]
+        return c, s * t[0], s * t[1], s * t[2]
+    if model.joint_nrot[i] == 3:
+        return q[a], q[a + 1], q[a + 2], q[a + 3]
+    if model.joint_nrot[i] == 2:
+        return swing_pose(model, i, q[a], q[a + 1])[0]
+    return 1.0, 0.0, 0.0, 0.0
+
+
+@kernel
+def rotation_columns(model: Model, q: Vector, i: int, R: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of the rotations of joint i, through o from O, in axes of its body, whose rotation is R."""
+    n = model.joint_nrot[i]
+    d = model.body_vadr[i + 1] - n
+    if n == 1:  # the axis is the same before and after the rotation
+        t = model.joint_axis[i]
+        x, y, z = times(R, t[0], t[1], t[2])
+        axis_column(S, d, x, y, z, o[0], o[1], o[2])
+    elif n == 2:
+        a = model.body_qadr[i + 1] - 2
+        _, first, second = swing_pose(model, i, q[a], q[a + 1])
+        x, y, z = times(R, first[0], first[1], first[2])
+        axis_column(S, d, x, y, z, o[0], o[1], o[2])
+        x, y, z = times(R, second[0], second[1], second[2])
+        axis_column(S, d + 1, x, y, z, o[0], o[1], o[2])
+    elif n == 3:
+        for k in range(3):
+            axis_column(S, d + k, R[k], R[3 + k], R[6 + k], o[0], o[1], o[2])
+
+
+@kernel
+def tree_poses(model: Model, work: Work, q: Vector) -> None:
+    """Poses of all bodies at configuration 2, whose coordinates are q, and unit joint columns about O.
+
+        joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
+        body          quat = Q quat_joint(q),   pos = o - R p_child
+        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see joints/swing.py;
+                      quaternion: the axes of the body
+
+    Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.
+    """
+    pos, quat, rot, S, O = work.pos2, work.quat2, work.rot2, work.S2, work.origin
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        b = model.joint_parent_point[i]
+        f = model.joint_offset[i]
+        r = (b[0], b[1], b[2])
+        Q = (f[0], f[1], f[2], f[3])
+        o = r
+        if p >= 0:
+            r = rotate(rot, p, b[0], b[1], b[2])
+            Q = quat_mul(quat[p, 0], quat[p, 1], quat[p, 2], quat[p, 3], f[0], f[1], f[2], f[3])
+            o = (pos[p, 0] + r[0], pos[p, 1] + r[1], pos[p, 2] + r[2])
+        if model.joint_ntrans[i] > 0:
+            o = translate(model, q, i, o, Q, S)
+        g = Q
+        if model.joint_nrot[i] > 0:
+            t = joint_rotation(model, q, i)
+            g = quat_mul(Q[0], Q[1], Q[2], Q[3], t[0], t[1], t[2], t[3])
+        R = quat_matrix(g[0], g[1], g[2], g[3])
+        for k in range(4):
+            quat[i, k] = g[k]
+        for k in range(9):
+            rot[i, k] = R[k]
+        rotation_columns(model, q, i, R, (o[0] - O[0], o[1] - O[1], o[2] - O[2]), S)
+        c = model.joint_child_point[i]
+        e = times(R, c[0], c[1], c[2])
+        for k in range(3):
+            work.arm[i, k] = r[k]
+            work.arm[i, 3 + k] = e[k]
+            pos[i, k] = o[k] - e[k]
+
+
+@kernel
+def velocity_columns(model: Model, S: Matrix, v: Vector, h: float, out: Matrix) -> None:
+    """out = d(pose)/d(v) at the end of a step: h S, and h S J(h w) for quaternion joints.  S, out: (nv, 6)."""
+    for i in range(model.body_parent.shape[0]):
+        d = model.body_vadr[i]
+        n = model.body_vadr[i + 1] - d
+        if model.joint_nrot[i] == 3:
+            n -= 3
+            e = d + n
+            J = left_jacobian(h * v[e], h * v[e + 1], h * v[e + 2])
+            for k in range(6):
+                a = h * S[e, k]
+                b = h * S[e + 1, k]
+                c = h * S[e + 2, k]
+                out[e, k] = a * J[0] + b * J[3] + c * J[6]
+                out[e + 1, k] = a * J[1] + b * J[4] + c * J[7]
+                out[e + 2, k] = a * J[2] + b * J[5] + c * J[8]
+        for e in range(d, d + n):
+            for k in range(6):
+                out[e, k] = h * S[e, k]

@@ -1,0 +1,126 @@
+"""Directions of the forces of loops where two branches of the motion meet at configuration 2.
+
+There a combination of constraints, w = sum of c G, all but vanishes: the links of a parallelogram lie in one line, and
+no force along them turns it. On the way through w changes its sign, and its direction on the branch of the motion is
+
+    dw = sum of c (G at 3 - G at 1) / 2        modulo the other rows, in joint coordinates
+
+with 3 where the velocity before leads, then where that of the solution does. It takes the place of w where w is small
+against it; of a constraint that says nothing anywhere, dw vanishes too. A force along dw does no work from 1 to 3.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.displacements import Increment, tree_moves, turn_bodies
+from sim.dynamics.loops.closure import loop_rows
+from sim.dynamics.loops.constraint_rows import add_along_path
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from solvers.jit import kernel
+
+_MEETING = 0.02  # |w| / |dw|
+_ROUNDING = 1e-10  # share of the largest w
+_SPOKEN = 0.1  # share of dw in the change of a row; less is a redundant one whose combination changes
+
+
+@kernel
+def _largest(a: Vector) -> float:
+    """Largest absolute entry."""
+    most = 0.0
+    for k in range(a.shape[0]):
+        most = max(most, abs(a[k]))
+    return most
+
+
+@kernel
+def _add_directions(model: Model, work: Work, S: Matrix, B: Matrix, sign: float, out: Matrix) -> None:
+    """out[row] += sign S^T B, the generalized impulses of unit forces of the rows of loops."""
+    for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0], model.coupling_body.shape[0]):
+        for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
+            add_along_path(model, S, model.coupling_body[k, 0], sign, B[row], out[row])
+            add_along_path(model, S, model.coupling_body[k, 1], -sign, B[row], out[row])
+
+
+@kernel
+def _next_pivot(work: Work, first: int, last: int) -> tuple[int, int, float, float]:
+    """Row and column of the largest entry of w in the rows that are left, its size, and that of dw."""
+    row, col = -1, 0
+    best = 0.0
+    change = 0.0
+    for r in range(first, last):
+        if work.loop_used[r] != 0:
+            continue
+        change = max(change, _largest(work.loop_lead[r]))
+        w = work.couple_Y[r]
+        for c in range(w.shape[0]):
+            if abs(w[c]) > best:
+                best = abs(w[c])
+                row, col = r, c
+    return row, col, best, change
+
+
+@kernel
+def _eliminate(work: Work, first: int, last: int, p: int, c: int) -> None:
+    """Row p out of the rows that are left: w and dw combined as w says, and dw modulo the row p."""
+    w = work.couple_Y[p]
+    dw = work.loop_lead[p]
+    work.loop_used[p] = 1
+    for r in range(first, last):
+        if work.loop_used[r] != 0:
+            continue
+        f = work.couple_Y[r, c] / w[c]
+        for d in range(w.shape[0]):
+            work.couple_Y[r, d] -= f * w[d]
+            work.loop_lead[r, d] -= f * dw[d]
+        work.couple_Y[r, c] = 0.0
+        f = work.loop_lead[r, c] / w[c]
+        for d in range(w.shape[0]):
+            work.loop_lead[r, d] -= f * w[d]
+
+
+@kernel
+def _set_rows(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+    """couple_Y = w at configuration 2 and loop_lead = dw, row by row; loop_scale = sizes of dw."""
+    for row in range(work.loop_lead.shape[0]):
+        for d in range(work.loop_lead.shape[1]):
+            work.couple_Y[row, d] = 0.0
+            work.loop_lead[row, d] = 0.0
+    tree_moves(model, work, Increment(q, v, h), True)
+    turn_bodies(work, work.rot3)
+    _add_directions(model, work, work.S2, work.couple_B, 1.0, work.couple_Y)
+    for m in range(model.loop_ntrans.shape[0]):
+        loop_rows(model, work, m, work.pos3, work.rot3, work.couple_G)
+    _add_directions(model, work, work.S3, work.couple_G, 0.5, work.loop_lead)
+    for m in range(model.loop_ntrans.shape[0]):
+        loop_rows(model, work, m, work.pos1, work.rot1, work.couple_G)
+    _add_directions(model, work, work.S1, work.couple_G, -0.5, work.loop_lead)
+
+
+@kernel
+def lead_loops(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+    """loop_lead[row] = dw where it takes the place of a row of couple_B, which is 0 then; loop_led: how many.
+
+    q: (nq,) configuration 2; v: (nv,) a velocity that leads to 3; couple_B: directions at configuration 2.
+    """
+    work.loop_led[0] = 0
+    pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
+    first, last = int(model.coupling_row[pairs]), int(model.coupling_row[model.coupling_body.shape[0]])
+    _set_rows(model, work, h, q, v)
+    size = 0.0
+    for row in range(first, last):
+        work.loop_used[row] = 0
+        work.loop_scale[row] = _largest(work.loop_lead[row])
+        size = max(size, _largest(work.couple_Y[row]))
+    for _ in range(first, last):
+        row, col, best, change = _next_pivot(work, first, last)
+        if row < 0 or best < _MEETING * change:
+            break
+        _eliminate(work, first, last, row, col)
+    for row in range(first, last):
+        dw = _largest(work.loop_lead[row])
+        led = work.loop_used[row] == 0 and dw > max(_SPOKEN * work.loop_scale[row], _ROUNDING * size)
+        for d in range(work.loop_lead.shape[1]):
+            work.loop_lead[row, d] = work.loop_lead[row, d] / dw if led else 0.0
+        for c in range(6):
+            work.couple_B[row, c] = 0.0 if led else work.couple_B[row, c]
+        work.loop_led[0] += 1 if led else 0

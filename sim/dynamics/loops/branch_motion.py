@@ -1,0 +1,131 @@
+"""Motion of closed loops: where a step begins to look for its velocity, so that it stays on its branch.
+
+Where two branches of a loop's motion meet, the links of a parallelogram in one line, the equations of a step have a
+solution on each, as near to one another as configuration 3 to the place where they meet. The solution is that of the
+branch of configurations 1 and 2, which Newton's method finds from a start closer to it than that: the leapfrog start
+2 P v - v (loop_velocity.py), off by O(h^3), where the incoming velocity is off by O(h^2). Of two solutions the one that
+is closer to it is taken.
+
+All that costs as much as the step, and where no branches are near it changes nothing. The least pivot of the dense
+system (coupling_system.py) is the product of the distances of configurations 2 and 3 from singular ones: where it is
+not small in the step before, the step is solved from its guess as if there were no branches, and where it is not small
+then either, that is the solution. At a singular configuration itself a constraint depends on others; how many always
+do is counted along the motion, whose first step takes the long way.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.energy import factor_mass_matrix
+from sim.dynamics.loops.bifurcation import lead_loops
+from sim.dynamics.loops.closure import direct_loops, start_loops
+from sim.dynamics.loops.loop_velocity import close_velocity
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_CLOSER = 0.5  # share of a least pivot
+_REGULAR = 5e-3  # a pivot above this is far from where branches meet
+_ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
+
+
+@optional(Slot.LOOPS_REGULAR, default=True)
+def loops_regular(model: Model, work: Work) -> bool:
+    """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
+    work.loop_led[0] = 0
+    if work.counts[3] == 0:
+        work.couple_rank[3] = 1e300
+        return False
+    deficiency = work.couple_rank[1] - work.couple_rank[0]
+    work.couple_rank[3] = min(work.couple_rank[3], deficiency)
+    regular = deficiency == work.couple_rank[3] and work.couple_rank[2] > _REGULAR
+    work.couple_rank[2] = 0.0
+    return regular
+
+
+@optional(Slot.STAY_REGULAR, default=True)
+def stay_regular(model: Model, work: Work, status: int) -> bool:
+    """Whether this step is as far, too; if not, the forces of loops are zero again."""
+    deficiency = work.couple_rank[1] - work.couple_rank[0]
+    if status == _SOLVED and work.couple_rank[2] > _REGULAR and deficiency <= work.couple_rank[3]:
+        return True
+    start_loops(model, work, False)
+    return False
+
+
+@optional(Slot.PREDICT_LOOPS, default=False)
+def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
+    """loop_velocity = 2 P v - v, and its directions of forces (bifurcation.py); False if a guess is not v.
+
+    q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2. Where loops are open v need not be along them; then
+    the start is P v.
+    """
+    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, work):
+        return False
+    given = False
+    for d in range(v.shape[0]):
+        given = given or guess[d] != v[d]
+        work.loop_velocity[d] = v[d]
+    close_velocity(model, work, h, q, v, work.loop_velocity)
+    across = 0.0
+    whole = 0.0
+    for d in range(v.shape[0]):
+        across = max(across, abs(v[d] - work.loop_velocity[d]))
+        whole = max(whole, abs(v[d]))
+    for d in range(v.shape[0]):
+        if across < _ACROSS * whole:
+            work.loop_velocity[d] += work.loop_velocity[d] - v[d]
+    work.loop_pivot[0] = work.couple_rank[2]
+    _no_step(work)
+    return not given
+
+
+@optional(Slot.LEAD_AGAIN, default=False)
+def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
+    """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
+    if work.loop_led[0] == 0:
+        return False
+    for d in range(work.nu.shape[0]):
+        work.loop_velocity[d] = work.nu[d]
+    _no_step(work)
+    direct_loops(model, work)
+    lead_loops(model, work, h, q, work.loop_velocity)
+    return True
+
+
+@optional(Slot.MEET_AHEAD, default=False)
+def meet_ahead(model: Model, work: Work) -> bool:
+    """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
+
+    Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
+    """
+    if work.loop_led[0] > 0 or not work.couple_rank[2] < _CLOSER * work.loop_pivot[0]:
+        return False
+    for d in range(work.nu.shape[0]):
+        work.loop_kept[d] = work.nu[d]
+        work.loop_start[d] = 2.0 * work.loop_velocity[d] - work.nu[d]
+    _no_step(work)
+    return True
+
+
+@optional(Slot.IS_FARTHER, default=False)
+def is_farther(model: Model, work: Work, status: int) -> bool:
+    """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
+    kept = 0.0
+    found = 0.0
+    for d in range(work.nu.shape[0]):
+        kept += (work.loop_kept[d] - work.loop_velocity[d]) ** 2
+        found += (work.nu[d] - work.loop_velocity[d]) ** 2
+        work.loop_start[d] = work.loop_kept[d]
+    _no_step(work)
+    return status != _SOLVED or found > (1.0 + 1e-6) * kept
+
+
+@kernel
+def _no_step(work: Work) -> None:
+    """The forces of loops are those that a solve begins with."""
+    for row in range(work.couple_step.shape[0]):
+        work.couple_step[row] = 0.0

@@ -1,0 +1,131 @@
+"""What couples branches of the tree: pairs of bodies in contact, and closed loops, as a small dense system.
+
+A coupling of the bodies a and b adds B f to the wrench on a and takes it from that on b, about O:
+
+    pairs in contact    (K_a, K_b) = B D R        f/D - R_a zeta_a - R_b zeta_b = 0
+    closed loop         B = G2^T                      - G3 zeta_a + G3 zeta_b = g
+
+K are the derivatives of the wrench by the twists of the bodies, of rank six at most; taking them apart keeps the
+stiffness D of contacts, up to 1e16, out of the sums. With the tree eliminated, twists are zeta = zeta_0 + Z f, where
+zeta_0 answers the right-hand side and Z the unit forces:
+
+    (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
+
+so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row, those of gears (gears.py)
+come last; couple_live names those that the dense system has: not those of far pairs, nor those without stiffness.
+Constraints that say nothing new (a planar loop in space) are found by the pivots, and their forces set to zero; their
+rows are rounding, and kept so by a scale that does not look at directions.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.elimination import solve
+from sim.dynamics.loops.constraint_rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from sim.model.slots import Slot
+from solvers.full_lu import full_lu_factor, full_lu_solve
+from solvers.jit import kernel
+from solvers.optional import optional
+
+_DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
+
+
+@kernel
+def scale_row(T: Matrix, p: int, size: float) -> float:
+    """Divide row p by its largest entry, or by `size` when that is larger; returns one over it."""
+    largest = size
+    for q in range(T.shape[1]):
+        largest = max(largest, abs(T[p, q]))
+    scale = 1.0 / largest if largest > 0.0 else 1.0
+    for q in range(T.shape[1]):
+        T[p, q] *= scale
+    return scale
+
+
+@optional(Slot.FACTOR_COUPLING, default=True)
+def factor_coupling(model: Model, work: Work) -> bool:
+    """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
+    n = enlist(model, work)
+    T = work.couple_T[:n, :n]
+    pairs = 0
+    for p in range(n):
+        work.couple_scale[p] = 0.0
+    for q in range(n):
+        col, k = work.couple_live[q, 0], work.couple_live[q, 1]
+        unit_impulse(model, work, q, work.rhs)
+        y = work.couple_Y[col]
+        solve(model, work, work.rhs, y)
+        for p in range(n):
+            T[p, q] = -row_response(model, work, p, y)
+            m = work.couple_live[p, 1]
+            if is_loop(model, m) and m < model.coupling_body.shape[0]:
+                work.couple_scale[p] = max(work.couple_scale[p], response_size(model, work, m, work.couple_live[p, 0]))
+        if not is_loop(model, k):
+            T[q, q] += work.couple_E[col]
+            pairs += 1
+    for p in range(n):
+        work.couple_scale[p] = scale_row(T, p, work.couple_scale[p])
+    least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
+    rank = full_lu_factor(T, work.couple_pivots, least)
+    work.couple_rank[0] = rank
+    work.couple_rank[1] = n
+    work.couple_rank[2] = 1.0
+    for p in range(rank):
+        work.couple_rank[2] = min(work.couple_rank[2], abs(T[p, p]))
+    return rank >= pairs
+
+
+@optional(Slot.SOLVE_COUPLING)
+def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
+    """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
+
+    share: part of the loop gaps to close.
+    """
+    n = int(work.couple_rank[1])
+    x = work.couple_x[:n]
+    for p in range(n):
+        gap = share * work.couple_gap[work.couple_live[p, 0]]
+        x[p, 0] = work.couple_scale[p] * (gap + row_response(model, work, p, out))
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), x)
+    for row in range(work.couple_step.shape[0]):
+        work.couple_step[row] = 0.0
+    for p in range(n):
+        f = x[p, 0]
+        row = work.couple_live[p, 0]
+        work.couple_step[row] = f
+        Y = work.couple_Y[row]
+        for d in range(out.shape[0]):
+            out[d] += f * Y[d]
+    body_twists(model, work, out)
+
+
+@kernel
+def body_twists(model: Model, work: Work, y: Vector) -> None:
+    """twist[i] = twist[parent] + S3nu y."""
+    for i in range(model.body_parent.shape[0]):
+        p = model.body_parent[i]
+        V = work.twist[i]
+        for k in range(6):
+            V[k] = work.twist[p, k] if p >= 0 else 0.0
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            for k in range(6):
+                V[k] += work.S3nu[d, k] * y[d]
+
+
+@optional(Slot.SOLVE_COUPLING_PANEL)
+def solve_coupling_panel(model: Model, work: Work) -> None:
+    """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
+    n = int(work.couple_rank[1])
+    X = work.couple_panel[:n]
+    for p in range(n):
+        add_columns(model, work, p, X[p])
+        for m in range(X.shape[1]):
+            X[p, m] *= work.couple_scale[p]
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X)
+    for p in range(n):
+        Y = work.couple_Y[work.couple_live[p, 0]]
+        for d in range(work.columns.shape[0]):
+            f = Y[d]
+            for m in range(X.shape[1]):
+                work.columns[d, m] += f * X[p, m]

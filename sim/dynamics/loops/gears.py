@@ -1,0 +1,80 @@
+"""Gears: rows of the dense system of the couplings that act on joint coordinates instead of bodies.
+
+    g = q3_a - ratio q3_b - offset = 0        impulse f on coordinate a, -ratio f on coordinate b
+
+They come after the rows of pairs and loops. Their directions are constant, so they add nothing to derivatives but g.
+"""
+
+from __future__ import annotations
+
+from sim.model.data import Work
+from sim.model.model import Matrix, Model, Vector
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+
+
+@kernel
+def gear_row(model: Model, k: int) -> int:
+    """Row of gear k in the dense system."""
+    return int(model.coupling_row[model.coupling_body.shape[0]]) + k
+
+
+@optional(Slot.APPLY_GEARS, default=0.0)
+def apply_gears(model: Model, work: Work, h: float) -> float:
+    """residual -= impulses of gears; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap.
+
+    Impulses of loops along directions in joint space (bifurcation.py) are taken off too.
+    """
+    error = 0.0
+    for k in range(model.gear_dof.shape[0]):
+        a = model.gear_dof[k, 0]
+        b = model.gear_dof[k, 1]
+        row = gear_row(model, k)
+        gap = work.theta3[model.dof_qadr[a]] - model.gear_ratio[k] * work.theta3[model.dof_qadr[b]]
+        work.couple_gap[row] = gap - model.gear_offset[k]
+        work.gear_rate[k, 0] = h
+        work.gear_rate[k, 1] = -h * model.gear_ratio[k]
+        work.residual[a] -= work.couple_force[row]
+        work.residual[b] += model.gear_ratio[k] * work.couple_force[row]
+        error = max(error, abs(work.couple_gap[row]))
+    if work.loop_led[0] > 0:
+        for row in range(gear_row(model, 0)):
+            for d in range(work.residual.shape[0]):
+                work.residual[d] -= work.couple_force[row] * work.loop_lead[row, d]
+    return error
+
+
+@kernel
+def unit_gear_impulse(model: Model, k: int, out: Vector) -> None:
+    """out (nv,) = the generalized impulse of gear k, of size one."""
+    for d in range(out.shape[0]):
+        out[d] = 0.0
+    out[model.gear_dof[k, 0]] += 1.0
+    out[model.gear_dof[k, 1]] -= model.gear_ratio[k]
+
+
+@kernel
+def gear_response(model: Model, work: Work, k: int, y: Vector) -> float:
+    """d(gap of gear k)/d(v25) y."""
+    return work.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + work.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
+
+
+@kernel
+def add_gear_columns(model: Model, work: Work, k: int, x: Vector) -> None:
+    """x += d(gap of gear k)/d(v25) of the columns."""
+    a = work.columns[model.gear_dof[k, 0]]
+    b = work.columns[model.gear_dof[k, 1]]
+    for m in range(x.shape[0]):
+        x[m] += work.gear_rate[k, 0] * a[m] + work.gear_rate[k, 1] * b[m]
+
+
+@kernel
+def gear_derivatives(model: Model, X: Matrix) -> None:
+    """X[row of gear] = d(gap)/d(q2)."""
+    for k in range(model.gear_dof.shape[0]):
+        row = gear_row(model, k)
+        for m in range(X.shape[1]):
+            X[row, m] = 0.0
+        X[row, model.gear_dof[k, 0]] += 1.0
+        X[row, model.gear_dof[k, 1]] -= model.gear_ratio[k]

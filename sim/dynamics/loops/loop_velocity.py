@@ -1,0 +1,57 @@
+"""What closed loops and gears leave of a velocity at one moment: its nearest one in the kinetic metric.
+
+    P v = v - M^-1 G^T (G M^-1 G^T)^-1 G v        M, G at configuration 2
+
+With v = M^-1 p, p without the half of the loops' impulses that acts at the node, P v is the velocity at the node.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.loops.bifurcation import lead_loops
+from sim.dynamics.loops.closure import direct_loops
+from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.slots import Slot
+from solvers.jit import kernel
+from solvers.optional import optional
+
+_WEAK = 1e-3  # a pivot of G M^-1 G^T above this is that of a configuration where no branches meet
+
+
+@kernel
+def _set_rows(model: Model, work: Work) -> None:
+    """couple_R = (B, -B) of loops, and unit rates of gears; no pairs of bodies."""
+    pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
+    for k in range(pairs):
+        work.coupling_live[k] = 0
+    for row in range(model.coupling_row[pairs], model.coupling_row[model.coupling_body.shape[0]]):
+        for c in range(6):
+            work.couple_R[row, c] = work.couple_B[row, c]
+            work.couple_R[row, 6 + c] = -work.couple_B[row, c]
+    for k in range(model.gear_dof.shape[0]):
+        work.gear_rate[k, 0] = 1.0
+        work.gear_rate[k, 1] = -model.gear_ratio[k]
+
+
+@optional(Slot.CLOSE_VELOCITY)
+def close_velocity(model: Model, work: Work, h: float, q: Vector, v: Vector, out: Vector) -> None:
+    """out = P out, with the mass matrix of configuration 2 factored; its twists in work.twist.
+
+    q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2, which tells the branch where two meet: there rows
+    of G are those of bifurcation.py.   out: (nv,).
+    """
+    direct_loops(model, work)
+    work.loop_led[0] = 0
+    _set_rows(model, work)
+    solved = factor_coupling(model, work)
+    loops = model.loop_ntrans.shape[0] > 0
+    if loops and (work.couple_rank[0] < work.couple_rank[1] or work.couple_rank[2] < _WEAK):
+        lead_loops(model, work, h, q, v)
+        _set_rows(model, work)
+        work.loop_led[1] = 1
+        solved = factor_coupling(model, work)
+    if solved:
+        body_twists(model, work, out)
+        solve_coupling(model, work, 0.0, out)
+    work.loop_led[1] = 0

@@ -1,0 +1,181 @@
+"""Adjoint sweep: gradient of a scalar of a rollout, one step at a time from its end.
+
+    l_T = dL/dx_T,    l_t = A_t^T l_t+1 + dL/dx_t,    dL/du_t = B_t^T l_t+1,    dL/dp = sum_t -y_t^T dR_t/dp
+
+A step's unknown v25 feels a parameter by -H^-1 dR/dp, so y = H^-T w with w the gradient by v25, and a parameter costs
+a column of dR and a scalar product. Each step is solved anew from its state (its solution is known: one iteration), so
+the sweep keeps nothing but one step: its memory is that of the trajectory and of the gradient.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.derivatives.parameters.columns import clear_columns, fill_columns
+from sim.derivatives.parameters.directions import At, Effect
+from sim.derivatives.parameters.height_columns import add_height_gradient
+from sim.dynamics.elimination_panel import column_count, solve_panel
+from sim.dynamics.loops.coupling_system import solve_coupling_panel
+from sim.integrators.rollout import Cube, Linearized, linearize
+from sim.model.data import Work
+from sim.model.layout import model_view, work_view
+from sim.model.model import IntegerMatrix, Matrix, Model, Vector
+from sim.model.pace import DEADLINE
+from solvers.clock import seconds
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.rotation import left_jacobian
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_TIME_STEP = int(Effect.TIME_STEP)
+
+
+class Sweep(NamedTuple):
+    """A trajectory, the loss, and its gradients."""
+
+    xs: Matrix  # (T + 1, nx)
+    us: Matrix  # (T, nu)
+    loss: Matrix  # (T + 1, ndx) dL/dx_t
+    A: Cube  # (1, ndx, ndx) of one step
+    B: Cube  # (1, ndx, nu)
+    x_next: Matrix  # (1, nx)
+    report: Matrix  # (1, 6) of the last step that was tried; zeros at first
+    costate: Matrix  # (2, ndx) in and out, the first row: dL/dx_T at first, dL/dx_0 in the end
+    inputs: Matrix  # (T, nu) out
+    parameters: Vector  # (nparameter,) out
+    w: Vector  # (nv,) gradient by v25
+    y: Vector  # (nv + nrow,) gradient by the residual of a step and by the gaps of its loops
+    twists: Matrix  # (12, 6)
+    below: Vector  # (nbody,)
+    places: Matrix  # (1, 3 nground) scratch
+    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) when not asked for
+
+
+@kernel
+def sweep(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    line: Sweep,
+    terms: IntegerMatrix,
+    weights: Vector,
+    left: int,
+) -> int:
+    """Gradients of the loss by the first `left` steps; returns how many are still left.
+
+    Without the report of an unsolved step, which is the last of those left, that is none, or the deadline is over.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    n = line.costate.shape[1]
+    nq = line.xs.shape[1] - n // 2
+    costate, before = line.costate[0], line.costate[1]
+    for t in range(left - 1, -1, -1):
+        for k in range(line.xs.shape[1]):
+            line.x_next[0, k] = line.xs[t + 1, k]
+        one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], line.A, line.B, line.x_next, line.report)
+        linearize(model_at, work_at, settings, (0, 0, 1), 1, one)
+        if line.report[0, 0] != _SOLVED:
+            return t + 1
+        if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
+            at = At(settings[0], line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
+            _add_parameters(model, work, at, line, terms, weights)
+        for j in range(line.us.shape[1]):
+            s = 0.0
+            for i in range(n):
+                s += line.B[0, i, j] * costate[i]
+            line.inputs[t, j] = s
+        for j in range(n):
+            before[j] = line.loss[t, j]
+        for i in range(n):
+            for j in range(n):
+                before[j] += line.A[0, i, j] * costate[i]
+        for j in range(n):
+            costate[j] = before[j]
+        if seconds() > settings[DEADLINE]:
+            return t
+    return 0
+
+
+@kernel
+def _velocity_gradient(model: Model, work: Work, h: float, costate: Vector, w: Vector) -> None:
+    """w = l_v + h l_q, h J(h w) l_q of quaternions: gradient by v25."""
+    nv = w.shape[0]
+    for d in range(nv):
+        w[d] = costate[nv + d] + h * costate[d]
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] != 3:
+            continue
+        d = model.body_vadr[i + 1] - 3
+        J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+        for r in range(3):
+            w[d + r] = costate[nv + d + r] + h * (
+                J[3 * r] * costate[d] + J[3 * r + 1] * costate[d + 1] + J[3 * r + 2] * costate[d + 2]
+            )
+
+
+@kernel
+def _residual_gradient(model: Model, work: Work, w: Vector, y: Vector) -> None:
+    """y = H^-T w: scalar products of w with the columns of H^-1, as many at once as fit."""
+    nv = w.shape[0]
+    width = column_count(model, work)
+    first = 0
+    while first < y.shape[0]:
+        clear_columns(work)
+        count = min(width, y.shape[0] - first)
+        for m in range(count):
+            if first + m < nv:
+                work.columns[first + m, m] = 1.0
+            else:
+                work.couple_panel[first + m - nv, m] = 1.0
+        solve_panel(model, work)
+        solve_coupling_panel(model, work)
+        for m in range(count):
+            s = 0.0
+            for d in range(nv):
+                s += w[d] * work.columns[d, m]
+            y[first + m] = s
+        first += width
+
+
+@kernel
+def _add_parameters(model: Model, work: Work, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
+    """parameters += what this step adds."""
+    costate, w, y = line.costate[0], line.w, line.y
+    nv = w.shape[0]
+    _velocity_gradient(model, work, at.h, costate, w)
+    _residual_gradient(model, work, w, y)
+    if line.heights.shape[1] > 0:
+        add_height_gradient(model, work, at.h, y, line.places, line.heights)
+    width = column_count(model, work)
+    count = line.parameters.shape[0]
+    first = 0
+    start = 0
+    while first < count:
+        end = fill_columns(model, work, at, terms, weights, first, start)
+        for m in range(min(width, count - first)):
+            s = 0.0
+            for d in range(nv):
+                s += y[d] * work.columns[d, m]
+            for row in range(work.couple_panel.shape[0]):
+                s += y[nv + row] * work.couple_panel[row, m]
+            line.parameters[first + m] += s
+        for t in range(start, end):
+            if terms[t, 0] == _TIME_STEP:
+                line.parameters[terms[t, 3]] += weights[t] * _time_gradient(work, at, line.A[0], costate, w)
+        first += width
+        start = end
+
+
+@kernel
+def _time_gradient(work: Work, at: At, A: Matrix, costate: Vector, w: Vector) -> float:
+    """w.(A_vv v15 - v25)/h + l_q.v25, the part of dL/dh that does not go through dR/dh; see parameter_jacobian.py."""
+    nv = w.shape[0]
+    s = 0.0
+    for d in range(nv):
+        z = -work.nu[d]
+        for k in range(nv):
+            z += A[nv + d, nv + k] * at.v[k]
+        s += w[d] * z / at.h + costate[d] * work.nu[d]
+    return s

@@ -1,0 +1,199 @@
+"""Derivatives of Hamilton's equations of a tree (hamilton.py), for columns S_d and S_k of joints on one branch.
+
+A displacement by S_k moves everything behind joint k rigidly, at fixed joint velocities against the twist V before k:
+with a_k = S_k x V, composite inertias I and derivatives N of the wrenches from outside by a displacement, both of the
+subtree, x the cross product of twists and * that of a twist and a wrench,
+
+    of        by q_k, d behind k                             by q_k, k behind d             by v_k
+    p_d       -I S_d . a_k                                   S_d . G_k                      S_d . I S_k
+    p_d'      -(S_d*P + I S_d') . a_k + (S_d*F + N^T S_d) . S_k
+                                                             S_d' . G_k + S_d . N S_k       (S_d*P + I S_d') . S_k
+                                                                                            or  S_d' . I S_k
+
+with G_k = S_k*P - I a_k, everything of the body that lies deeper. The momenta of a free root have S_d = 1, S_d' = 0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.dynamics.elimination import add_children, factor
+from sim.dynamics.elimination_panel import solve_panel
+from sim.dynamics.energy import armature_blocks, spatial_inertia
+from sim.dynamics.external_forces import input_slopes, outer_slopes
+from sim.dynamics.joints.ball_spring import relative_to_rest
+from sim.integrators.hamilton import column_rate
+from sim.model.data import Work
+from sim.model.model import Integers, Matrix, Model, Vector
+from solvers.dense import dot
+from solvers.jit import kernel
+from solvers.rotation import cross
+
+
+class Slopes(NamedTuple):
+    """Derivatives of momenta p and of their rates f by coordinates, velocities and inputs, in tangent coordinates."""
+
+    p_q: Matrix  # (nv, nv)
+    p_v: Matrix  # (nv, nv)
+    f_q: Matrix  # (nv, nv)
+    f_v: Matrix  # (nv, nv)
+    f_u: Matrix  # (nv, nu)
+    column: Matrix  # (nv, 42) a_k, S_k', I S_k, S_k*P + I S_k', S_k*F + N^T S_k, G_k, N S_k
+
+
+@kernel
+def _star(S: Vector, f: Vector, out: Vector) -> None:
+    """out[:6] = S* f = (w x f, w x n + v x f) of the twist S = (v, w) and the wrench f = (f, n)."""
+    out[0], out[1], out[2] = cross(S[3], S[4], S[5], f[0], f[1], f[2])
+    a, b, c = cross(S[3], S[4], S[5], f[3], f[4], f[5])
+    x, y, z = cross(S[0], S[1], S[2], f[0], f[1], f[2])
+    out[3], out[4], out[5] = a + x, b + y, c + z
+
+
+@kernel
+def _add_mul(A: Vector, x: Vector, sign: float, transposed: bool, out: Vector) -> None:
+    """out[:6] += sign A x or A^T x, A 6 x 6 row-major."""
+    for r in range(6):
+        t = 0.0
+        for k in range(6):
+            t += A[6 * k + r if transposed else 6 * r + k] * x[k]
+        out[r] += sign * t
+
+
+@kernel
+def _columns(model: Model, work: Work, out: Matrix) -> None:
+    """The vectors of every column, (nv, 42).   work.A1, A2: I and N of the subtrees; work.balance: F."""
+    for i in range(model.body_parent.shape[0]):
+        V, p = work.wrench[0], model.body_parent[i]
+        for k in range(6):
+            V[k] = work.twist[p, k] if p >= 0 else 0.0
+        J, N, P, F = work.A1[i], work.A2[i], work.subtree[i], work.balance[i]
+        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            S, c = work.S2[d], out[d]
+            a, b = cross(S[3], S[4], S[5], V[0], V[1], V[2]), cross(S[0], S[1], S[2], V[3], V[4], V[5])
+            c[0], c[1], c[2] = a[0] + b[0], a[1] + b[1], a[2] + b[2]
+            c[3], c[4], c[5] = cross(S[3], S[4], S[5], V[3], V[4], V[5])
+            c[6], c[7], c[8], c[9], c[10], c[11] = column_rate(model, work, i, d)
+            for k in range(12, 42):
+                c[k] = 0.0
+            _add_mul(J, S, 1.0, False, c[12:18])
+            _star(S, P, c[18:24])
+            _star(S, P, c[30:36])
+            _add_mul(J, c[6:12], 1.0, False, c[18:24])
+            _star(S, F, c[24:30])
+            _add_mul(N, S, 1.0, True, c[24:30])
+            _add_mul(J, c[0:6], -1.0, False, c[30:36])
+            _add_mul(N, S, 1.0, False, c[36:42])
+            if d < model.body_vadr[i] + model.joint_ntrans[i]:  # what lies before the rotations of a joint
+                for k in range(6):
+                    V[k] += S[k] * work.nu[d]
+
+
+@kernel
+def _pair(S: Matrix, slopes: Slopes, d: int, k: int, behind: bool) -> None:
+    """Entry (d, k); behind: d moves with k."""
+    a, b = slopes.column[d], slopes.column[k]
+    if behind:
+        slopes.p_q[d, k] = -dot(a[12:18], b[0:6])
+        slopes.f_q[d, k] = dot(a[24:30], S[k]) - dot(a[18:24], b[0:6])
+        slopes.p_v[d, k] = dot(a[12:18], S[k])
+        slopes.f_v[d, k] = dot(a[18:24], S[k])
+    else:
+        slopes.p_q[d, k] = dot(S[d], b[30:36])
+        slopes.f_q[d, k] = dot(a[6:12], b[30:36]) + dot(S[d], b[36:42])
+        slopes.p_v[d, k] = dot(S[d], b[12:18])
+        slopes.f_v[d, k] = dot(a[6:12], b[12:18])
+
+
+@kernel
+def _tree_pairs(model: Model, work: Work, free: Integers, slopes: Slopes) -> None:
+    """p_q, p_v, f_q, f_v without joint forces."""
+    S = work.S2
+    for d in range(model.dof_body.shape[0]):
+        i = model.dof_body[d]
+        turns = model.body_vadr[i] + model.joint_ntrans[i]
+        for k in range(model.body_vadr[i], model.body_vadr[i + 1]):
+            _pair(S, slopes, d, k, k <= d or (d >= turns and model.joint_nrot[i] == 3))
+        p = model.body_parent[i]
+        while p >= 0:
+            for k in range(model.body_vadr[p], model.body_vadr[p + 1]):
+                _pair(S, slopes, d, k, True)
+                _pair(S, slopes, k, d, False)
+            p = model.body_parent[p]
+    for d in range(model.dof_body.shape[0]):  # the rows of free roots are others
+        root = model.dof_body[d]
+        while model.body_parent[root] >= 0:
+            root = model.body_parent[root]
+        if free[root] == 1:
+            c = slopes.column[d]
+            for r in range(6):
+                e = model.body_vadr[root] + r
+                slopes.p_q[e, d], slopes.p_v[e, d] = c[30 + r], c[12 + r]
+                slopes.f_q[e, d], slopes.f_v[e, d] = c[36 + r], 0.0
+
+
+@kernel
+def _add_joint_slopes(model: Model, q: Vector, slopes: Slopes) -> None:
+    """f_q -= k, f_v -= d, p_v += armature; quaternions: -2 k c s with dc = -s.e/2, ds = (c e + s x e)/2."""
+    for i in range(model.body_parent.shape[0]):
+        stop = model.body_vadr[i + 1]
+        if model.joint_nrot[i] == 3:
+            stop -= 3
+            r = relative_to_rest(model, i, q)
+            g = model.dof_spring[stop]
+            for a in range(3):
+                for b in range(3):
+                    slopes.f_q[stop + a, stop + b] += g * r[1 + a] * r[1 + b]
+                b, c = (a + 1) % 3, (a + 2) % 3
+                slopes.f_q[stop + a, stop + a] -= g * r[0] * r[0]
+                slopes.f_q[stop + a, stop + c] -= g * r[0] * r[1 + b]
+                slopes.f_q[stop + a, stop + b] += g * r[0] * r[1 + c]
+        for d in range(model.body_vadr[i], stop):
+            slopes.f_q[d, d] -= model.dof_spring[d]
+    for d in range(slopes.p_v.shape[0]):
+        slopes.f_v[d, d] -= model.dof_damper[d]
+        slopes.p_v[d, d] += model.dof_armature[d]
+
+
+@kernel
+def slopes_at(model: Model, work: Work, free: Integers, u: Vector, out: Slopes) -> bool:
+    """All derivatives at the evaluation that is in `work`, and the factors of M; False when that is singular."""
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A1)
+    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
+    add_children(model, work.A1)
+    outer_slopes(model, work, u, work.A2)
+    _columns(model, work, out.column)
+    for d in range(out.p_q.shape[0]):
+        for k in range(out.p_q.shape[0]):
+            out.p_q[d, k] = out.p_v[d, k] = out.f_q[d, k] = out.f_v[d, k] = 0.0
+    _tree_pairs(model, work, free, out)
+    _add_joint_slopes(model, work.theta1, out)
+    input_slopes(model, work, free, out.f_u)
+    for d in range(work.nu.shape[0]):
+        for k in range(6):
+            work.S3nu[d, k] = work.S2[d, k]
+    armature_blocks(model, 1.0, work.joint_block)
+    return factor(model, work) != 0
+
+
+@kernel
+def velocity_slopes(model: Model, work: Work, free: Integers, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
+    """work.columns = dv of every direction (dq, dp), p_v dv = dp - p_q dq.   dq: tangent; both (nv, n)."""
+    X, n = work.columns, dq.shape[1]
+    for d in range(X.shape[0]):
+        for k in range(n):
+            X[d, k] = dp[d, k]
+        for e in range(X.shape[0]):
+            c = slopes.p_q[d, e]
+            if c != 0.0:
+                for k in range(n):
+                    X[d, k] -= c * dq[e, k]
+    for i in range(free.shape[0]):
+        if free[i] == 1:
+            d, w = model.body_vadr[i], work.wrench[0]
+            for k in range(n):
+                for r in range(6):
+                    w[r] = X[d + r, k]
+                for r in range(6):
+                    X[d + r, k] = dot(work.S2[d + r], w)
+    solve_panel(model, work)

@@ -1,0 +1,192 @@
+"""Steps of higher order of a motion with contacts and limits, where it is far from all of them.
+
+A step may leave out the impulses kappa/gap of all contacts and limits where together they are within its tolerance:
+
+    sum of kappa/g <= tolerance (1 + largest momentum),    g = (g0 + g1 - d)/2
+
+g0, g1 are lower bounds of a gap where the step begins and where it ends, and d = h max |speed| of its points at both:
+a path no longer than d between two places g0 and g1 from the ground is nowhere nearer to it than g. Paths are no longer
+than d while accelerations hardly change within a step. A step that turns out to be near is not taken.
+
+Columns of `far` here, at the first contact of a cluster:  0 gap, 1 speed, of the node in `work`.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import NamedTuple
+
+from sim.contact.contact_report import report_contacts
+from sim.contact.inactive import cluster_gap, highest
+from sim.integrators.rollout import Cube
+from sim.integrators.runge_kutta import Scheme, advance, begin
+from sim.mechanism.confined import IDLE
+from sim.model.data import Work
+from sim.model.layout import model_view, work_view
+from sim.model.model import Matrix, Model, Vector
+from sim.model.pace import is_due, start_pace
+from solvers.dense import copy, copy_vector
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.rotation import cross, quat_matrix, quat_turn
+from solvers.status import Status
+
+NEAR = -1  # in place of a Status: something is near
+
+_SOLVED = int(Status.SOLVED)
+
+
+@kernel
+def _speed(model: Model, work: Work, c: int) -> float:
+    """|v + w x r| of all points of the cluster at contact c is at most this: |v| + arm |w| of its body."""
+    i = model.contact_body[c]
+    V, o = work.twist[i], work.origin
+    x, y, z = cross(V[3], V[4], V[5], work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2])
+    x, y, z = x + V[0], y + V[1], z + V[2]
+    return sqrt(x * x + y * y + z * z) + model.cluster[c, 4] * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
+
+
+@kernel
+def _limit(model: Model, work: Work, k: int, v: Vector) -> tuple[float, float]:
+    """(gap, largest speed of the gap) of limit k, gaps as in joints/limits.py."""
+    d = model.limit_dof[k]
+    a = model.dof_qadr[d]
+    q = work.theta1
+    if not model.limit_cone[k]:
+        return model.limit_sign[k] * (q[a] - model.limit_bound[k]), abs(v[d])
+    axis, R = model.joint_axis[model.dof_body[d]], quat_matrix(q[a], q[a + 1], q[a + 2], q[a + 3])
+    along = 0.0
+    for j in range(3):
+        along += axis[j] * (R[3 * j] * axis[0] + R[3 * j + 1] * axis[1] + R[3 * j + 2] * axis[2])
+    scale = 1.0 / sin(model.limit_bound[k])
+    speed = sqrt(v[d] * v[d] + v[d + 1] * v[d + 1] + v[d + 2] * v[d + 2])
+    return scale * (along - cos(model.limit_bound[k])), scale * speed
+
+
+@kernel
+def _least(gap: float, speed: float, before: float, speed_before: float, travel: float) -> float:
+    """g of a step of `travel` times the larger speed; with travel < 0, of a node alone."""
+    return gap if travel < 0.0 else 0.5 * (before + gap - travel * max(speed, speed_before))
+
+
+@kernel
+def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> float:
+    """Sum of the impulses kappa/g over a step of length h to the node in `work`; of the node itself with h < 0.
+
+    Gaps and speeds of the node are kept for the step that begins there. 1e300 where something is not apart.
+    """
+    total = 0.0
+    for c in range(model.contact_height.shape[0]):
+        if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
+            row, speed = work.far[c], _speed(model, work, c)
+            gap = cluster_gap(model, work, c, highest(model, c), False)
+            g = _least(gap, speed, row[0], row[1], h)
+            row[0], row[1] = gap, speed
+            total = total + (model.cluster_end[c] - c) * kappa / g if g > 0.0 else 1e300
+    for k in range(model.limit_dof.shape[0]):
+        gap, speed = _limit(model, work, k, v)
+        g = _least(gap, speed, work.bound_gap[k], work.bound_w[k], h)
+        work.bound_gap[k], work.bound_w[k] = gap, speed
+        total = total + kappa / g if g > 0.0 else 1e300
+    return total
+
+
+@kernel
+def _allowed(scheme: Scheme, tolerance: float) -> float:
+    """tolerance (1 + largest momentum) of the node in `scheme`."""
+    most = 0.0
+    for d in range(scheme.momenta.shape[0]):
+        most = max(most, abs(scheme.momenta[d]))
+    return tolerance * (1.0 + most)
+
+
+@kernel
+def first_far(model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, xs: Matrix) -> int:
+    """The first of the states xs (n, nx) at which all is far; n where there is none."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    nq = work.theta1.shape[0]
+    for t in range(xs.shape[0]):
+        begin(model, work, scheme, xs[t])
+        if left_out(model, work, settings[1], xs[t, nq:], -1.0) <= _allowed(scheme, settings[2]):
+            return t
+    return xs.shape[0]
+
+
+@kernel
+def _leave(work: Work) -> None:
+    """Configuration 2 becomes configuration 1."""
+    copy(work.pos2, work.pos1)
+    copy(work.quat2, work.quat1)
+    copy(work.rot2, work.rot1)
+
+
+@kernel
+def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
+    """Contacts that carry nothing, with their gaps and mean slips, of the step from configuration 1 to 2."""
+    copy(work.pos2, work.pos3)
+    copy(work.quat2, work.quat3)
+    copy(work.rot2, work.rot3)
+    copy(work.pos1, work.pos2)
+    copy(work.quat1, work.quat2)
+    for i in range(work.pos2.shape[0]):
+        a, b, t = work.quat2[i], work.quat3[i], work.turn[i]
+        t[0], t[1], t[2], t[3] = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
+        for k in range(3):
+            work.move[i, k] = work.pos3[i, k] - work.pos2[i, k]
+    work.counts[1] = 0
+    for c in range(model.contact_height.shape[0]):
+        if model.cluster_end[c] > 0:
+            work.far_first[work.counts[1]] = c
+            work.counts[1] += 1
+        work.bounce[c, 0] = 0.0
+        for k in range(work.cone.shape[1]):
+            work.cone[c, k] = 0.0
+    report_contacts(model, work, h, out)
+    copy(work.pos3, work.pos2)
+    copy(work.quat3, work.quat2)
+
+
+class Flight(NamedTuple):
+    """Steps while all is far."""
+
+    us: Matrix  # (T, nu) in
+    xs: Matrix  # (T + 1, nx), of which xs[0] is given
+    reports: Matrix  # (T, 5)
+    contacts: Cube  # (T, ncontact, 11)
+
+
+@kernel
+def roll_far(
+    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
+) -> tuple[int, int]:
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is far.
+
+    Returns how many steps were taken, and why no more: SOLVED at the end of us or after the deadline, NEAR, or the
+    Status of the next.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    nq = work.theta1.shape[0]
+    h, kappa = settings[0], settings[1]
+    us, xs, reports = flight.us, flight.xs, flight.reports
+    start_pace(work, settings)
+    if first == 0:
+        begin(model, work, scheme, xs[0])
+    for t in range(first, us.shape[0]):
+        x = xs[t + 1]
+        copy_vector(xs[t], x)
+        allowed = _allowed(scheme, settings[2])
+        if left_out(model, work, kappa, x[nq:], -1.0) > allowed:
+            return t, NEAR
+        _leave(work)
+        status = advance(model, work, scheme, h, us[t], x, None)
+        reports[t, 0], reports[t, 1], reports[t, 4] = status, scheme.b.shape[0], -1.0
+        if status != _SOLVED:
+            return t, status
+        if left_out(model, work, kappa, x[nq:], h) > allowed:
+            return t, NEAR
+        _report(model, work, h, flight.contacts[t])
+        if is_due(work, reports[t, 1]):
+            return t + 1, _SOLVED
+    return us.shape[0], _SOLVED

@@ -1,0 +1,129 @@
+"""Policy: a trajectory with gains, and the rollout that follows it.
+
+What a planner knows about the trajectory makes the steps of a rollout nearby cheap: derivatives predict its velocities,
+and the cone variables of its steps are nearly those of the steps beside them. An iteration of the trot goes from 5 to 2
+or 3 Newton iterations per step that way.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.dynamics.state import integrate_state, state_difference
+from sim.integrators.rollout import Cube, options_of
+from sim.model.layout import model_view, work_view
+from sim.model.model import Matrix, Vector
+from sim.model.options import Guess
+from sim.model.pace import is_due
+from sim.step import step
+from solvers.dense import copy, copy_vector, dot
+from solvers.jit import kernel
+from solvers.record import Table
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+
+
+class Policy(NamedTuple):
+    """What a rollout follows: a trajectory, its gains, and what is known of its steps; the last four may be empty."""
+
+    xs: Matrix  # (T + 1, nx)
+    us: Matrix  # (T, nu)
+    ks: Matrix  # (T, nu)
+    Ks: Cube  # (T, nu, ndx)
+    gaps: Matrix  # (T + 1, ndx)  f(xs_t, us_t) (-) xs_t+1
+    A: Cube  # (T, ndx, ndx) derivatives of the steps: where the next velocity is looked for
+    B: Cube  # (T, ndx, nu)
+    cones: Cube  # (T, ncontact, 12) cone variables of the steps
+    bounds: Cube  # (T, nlimit, 2)
+
+
+class Path(NamedTuple):
+    """What a rollout fills in."""
+
+    xs: Matrix  # (T + 1, nx)
+    us: Matrix  # (T, nu)
+    cones: Cube  # (T, ncontact, 12) or empty
+    bounds: Cube
+    report: Vector  # (7,) of the last step, and the iterations of all, which are those of the report in the end; zeros
+
+
+@kernel
+def _expected_velocity(policy: Policy, t: int, dx: Vector, u: Vector, out: Vector) -> None:
+    """out = velocity at knot t + 1 by the linear model of the policy, dx away from its state at knot t under u."""
+    n = out.shape[0]
+    last = policy.xs.shape[1] - n
+    for i in range(n):
+        out[i] = policy.xs[t + 1, last + i]
+    if policy.A.shape[0] == 0:
+        return
+    for i in range(n):
+        out[i] += policy.gaps[t + 1, n + i] + dot(policy.A[t, n + i], dx)
+        row = policy.B[t, n + i]
+        for j in range(u.shape[0]):
+            out[i] += row[j] * (u[j] - policy.us[t, j])
+
+
+@kernel
+def closed_loop(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    policy: Policy,
+    alpha: float,
+    limits: tuple[Vector, Vector],
+    substeps: int,
+    path: Path,
+    first: int,
+) -> int:
+    """Rollout from path.xs[0] under the policy of a backward pass, from the step `first` on, that many of all knots
+    before it; returns the number of solved steps.
+
+    u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)),   x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    options = options_of(work, settings, first == 0)
+    nq = work.theta1.shape[0]
+    low, high = limits
+    ndx = policy.gaps.shape[1]
+    dx = work.chain[0][:ndx]
+    velocity = work.step_x[1, nq:]
+    for t in range(first // substeps, path.us.shape[0]):
+        u = path.us[t]
+        state_difference(model, policy.xs[t], path.xs[t], dx)
+        for j in range(u.shape[0]):
+            f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
+            u[j] = min(max(f, low[j]), high[j])
+        if substeps == 1:
+            _expected_velocity(policy, t, dx, u, velocity)
+        if policy.cones.shape[0] > 0:
+            copy(policy.cones[t], work.cone)
+            copy(policy.bounds[t], work.bound)
+        known = t > 0 or policy.cones.shape[0] > 0
+        b = path.xs[t + 1]
+        before = max(first - t * substeps, 0)
+        if before == 0:
+            copy_vector(path.xs[t], b)
+        due = False
+        for s in range(before, substeps):
+            copy_vector(b, work.step_x[0])
+            guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
+            if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
+                return t * substeps + s
+            path.report[6] += path.report[1]
+            due = is_due(work, path.report[1])
+            if due and s + 1 < substeps:
+                return t * substeps + s + 1
+        if path.cones.shape[0] > 0:
+            copy(work.cone, path.cones[t])
+            copy(work.bound, path.bounds[t])
+        if alpha < 1.0:
+            for k in range(ndx):
+                dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
+            copy_vector(b, work.step_x[0])
+            integrate_state(model, work.step_x[0], dx, b)
+        if due:
+            return (t + 1) * substeps
+    path.report[1] = path.report[6]
+    return path.us.shape[0] * substeps

@@ -1,0 +1,253 @@
+"""Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
+
+    settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
+    report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
+               accuracy of derivatives, 0 where there are none
+    contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
+
+Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
+not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py says how it goes on.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.contact.contact_report import report_contacts
+from sim.derivatives.step_gradient import gradient
+from sim.model.data import Work
+from sim.model.layout import model_view, work_view
+from sim.model.model import Integers, Matrix, Vector
+from sim.model.options import Guess, Options
+from sim.model.pace import DEADLINE, is_due, start_pace
+from sim.step import step
+from solvers.clock import seconds
+from solvers.dense import copy_vector
+from solvers.jit import kernel
+from solvers.parallel import parallel_kernel, prange
+from solvers.record import Table
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_SINGULAR = int(Status.SINGULAR)
+ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
+Cube = Matrix  # (n, rows, columns)
+
+
+class Linearized(NamedTuple):
+    """Knots of a trajectory, and what their linearization fills in."""
+
+    xs: Matrix  # (T, nx) or (T + 1, nx) states, in
+    us: Matrix  # (T, nu) inputs, in
+    A: Cube  # (T, ndx, ndx)
+    B: Cube  # (T, ndx, nu)
+    x_next: Matrix  # (T, nx), in: where the steps of one-step knots start to look for their velocities
+    reports: Matrix  # (T, 6)
+
+
+@kernel
+def options_of(work: Work, settings: Vector, begins: bool) -> Options:
+    """Options of the steps of a motion that begins here, or goes on after a pause."""
+    start_pace(work, settings)
+    if begins:
+        begin(work)
+    return Options(settings[0], settings[1], settings[2], int(settings[3]))
+
+
+@kernel
+def begin(work: Work) -> None:
+    """Forget the motion before."""
+    work.counts[3] = 0
+    # what is known of far contacts (contact/inactive.py), forces of loops and last directions belong to another motion
+    work.far_law[0] = 0.0
+    for row in range(work.couple_force.shape[0]):
+        work.couple_force[row] = 0.0
+    for c in range(work.cone_step.shape[0]):
+        for k in range(work.cone_step.shape[1]):
+            work.cone_step[c, k] = 0.0
+    for k in range(work.bound_step.shape[0]):
+        work.bound_step[k, 0] = work.bound_step[k, 1] = 0.0
+
+
+@kernel
+def roll(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    us: Matrix,
+    xs: Matrix,
+    reports: Matrix,
+    contacts: Cube,
+    first: int,
+) -> int:
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
+
+    us: (T, nu); xs: (T + 1, nx), of which xs[0] is given; reports: (T, 6); contacts: (T, ncontact, 11).
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    options = options_of(work, settings, first == 0)
+    nq = work.theta1.shape[0]
+    for t in range(first, us.shape[0]):
+        if step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t]) != _SOLVED:
+            return t
+        report_contacts(model, work, options.h, contacts[t])
+        if is_due(work, reports[t, 1]):
+            return t + 1
+    return us.shape[0]
+
+
+@kernel
+def _chain(work: Work, A: Matrix, B: Matrix) -> None:
+    """A := A_step A, B := A_step B + B_step."""
+    n = A.shape[0]
+    m = B.shape[1]
+    T = work.chain
+    S = work.step_A
+    for i in range(n):
+        t = T[i]
+        for k in range(n):
+            t[k] = 0.0
+        for k in range(m):
+            t[n + k] = work.step_B[i, k]
+        for j in range(n):
+            s = S[i, j]
+            a = A[j]
+            b = B[j]
+            for k in range(n):
+                t[k] += s * a[k]
+            for k in range(m):
+                t[n + k] += s * b[k]
+    for i in range(n):
+        for k in range(n):
+            A[i, k] = T[i, k]
+        for k in range(m):
+            B[i, k] = T[i, n + k]
+
+
+@kernel
+def linearize(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    knots: tuple[int, int, int],
+    substeps: int,
+    line: Linearized,
+) -> int:
+    """Derivatives of the knots from knots[0] up to knots[2], products of the derivatives of their steps.
+
+    knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
+    """
+    model = model_view(model_at)
+    work = work_view(work_at)
+    options = options_of(work, settings, knots[1] == knots[0] * substeps)
+    nq = work.theta1.shape[0]
+    x = work.step_x[0]
+    for t in range(knots[1] // substeps, knots[2]):
+        A = line.A[t]
+        B = line.B[t]
+        x_next = line.x_next[t]
+        report = line.reports[t]
+        velocity = work.step_x[1, nq:]
+        before = max(knots[1] - t * substeps, 0)
+        if before == 0:
+            copy_vector(x_next[nq:], velocity)
+            copy_vector(line.xs[t], x_next)
+        for s in range(before, substeps):
+            copy_vector(x_next, x)
+            guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
+            if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
+                break
+            Js = A if s == 0 else work.step_A
+            Ju = B if s == 0 else work.step_B
+            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
+                report[0] = _SINGULAR
+                break
+            report[5] = max(report[5], ACCURACY * work.contact_hard[0])
+            if s > 0:
+                _chain(work, A, B)
+            if is_due(work, report[1] + A.shape[0]):
+                return t * substeps + s + 1
+    return knots[2] * substeps
+
+
+@parallel_kernel
+def linearize_knots(
+    model_at: Table,
+    work_ats: Table,
+    settings: Vector,
+    substeps: int,
+    line: Linearized,
+    done: Integers,
+) -> None:
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c], done[c] is its next
+    step, the first one of chunk c + 1 in the end.
+    """
+    n = line.us.shape[0]
+    chunks = work_ats.shape[0]
+    for c in prange(chunks):
+        if seconds() < settings[DEADLINE]:
+            knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
+            done[c] = linearize(model_at, work_ats[c], settings, knots, substeps, line)
+
+
+@kernel
+def _roll_one(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    us: Matrix,
+    xs: Matrix,
+    first: int,
+) -> tuple[int, int]:
+    """As `roll`, but keeps its states only: (status, number of solved steps)."""
+    model = model_view(model_at)
+    work = work_view(work_at)
+    options = options_of(work, settings, first == 0)
+    nq = work.theta1.shape[0]
+    for t in range(first, us.shape[0]):
+        status = step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report)
+        if status != _SOLVED:
+            return status, t
+        if is_due(work, work.report[1]):
+            return _SOLVED, t + 1
+    return _SOLVED, us.shape[0]
+
+
+@kernel
+def _roll_rows(
+    model_at: Table,
+    work_at: Table,
+    settings: Vector,
+    rows: tuple[int, int],
+    us: Cube,
+    xs: Cube,
+    status: Integers,
+    knots: Integers,
+) -> None:
+    """Rollouts rows[0] up to rows[1], as far as they are not done, until the deadline."""
+    for i in range(rows[0], rows[1]):
+        if status[i] == _SOLVED and knots[i] < us.shape[1]:
+            if seconds() > settings[DEADLINE]:
+                return
+            status[i], knots[i] = _roll_one(model_at, work_at, settings, us[i], xs[i], knots[i])
+            if status[i] == _SOLVED and knots[i] < us.shape[1]:
+                return
+
+
+@parallel_kernel
+def roll_batch(
+    model_at: Table,
+    work_ats: Table,
+    settings: Vector,
+    us: Cube,
+    xs: Cube,
+    status: Integers,
+    knots: Integers,
+) -> None:
+    """Rollouts from xs[i, 0] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,), zeros."""
+    n = us.shape[0]
+    chunks = work_ats.shape[0]
+    for c in prange(chunks):
+        rows = (c * n // chunks, (c + 1) * n // chunks)
+        _roll_rows(model_at, work_ats[c], settings, rows, us, xs, status, knots)

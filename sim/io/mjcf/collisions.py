@@ -1,0 +1,78 @@
+"""Collisions from the geoms of an MJCF file: bodies with one another, and with geoms that are fixed to the world.
+
+Two geoms meet where MuJoCo lets them: contype and conaffinity fit, they move relative to one another, neither body is
+the parent of the other (but the world), the file does not <exclude> their bodies; or a <pair> names them. Friction is
+the larger of both, or that of the geom with priority, or of the <pair>; condim 1 is without. Planes are left to
+sim/io/mjcf/contacts.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+from sim.io.mjcf.contacts import KINDS, PLANE, meet, mixed
+from sim.io.mjcf.groups import Group, Where, name_of, solid_of
+from sim.io.urdf.report import Notes
+from sim.mechanism.collision import Collision
+from sim.mechanism.parts import WORLD
+from sim.mechanism.shapes import Shape
+
+Settings = tuple[float | None, str, int]
+
+
+def find_collisions(model: Any, where: Where, settings: Settings, notes: Notes) -> list[Collision]:
+    """The collisions of all geoms that may meet; settings: friction, law, and what contacts need."""
+    chosen, law, _ = settings
+    out = []
+    for a, b, (friction, slippery) in _pairs(model, where):
+        names = [name_of(model, "geom", g) for g in (a, b)]
+        first, second = (_solid(model, where, g) for g in (a, b))
+        for g, name, solid in zip((a, b), names, (first, second), strict=True):
+            if solid is None:
+                notes.add(f"no collisions of geoms of kind {KINDS[int(model.geom_type[g])]}", [name], warn=True)
+        if first is None or second is None:
+            continue
+        one, other = (group.name if group else WORLD for group in (_owner(model, where, a), _owner(model, where, b)))
+        mu = friction if chosen is None else chosen
+        name = f"{names[0]}-{names[1]}"
+        out.append(Collision(one, other, first, second, mu, "impact" if slippery else law, name))
+    return out
+
+
+def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, tuple[float, bool]]]:
+    """Geoms a < b that may meet, planes aside, and their (friction, whether there is none)."""
+    listed = {tuple(sorted((int(model.pair_geom1[k]), int(model.pair_geom2[k])))): k for k in range(model.npair)}
+    for a, b in combinations(range(model.ngeom), 2):
+        owners = _owner(model, where, a), _owner(model, where, b)
+        if owners[0] is owners[1] or PLANE in (model.geom_type[a], model.geom_type[b]):
+            continue
+        if (a, b) in listed:
+            k = listed[a, b]
+            yield a, b, (float(model.pair_friction[k, 0]), int(model.pair_dim[k]) == 1)
+        elif meet(model, a, b) and not _related(*owners) and not _excluded(model, a, b):
+            yield a, b, mixed(model, a, b)
+
+
+def _owner(model: Any, where: Where, g: int) -> Group | None:
+    """The group of a geom, None for the world."""
+    return where[int(model.geom_bodyid[g])][0]
+
+
+def _related(a: Group | None, b: Group | None) -> bool:
+    """Whether one hangs on the other; everything may meet the world."""
+    return a is not None and b is not None and (a.parent is b or b.parent is a)
+
+
+def _excluded(model: Any, a: int, b: int) -> bool:
+    """Whether the file excludes the bodies of two geoms."""
+    first, second = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
+    signature = (first << 16) + second
+    return bool((model.exclude_signature == signature).any())
+
+
+def _solid(model: Any, where: Where, g: int) -> Shape | None:
+    """The shape of a geom, from the centre of mass of its body, or in the world; None where there is none."""
+    group, frame = where[int(model.geom_bodyid[g])]
+    return solid_of(model, g, frame, group.com if group else 0.0)

@@ -1,0 +1,123 @@
+"""Contacts from the geoms of an MJCF file: balls and points that cannot enter its planes.
+
+    sphere      one ball
+    capsule     two balls
+    box         its eight corners
+    cylinder    points on both rims
+
+A plane counts where it is fixed to the world; a geom touches it where MuJoCo's contype and conaffinity say so. Friction
+is the larger of both, or that of the geom with priority; condim 1 is without.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, Group, Where, name_of, pose_of
+from sim.io.urdf.report import Notes
+from sim.mechanism.parts import Contact
+from sim.mechanism.pose import Pose
+
+Floats = NDArray[np.float64]
+PLANE = 0  # mjtGeom
+_UNLESS = "are no obstacles (collisions=True makes them)"
+KINDS = {1: "height field", 4: "ellipsoid", 7: "mesh", 8: "signed distance field"}
+
+
+def find_contacts(
+    model: Any, where: Where, settings: tuple[float | None, str, int], collisions: bool, notes: Notes
+) -> list[Contact]:
+    """The contacts of all geoms with all planes; settings: friction, law, points per rim of a cylinder.
+
+    collisions: whether the other fixed geoms are obstacles, by sim/io/mjcf/collisions.py.
+    """
+    planes = [g for g in range(model.ngeom) if _owner(model, where, g) is None and model.geom_type[g] == PLANE]
+    out: list[Contact] = []
+    for g in range(model.ngeom):
+        group, frame = where[int(model.geom_bodyid[g])]
+        if group is None:
+            solid = model.geom_type[g] != PLANE and model.geom_contype[g] | model.geom_conaffinity[g]
+            if solid and not collisions:
+                notes.add(f"geoms fixed to the world other than planes {_UNLESS}", [name_of(model, "geom", g)])
+            continue
+        touched = [p for p in planes if meet(model, g, p)]
+        if not touched:
+            continue
+        kind = int(model.geom_type[g])
+        if kind in KINDS:
+            notes.add(f"no contact from geoms of kind {KINDS[kind]}", [name_of(model, "geom", g)], warn=True)
+            continue
+        balls = _balls(model, g, frame, settings[2])
+        for p in touched:
+            label = name_of(model, "geom", g) + (f"@{name_of(model, 'geom', p)}" if len(touched) > 1 else "")
+            names = [label if len(balls) == 1 else f"{label}_{k}" for k in range(len(balls))]
+            out += [
+                _contact(model, (g, p), group, ball, name, settings) for ball, name in zip(balls, names, strict=True)
+            ]
+    return out
+
+
+def _owner(model: Any, where: Where, g: int) -> Group | None:
+    """The group of a geom, None for the world."""
+    return where[int(model.geom_bodyid[g])][0]
+
+
+def meet(model: Any, a: int, b: int) -> bool:
+    """Whether MuJoCo lets two geoms collide."""
+    ab = model.geom_contype[a] & model.geom_conaffinity[b]
+    return bool(ab | (model.geom_contype[b] & model.geom_conaffinity[a]))
+
+
+def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
+    """(friction, whether there is none) of two geoms: the larger ones, or those of the geom with priority."""
+    own, other = int(model.geom_priority[a]), int(model.geom_priority[b])
+    first = [x for x, wins in ((a, own >= other), (b, other >= own)) if wins]
+    return max(float(model.geom_friction[x, 0]) for x in first), max(int(model.geom_condim[x]) for x in first) == 1
+
+
+def _contact(
+    model: Any, pair: tuple[int, int], group: Group, ball: tuple[Floats, float], name: str, settings: Any
+) -> Contact:
+    """One ball of a geom against a plane."""
+    g, p = pair
+    chosen, law, _ = settings
+    plane = pose_of(model.geom_pos[p], model.geom_quat[p])
+    if model.geom_bodyid[p]:  # on a body that is welded to the world
+        body = int(model.geom_bodyid[p])
+        while body:
+            plane = pose_of(model.body_pos[body], model.body_quat[body]).then(plane)
+            body = int(model.body_parentid[body])
+    normal = plane.rotation[:, 2]
+    friction, slippery = mixed(model, g, p)
+    return Contact(
+        group.name,
+        ball[0] - group.com,
+        ball[1],
+        friction if chosen is None else chosen,
+        "impact" if slippery else law,
+        normal,
+        float(normal @ plane.point),
+        name,
+    )
+
+
+def _balls(model: Any, g: int, frame: Pose, rim: int) -> list[tuple[Floats, float]]:
+    """Centres in the frame of the group, and radii."""
+    at = frame.then(pose_of(model.geom_pos[g], model.geom_quat[g]))
+    size = np.array(model.geom_size[g], dtype=np.float64)
+    kind = int(model.geom_type[g])
+    if kind == SPHERE:
+        return [(at.point, float(size[0]))]
+    ends = [np.array([0.0, 0.0, side * size[1]]) for side in (-1.0, 1.0)]
+    if kind == CAPSULE:
+        return [(at.at(end), float(size[0])) for end in ends]
+    if kind == BOX:
+        return [(at.at(size * signs), 0.0) for signs in product((-1, 1), repeat=3)]
+    assert kind == CYLINDER
+    angles = 2.0 * np.pi * np.arange(rim) / rim
+    around = [size[0] * np.array([np.cos(a), np.sin(a), 0.0]) for a in angles]
+    return [(at.at(end + offset), 0.0) for end in ends for offset in around]

@@ -1,0 +1,97 @@
+"""Inputs from the actuators of an MJCF file, and what of it the mechanism leaves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.mjcf.groups import Where, name_of, pose_of
+from sim.io.mjcf.joints import BALL, FREE
+from sim.io.urdf.report import Notes
+from sim.mechanism.parts import Input
+
+Floats = NDArray[np.float64]
+
+_JOINT, _JOINT_IN_PARENT, _SITE = 0, 1, 4  # mjtTrn
+_FIXED_GAIN, _NO_BIAS, _NO_DYNAMICS = 0, 0, 0
+
+
+def find_inputs(
+    model: Any, homes: dict[int, tuple[str, int]], where: Where, notes: Notes
+) -> tuple[list[Input], Floats, Floats, Floats]:
+    """(inputs, gear, low, high): one input per actuator on a hinge, a slide or a site; bounds of u = gear * ctrl.
+
+    That of a site is the wrench that moves with it, per unit of the actuator's force.
+    """
+    inputs: list[Input] = []
+    rows: list[tuple[float, float, float]] = []
+    for a in range(model.nu):
+        name, j = name_of(model, "actuator", a), int(model.actuator_trnid[a, 0])
+        wrench = _at_site(model, a, name, where)
+        on_joint = int(model.actuator_trntype[a]) in (_JOINT, _JOINT_IN_PARENT)
+        if wrench is None and (not on_joint or model.jnt_type[j] in (FREE, BALL)):
+            notes.add("actuators that do not drive a hinge, a slide or a site are left out", [name], warn=True)
+            continue
+        plain = model.actuator_gaintype[a] == _FIXED_GAIN and model.actuator_biastype[a] == _NO_BIAS
+        if not plain or model.actuator_dyntype[a] != _NO_DYNAMICS:
+            notes.add("servos and actuators with dynamics are plain forces here", [name], warn=True)
+        ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
+        gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
+        inputs.append(wrench or Input(homes[j][0], dof=homes[j][1], name=name))
+        rows.append((gear, *_bounds(model, a, gear, ratio, bool(plain))))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    return inputs, table[:, 0], table[:, 1], table[:, 2]
+
+
+def _at_site(model: Any, a: int, name: str, where: Where) -> Input | None:
+    """The force and torque of an actuator on a site of a moving body, about its centre of mass; None of others."""
+    site, reference = (int(k) for k in model.actuator_trnid[a])
+    if int(model.actuator_trntype[a]) != _SITE or reference >= 0:
+        return None
+    group, frame = where[int(model.site_bodyid[site])]
+    gear = np.array(model.actuator_gear[a], dtype=np.float64)
+    if group is None or not gear.any():
+        return None
+    at = frame.then(pose_of(model.site_pos[site], model.site_quat[site]))
+    force, torque = at.rotation @ gear[:3], at.rotation @ gear[3:]
+    torque = torque + np.cross(at.point - group.com, force)
+    return Input(body=group.name, force=force, torque=torque, frame="body", name=name)
+
+
+def _bounds(model: Any, a: int, gear: float, ratio: float, plain: bool) -> tuple[float, float]:
+    """Bounds of an input from those of its control, and of its force times the ratio [N, N m]."""
+    low, high = -np.inf, np.inf
+    if plain and model.actuator_ctrllimited[a]:
+        low, high = sorted(float(gear * x) for x in model.actuator_ctrlrange[a])
+    if model.actuator_forcelimited[a]:
+        ends = sorted(float(ratio * x) for x in model.actuator_forcerange[a])
+        low, high = max(low, ends[0]), min(high, ends[1])
+    return low, high
+
+
+def left_out(model: Any, collisions: bool, notes: Notes) -> None:
+    """Notes on what the file has and the mechanism does not."""
+    if model.ntendon:
+        forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
+        felt = any(np.any(field) for field in forces)
+        notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
+    if model.npair and not collisions:
+        notes.add("explicit contact pairs are left out", [name_of(model, "pair", k) for k in range(model.npair)])
+    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
+    if rough:
+        notes.add("dry friction of joints is left out", [name_of(model, "joint", j) for j in rough], warn=True)
+    for field, what in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
+        if np.any(getattr(model, field, 0.0)):
+            notes.add(f"{what} is left out", warn=True)
+    if model.opt.density or model.opt.viscosity:
+        notes.add("the drag of a fluid is left out", warn=True)
+    if np.any(model.body_gravcomp):
+        notes.add("gravity compensation is left out", warn=True)
+    moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
+    types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
+    if collisions or not len(moving):
+        return
+    if np.any(types[:, None] & affinities[None, :]):
+        notes.add("bodies do not collide with one another (collisions=True lets them)")

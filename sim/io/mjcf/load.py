@@ -1,0 +1,195 @@
+"""load_mjcf: a Mechanism from an MJCF file."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sim.io.mjcf.collisions import find_collisions
+from sim.io.mjcf.contacts import find_contacts
+from sim.io.mjcf.drives import find_inputs, left_out
+from sim.io.mjcf.equalities import find_gears, find_loops
+from sim.io.mjcf.groups import Group, drawn, find_groups
+from sim.io.mjcf.joints import BALL, FREE, carry
+from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
+from sim.io.urdf.report import Frame, Notes
+from sim.mechanism import checks
+from sim.mechanism.parts import LAWS, Body, Joint
+from sim.mechanism.pose import Pose
+from sim.mechanism.stance import gaps, lifted
+from sim.simulator.border import whole
+
+
+def load_mjcf(
+    source: str | Path,
+    *,
+    ground: bool = True,
+    friction: float | None = None,
+    law: str = "nonlinear",
+    merge: bool = True,
+    keyframe: int | None = None,
+    rim_points: int = 4,
+    collisions: bool = False,
+    gravity: ArrayLike | None = None,
+) -> MjcfMechanism:
+    """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
+
+        ground      whether geoms cannot enter the planes of the file
+        friction    coefficient of all contacts; None: that of the geoms
+        law         of contacts with friction, see Contact; geoms with condim 1 are without
+        merge       whether slides and a hinge in a row become one joint where there is a kind for it; the coordinates
+                    are the same. All other joints in a row are a chain with bodies without mass between them.
+        keyframe    number of the keyframe whose qpos is the neutral state; None: the default one, joints that it has
+                    outside their range in its middle, and a floating base so high that nothing is in the ground
+        rim_points  points per rim of a cylinder
+        collisions  whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
+                    them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
+        gravity     [m/s^2]; None: that of the file
+
+    What of the file is represented, and what not: MjcfMechanism. What changes the motion in a way that a user would not
+    expect is also an MjcfWarning.
+
+    ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
+    whose inertia no rigid body has; OSError for a file that is not there.
+    """
+    model, file = _compile(source)
+    touching = _touching(friction, law, rim_points)
+    notes = Notes()
+    groups, where = find_groups(model)
+    bodies, joints, homes = _tree(model, groups, merge, notes)
+    if not joints:
+        raise ValueError(f"load_mjcf: {file}: no joint is free to move")
+    inputs, gear, low, high = find_inputs(model, homes, where, notes)
+    left_out(model, collisions, notes)
+    mech = MjcfMechanism(
+        bodies,
+        [*joints, *find_loops(model, where, notes)],
+        find_contacts(model, where, touching, collisions, notes) if ground else [],
+        inputs,
+        gravity=model.opt.gravity if gravity is None else gravity,
+        name=Path(file).stem,
+        neutral=_neutral(model, keyframe, notes),
+        collisions=find_collisions(model, where, touching, notes) if collisions else (),
+        gears=find_gears(model, homes, notes),
+    )
+    mech = _without_constant_gaps(mech, notes)
+    mech = _clear(mech) if keyframe is None else mech
+    known = {model.joint(j).name or f"joint_{j}": home for j, home in homes.items()}
+    report = MjcfReport(file, notes.close(), _frames(model, where), known, gear, low, high)
+    _warn(report)
+    return replace(mech, report=report)
+
+
+def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float | None, str, int]:
+    """The choices that all contacts share, checked."""
+    return (
+        None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
+        checks.one_of("load_mjcf(law=...)", law, LAWS),
+        whole("load_mjcf(rim_points=...)", rim_points, 3),
+    )
+
+
+def _warn(report: MjcfReport) -> None:
+    """Warnings, at the line that called load_mjcf, of what changes the motion."""
+    for note in report.notes:
+        if note.warn:
+            warnings.warn(f"load_mjcf: {report.file}: {note}", MjcfWarning, stacklevel=3)
+
+
+def _tree(
+    model: Any, groups: list[Group], merge: bool, notes: Notes
+) -> tuple[list[Body], list[Joint], dict[int, tuple[str, int]]]:
+    """Bodies, the joints they hang on, and where every joint of the file went."""
+    bodies: list[Body] = []
+    joints: list[Joint] = []
+    homes: dict[int, tuple[str, int]] = {}
+    for group in groups:
+        carried = carry(model, group, merge, notes)
+        inertia = group.inertia
+        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group, notes)) if inertia.mass else None
+        bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
+        joints += carried.joints
+        homes |= carried.homes
+    return bodies, joints, homes
+
+
+def _compile(source: str | Path) -> tuple[Any, str]:
+    """MuJoCo's model of a file or a text, and a name for messages."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ImportError('load_mjcf needs MuJoCo: pip install "dojo-opt[mjcf]"') from error
+    text = isinstance(source, str) and source.lstrip().startswith("<")
+    if not text and not Path(source).is_file():
+        raise FileNotFoundError(f"load_mjcf: no file {str(source)!r}")
+    try:
+        if text:
+            return mujoco.MjModel.from_xml_string(str(source)), "model"
+        return mujoco.MjModel.from_xml_path(str(source)), Path(source).name
+    except ValueError as error:
+        raise ValueError(f"load_mjcf: {'the text' if text else source}: {error}") from None
+
+
+def _neutral(model: Any, keyframe: int | None, notes: Notes) -> Any:
+    """qpos of a keyframe, or the default one within the ranges of its joints."""
+    if keyframe is not None:
+        if not isinstance(keyframe, int | np.integer) or not 0 <= keyframe < model.nkey:
+            raise ValueError(f"load_mjcf(keyframe=...): the file has {model.nkey} keyframes, got {keyframe!r}")
+        q = np.array(model.key_qpos[keyframe], dtype=np.float64)
+    else:
+        q = np.array(model.qpos0, dtype=np.float64)
+    for j in range(model.njnt):
+        a = int(model.jnt_qposadr[j])
+        kind = int(model.jnt_type[j])
+        if kind in (FREE, BALL):
+            a += 3 if kind == FREE else 0
+            q[a : a + 4] /= np.linalg.norm(q[a : a + 4])
+        elif keyframe is None and model.jnt_limited[j] and not model.jnt_range[j, 0] <= q[a] <= model.jnt_range[j, 1]:
+            q[a] = model.jnt_range[j].mean()
+            notes.add("neutral coordinates that were outside their range are in its middle", [model.joint(j).name])
+    return q
+
+
+def _without_constant_gaps(mech: MjcfMechanism, notes: Notes) -> MjcfMechanism:
+    """Without the contacts that no joint can open or close, as of a disc that slides in the plane it lies on."""
+    rng = np.random.default_rng(0)
+    seen = []
+    for _ in range(4):
+        q = rng.uniform(-1.0, 1.0, mech.nq)
+        for joint in mech.joints:
+            if joint.nrot == 3:
+                stop = mech.q_slice(joint.name).stop
+                q[stop - 4 : stop] /= np.linalg.norm(q[stop - 4 : stop])
+        seen.append(gaps(mech, q))
+    moving = np.ptp(seen, axis=0) > 1e-9 if mech.contacts else np.zeros(0, dtype=bool)
+    if moving.all():
+        return mech
+    notes.add(
+        "contacts that no joint can open or close are left out",
+        [c.name for c, moves in zip(mech.contacts, moving, strict=True) if not moves],
+        warn=True,
+    )
+    return replace(mech, contacts=[c for c, moves in zip(mech.contacts, moving, strict=True) if moves])
+
+
+def _clear(mech: MjcfMechanism) -> MjcfMechanism:
+    """The mechanism with its floating base, if it has one, lifted out of the ground."""
+    bases = [j.name for j in mech.joints if j.kind == "floating"]
+    if len(bases) != 1 or not mech.contacts or gaps(mech, np.asarray(mech.neutral)).min() >= 0.0:
+        return mech
+    return replace(mech, neutral=lifted(mech, bases[0]))
+
+
+def _frames(model: Any, where: dict[int, tuple[Group | None, Pose]]) -> dict[str, Frame]:
+    """Where the bodies of the file are."""
+    out = {}
+    for b, (group, pose) in where.items():
+        point = pose.point - (group.com if group else 0.0)
+        name = model.body(b).name or f"body_{b}"
+        out[name] = Frame(group.name if group else None, tuple(float(x) for x in point), pose.quaternion)
+    return out

@@ -1,0 +1,60 @@
+"""MjcfReport: what a loaded mechanism has of its MJCF file, and what not; MjcfMechanism carries it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.urdf.report import Frame, Note
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+
+class MjcfWarning(UserWarning):
+    """The mechanism differs from the model of the file in a way that its motion shows."""
+
+
+@dataclass(frozen=True)
+class MjcfReport:
+    """What became of an MJCF file. `str(report)` is a page of text.
+
+    bodies   where the frame of every body of the file is now
+    joints   of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them
+    gear     force or torque of every input per unit of MuJoCo's control: u = gear * ctrl
+    low      bounds of u from the control and force ranges of the actuators, infinite where there are none; and high
+    """
+
+    file: str
+    notes: tuple[Note, ...]
+    bodies: dict[str, Frame]
+    joints: dict[str, tuple[str, int]]
+    gear: Floats  # (nu,)
+    low: Floats  # (nu,) [N, N m]
+    high: Floats  # (nu,)
+
+    __repr__ = brief_repr
+
+    def __str__(self) -> str:
+        lines = [f"{self.file}: {len(self.bodies)} bodies, {len(self.joints)} joints, {len(self.gear)} actuators"]
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+
+@dataclass(frozen=True, repr=False)
+class MjcfMechanism(Mechanism):
+    """A Mechanism that `load_mjcf` made; `report` says what became of the file.
+
+    The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
+    slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
+    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move, and with
+    `collisions=True` against one another and what is fixed; actuators on hinges and slides as inputs in N and N m, u =
+    report.gear * ctrl, and on sites as wrenches that move with the body; connect and weld as joints that close loops,
+    and linear couplings of two joints as gears, all of them rigid (equalities.py). Not represented, and listed
+    in `report.notes`: other equality constraints, tendons, dry friction of joints, servos, fluids, meshes, height
+    fields.
+    """
+
+    report: MjcfReport | None = field(default=None, compare=False, repr=False)

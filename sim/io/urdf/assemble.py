@@ -1,0 +1,231 @@
+"""assemble: the parts of a Mechanism from what a URDF file says and what the caller chose."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.io.urdf.contacts import find_contacts
+from sim.io.urdf.drawing import drawn
+from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
+from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
+from sim.io.urdf.mimic import mimic_gears
+from sim.io.urdf.report import Frame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
+from sim.io.urdf.robot import Robot, UrdfJoint
+from sim.io.urdf.tree import Group, Place, group, ordered
+from sim.io.urdf.xml import UrdfError
+from sim.mechanism import checks
+from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
+from sim.mechanism.pose import HERE, Pose
+from sim.mechanism.stance import gaps, lifted, resting
+
+Floats = NDArray[np.float64]
+
+ROOT_JOINT = {
+    False: "floating_base",
+    True: "fixed_base",
+}  # by whether the base is fixed; behind the link's name if taken
+_SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the caller of `load_urdf` chose; see there."""
+
+    file: str
+    fixed_base: bool
+    merge: bool
+    locked: frozenset[str]
+    geared: tuple[str, ...]  # joints that follow another one
+    repair: bool
+    neutral: Mapping[str, ArrayLike]
+    position: tuple[float, ...]
+    actuated: tuple[str, ...] | None
+    contacts: Sequence[str | Contact] | None
+    friction: float | None
+    law: str
+    rim_points: int
+    gravity: tuple[float, ...]
+
+
+def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
+    """The mechanism, with its report."""
+    root, order = ordered(robot, choices.file)
+    if WORLD in robot.links and root != WORLD:
+        raise robot.links[WORLD].element.error("a link of this name must be the root")
+    locked = {name: _neutral(robot, choices, name) for name in choices.locked}
+    if locked:
+        notes.add("joints that are held where they are", locked)
+    groups, places = group(robot, root, order, choices.fixed_base, choices.merge, locked)
+    if root == WORLD and not choices.fixed_base:
+        notes.add("the root is called 'world', so it is fixed there although floating=True", [root])
+    inertias = _inertias(groups, choices, notes)
+    coms = {name: part.com for name, part in inertias.items()}
+    taken = {body.joint.name for body in groups if body.joint}
+    base = ROOT_JOINT[choices.fixed_base]
+    base = base if base not in taken else f"{root}_{base}"
+    joints = [_joint(body, places, coms, choices, base) for body in groups]
+    closing = _closing(loops, places, coms, zero_poses(root, order), choices, notes)
+    known = dict.fromkeys([*robot.joints, *(j.name for j in joints)])
+    for name in choices.neutral:
+        checks.one_of("load_urdf(neutral=...): joint", name, known)
+    if not any(joint.nv for joint in joints):
+        raise UrdfError(f"load_urdf: {choices.file}: no joint is free to move")
+    found = find_contacts(places, coms, choices.contacts, (choices.friction, choices.law, choices.rim_points), notes)
+    neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
+    neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
+    mech = UrdfMechanism(
+        [_body(body, inertias[body.name], notes) for body in groups],
+        [*joints, *closing],
+        found,
+        _inputs(joints, closing, choices),
+        gravity=choices.gravity,
+        name=robot.name,
+        neutral=neutral,
+        gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
+    )
+    bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
+    if len(bases) == 1 and bases[0] not in choices.neutral:
+        mech = replace(mech, neutral=lifted(mech, bases[0]))
+    _ground_notes(mech, choices, bool(bases), notes)
+    report = _report(
+        {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, mech, places, coms, choices.file, notes
+    )
+    for note in report.notes:
+        if note.warn:
+            warnings.warn(f"load_urdf: {choices.file}: {note}", UrdfWarning, stacklevel=3)
+    return replace(mech, report=report)
+
+
+def _neutral(robot: Robot, choices: Choices, name: str) -> float:
+    """Neutral coordinate of a joint with one degree of freedom; of one with more, which is to be locked, zero."""
+    if name not in choices.neutral:
+        return resting(robot.joints[name].limits)
+    if robot.joints[name].kind not in ("revolute", "prismatic"):
+        raise ValueError(
+            f"load_urdf(neutral=...): joint {name!r} does not move, or is held where all coordinates are zero"
+        )
+    return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
+
+
+def _inertias(groups: list[Group], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
+    """Inertia of every body in its own frame; what no rigid body has is repaired or refused."""
+    out = {body.name: combined(body.inertias) for body in groups}
+    if groups and not any(part.mass for part in out.values()):
+        raise UrdfError(f"load_urdf: {choices.file}: nothing that moves has a mass")
+    bad: list[str] = []
+    for body in groups:
+        why = fault(out[body.name])
+        if not why:
+            continue
+        on = f"on joint {body.joint.name!r}" if body.joint else "as the root"
+        if choices.repair:
+            out[body.name] = repaired(out[body.name])
+            notes.add("inertias that no rigid body has were repaired", [f"{body.name} {why}"], warn=True)
+        else:
+            bad.append(f"  line {body.links[0][0].element.line}, link {body.name!r}, which moves {on}, {why}")
+    if bad:
+        root = ", floating=False fixes the root" if not groups[0].joint and fault(out[groups[0].name]) else ""
+        raise UrdfError(
+            f"load_urdf: {choices.file}: no rigid body has the inertia of these moving links:\n"
+            + "\n".join(bad)
+            + f"\nlocked=[...] holds their joints{root}, repair=True replaces the inertias by the nearest possible ones"
+        )
+    return out
+
+
+def _joint(body: Group, places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices, base: str) -> Joint:
+    """The Joint that a body hangs on; `base` is the name of that of the root."""
+    com = coms[body.name]
+    if body.joint is None:
+        if choices.fixed_base:
+            return Joint("fixed", None, body.name, base, choices.position, child_point=-com)
+        return Joint("floating", None, body.name, base, child_point=-com)
+    joint, at = body.joint, places[body.joint.parent]
+    frame = at.pose.then(joint.pose)
+    if at.group.name in coms:
+        parent, point = at.group.name, frame.point - coms[at.group.name]
+    else:
+        parent, point = WORLD, frame.point + np.asarray(choices.position)
+    return Joint(
+        "fixed" if body.fixed else joint.kind,
+        parent,
+        body.name,
+        joint.name,
+        parent_point=point,
+        child_point=-com,
+        axis=joint.axis,
+        orientation=frame.quaternion,
+        damper=0.0 if body.fixed else joint.damping,
+        limits=None if body.fixed else joint.limits,
+    )
+
+
+def _body(body: Group, part: RigidInertia, notes: Notes) -> Body:
+    return Body(body.name, part.mass, part.inertia, drawn(body, part.com, notes))
+
+
+def _closing(
+    loops: Mapping[str, UrdfLoop],
+    places: Mapping[str, Place],
+    coms: Mapping[str, Floats],
+    zero: Mapping[str, Pose],
+    choices: Choices,
+    notes: Notes,
+) -> list[Joint]:
+    """The joints that close loops."""
+    found = [closing_joint(loop, places, coms, zero, choices.position, notes) for loop in loops.values()]
+    return [joint for joint in found if joint is not None]
+
+
+def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list[Input]:
+    """One per degree of freedom of the actuated joints; those that close loops only when they are asked for."""
+    by_name = {j.name: j for j in (*joints, *closing)}
+    if choices.actuated is None:
+        chosen = [j for j in joints if j.kind != "floating"]
+    else:
+        moving = {j.name: j for j in by_name.values() if j.nv}
+        for name in choices.actuated:
+            checks.one_of("load_urdf(actuated=...): joint that moves", name, moving)
+        chosen = [by_name[name] for name in choices.actuated]
+    return [Input(j.name, dof=d) for j in chosen for d in range(j.nv)]
+
+
+def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: Notes) -> None:
+    """What a user should know about the ground before the first step."""
+    wanted = choices.contacts is None or len(choices.contacts) > 0
+    if floating and wanted and not mech.contacts:
+        notes.add("nothing of the robot makes contact with the ground: it falls through", warn=True)
+    if mech.contacts:
+        sunk = gaps(mech, np.asarray(mech.neutral))
+        low = [f"{name} ({-gap:.3g} m)" for name, gap in zip(mech.contact_names, sunk, strict=True) if gap < -_SUNK]
+        if low:
+            notes.add("contacts that are below the ground in the neutral state; see position, neutral", low, warn=True)
+
+
+def _report(
+    joints: Mapping[str, UrdfJoint],
+    mech: UrdfMechanism,
+    places: Mapping[str, Place],
+    coms: Mapping[str, Floats],
+    file: str,
+    notes: Notes,
+) -> UrdfReport:
+    """Where the links are, and the bounds of the inputs."""
+    links = {}
+    for name, place in places.items():
+        body = place.group.name if place.group.name in coms else None
+        pose = Pose(place.pose.rotation, place.pose.point - (coms[body] if body else HERE.point))
+        links[name] = Frame(body, tuple(float(x) for x in pose.point), pose.quaternion)
+    driven = [joints[part.joint or ""] for part in mech.inputs or ()]
+    return UrdfReport(
+        file,
+        notes.close(),
+        links,
+        np.array([joint.effort for joint in driven], dtype=np.float64),
+        np.array([joint.velocity for joint in driven], dtype=np.float64),
+    )

@@ -1,0 +1,138 @@
+"""Contacts from the collision shapes of links: balls and points that cannot enter the ground.
+
+    sphere      one ball
+    capsule     two balls
+    box         its eight corners
+    cylinder    points on both rims, the first along x; two balls of its radius for a wheel, at the ends of its axis,
+                which is exact as long as the axis is level. A wheel is a cylinder whose link turns about its axis.
+
+Meshes have no contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.urdf.report import Notes
+from sim.io.urdf.robot import Geometry
+from sim.io.urdf.tree import Group, Place
+from sim.io.urdf.xml import UrdfError
+from sim.mechanism.parts import Contact
+from sim.mechanism.pose import HERE, Pose
+
+Floats = NDArray[np.float64]
+Balls = list[tuple[Floats, float]]  # centre (3,) and radius [m]
+
+SHAPES = ("sphere", "box", "cylinder", "capsule")
+FRICTION = 0.8  # where neither the caller nor the file says anything
+_PARALLEL = 1e-3  # [rad, radii] by how much the axis of a wheel may miss that of its joint
+
+
+def find_contacts(
+    places: dict[str, Place],
+    coms: dict[str, Floats],
+    chosen: Sequence[str | Contact] | None,
+    settings: tuple[float | None, str, int],
+    notes: Notes,
+) -> list[Contact]:
+    """The contacts of the chosen links, or of all, with points measured from the centres of mass of their bodies.
+
+    coms: centre of mass of every body in its own frame; settings: friction, law, points per rim.
+    """
+    picked = _picked(places, chosen)
+    out: list[Contact] = []
+    taken: set[str] = set()
+    for name, place in places.items():
+        if name not in picked:
+            continue
+        body = place.group.name
+        given = picked[name]
+        if body not in coms:
+            if given or place.group.links and _shapes(place):
+                notes.add("no contacts on links that are fixed to the world", [name])
+            continue
+        link = place.link
+        mu, law, rim = settings
+        friction = mu if mu is not None else link.friction if link.friction is not None else FRICTION
+        for contact in given:
+            point = place.pose.at(contact.point) - coms[body]
+            label = _free(contact.name or name, taken)
+            out.append(
+                Contact(
+                    body, point, contact.radius, contact.friction, contact.law, contact.normal, contact.height, label
+                )
+            )
+        if given:
+            continue
+        balls = [ball for shape in _shapes(place) for ball in _balls(shape, place, rim)]
+        for k, (point, radius) in enumerate(balls):
+            label = _free(name if len(balls) == 1 else f"{name}_{k}", taken)
+            out.append(Contact(body, point - coms[body], radius, friction, law, name=label))
+        other = sorted({s.kind for s in link.collisions if s.kind not in SHAPES})
+        for kind in other:
+            notes.add(f"no contact from collision shapes of kind {kind!r}", [name])
+        if chosen is not None and not balls:
+            raise link.element.error(
+                f"contacts=...: the link has no sphere, box, cylinder or capsule to make contacts of; "
+                f"place one in its frame with dojo.Contact({name!r}, point=(x, y, z), radius=...)"
+            )
+    return out
+
+
+def _picked(places: dict[str, Place], chosen: Sequence[str | Contact] | None) -> dict[str, list[Contact]]:
+    """The links that get contacts, each with those that the caller placed by hand."""
+    if chosen is None:
+        return {name: [] for name in places}
+    picked: dict[str, list[Contact]] = {}
+    for part in [chosen] if isinstance(chosen, str | Contact) else chosen:
+        name = part.body if isinstance(part, Contact) else part
+        if name not in places:
+            raise UrdfError(f"load_urdf(contacts=...): {name!r} is not a link of the file: {', '.join(places)}")
+        picked.setdefault(name, []).extend([part] if isinstance(part, Contact) else [])
+    return picked
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """A name that no other contact has."""
+    label, k = name, 0
+    while label in taken:
+        k += 1
+        label = f"{name}_{k}"
+    taken.add(label)
+    return label
+
+
+def _shapes(place: Place) -> list[Geometry]:
+    """The collision shapes of a link that make contacts."""
+    return [s for s in place.link.collisions if s.kind in SHAPES]
+
+
+def _balls(shape: Geometry, place: Place, rim: int) -> Balls:
+    """Centres in the frame of the body, and radii."""
+    pose = place.pose.then(shape.pose)
+    if shape.kind == "sphere":
+        return [(pose.point, shape.sizes[0])]
+    if shape.kind == "box":
+        half = 0.5 * np.array(shape.sizes)
+        return [(pose.at(half * signs), 0.0) for signs in product((-1, 1), repeat=3)]
+    radius, length = shape.sizes
+    ends = [np.array([0.0, 0.0, side * length / 2]) for side in (-1, 1)]
+    if shape.kind == "capsule" or is_wheel(pose, radius, place.group):
+        return [(pose.at(end), radius) for end in ends]
+    angles = 2.0 * np.pi * np.arange(rim) / rim
+    around = [radius * np.array([np.cos(a), np.sin(a), 0.0]) for a in angles]
+    return [(pose.at(end + offset), 0.0) for end in ends for offset in around]
+
+
+def is_wheel(pose: Pose, radius: float, body: Group) -> bool:
+    """Whether a cylinder with this pose in its body turns about its own axis."""
+    if body.joint is None or body.joint.kind != "revolute" or body.fixed:
+        return False
+    axis = body.joint.axis
+    aligned = float(np.linalg.norm(np.cross(axis, pose.rotation[:, 2]))) < _PARALLEL
+    off = float(np.linalg.norm(np.cross(axis, pose.point - HERE.point)))
+    return aligned and off < _PARALLEL * max(radius, 1e-9)

@@ -1,0 +1,108 @@
+"""load_urdf: a Mechanism from a URDF file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from sim.io.urdf.assemble import Choices, assemble
+from sim.io.urdf.loops import read_loops
+from sim.io.urdf.report import Notes, UrdfMechanism
+from sim.io.urdf.robot import Robot, read_robot
+from sim.io.urdf.xml import parse
+from sim.mechanism import checks
+from sim.mechanism.parts import LAWS, Contact
+from sim.simulator.border import whole
+
+MIMIC = ("free", "locked", "gear")
+
+
+def load_urdf(
+    path: str | Path,
+    floating: bool = True,
+    ground: bool = True,
+    friction: float | None = None,
+    contacts: Sequence[str | Contact] | None = None,
+    merge_fixed: bool = True,
+    *,
+    locked: Collection[str] = (),
+    mimic: str = "free",
+    repair: bool = False,
+    neutral: Mapping[str, ArrayLike] | None = None,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    actuated: Sequence[str] | None = None,
+    law: str = "nonlinear",
+    rim_points: int = 4,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+) -> UrdfMechanism:
+    """The robot of a URDF file.
+
+        floating      whether the root can move or is fixed to the world; a root link called "world" is the world in
+                      either case. The joint is called "floating_base": its coordinates are the position of the root's
+                      frame and its quaternion, its speeds that of the frame's origin (world) and of rotation (body)
+        ground        whether collision shapes cannot enter the half-space z < 0
+        friction      coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
+        contacts      which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the
+                      frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder
+                      (points on both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make
+                      no contacts.
+        merge_fixed   whether links on fixed joints become one body; a link without mass always does
+        locked        joints that are held at their neutral coordinate, as if they were fixed
+        mimic         what becomes of joints that follow another one: "gear" couples them (see Gear), "free" and
+                      "locked" leave that out
+        repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
+                      more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
+        neutral       coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their
+                      range when zero is outside. The base then stands so high that the lowest contact touches.
+        position      of the root's frame when it is fixed [m]
+        actuated      joints with an input, in the order of u; None: all that move, but for floating ones
+        rim_points    points per rim of a cylinder
+
+    What is read, and what `mechanism.report` says of the rest: UrdfMechanism. What changes the motion in a way that a
+    user would not expect is also a UrdfWarning.
+
+    Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
+    names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
+    """
+    file, notes = Path(path), Notes()
+    root = parse(file)
+    robot = read_robot(root, notes)
+    loops = read_loops(root, robot, notes)
+    held, geared = _held(robot, locked, mimic, notes)
+    choices = Choices(
+        file=file.name,
+        fixed_base=not floating,
+        merge=merge_fixed,
+        locked=held,
+        geared=geared,
+        repair=repair,
+        neutral=dict(neutral or {}),
+        position=checks.vector("load_urdf(position=...)", position, 3),
+        actuated=None if actuated is None else tuple(actuated),
+        contacts=(contacts if ground else ()),
+        friction=None if friction is None else checks.number("load_urdf(friction=...)", friction, at_least=0.0),
+        law=checks.one_of("load_urdf(law=...)", law, LAWS),
+        rim_points=whole("load_urdf(rim_points=...)", rim_points, 3),
+        gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
+    )
+    return assemble(robot, loops, choices, notes)
+
+
+def _held(robot: Robot, locked: Collection[str], mimic: str, notes: Notes) -> tuple[frozenset[str], tuple[str, ...]]:
+    """Joints that do not move, and joints that a gear ties to another one."""
+    checks.one_of("load_urdf(mimic=...)", mimic, MIMIC)
+    held = [locked] if isinstance(locked, str) else list(locked)
+    for name in held:
+        checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
+    following = [name for name in robot.mimics if name not in held]
+    if following and mimic == "gear":
+        notes.add("joints that follow another one, by a gear", following)
+    elif following:
+        fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
+        notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
+    return (
+        frozenset([*held, *following] if mimic == "locked" else held),
+        tuple(following) if mimic == "gear" else (),
+    )

@@ -1,0 +1,99 @@
+"""UrdfReport: what a loaded mechanism has of its file, and what not; UrdfMechanism carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+
+
+class UrdfWarning(UserWarning):
+    """The mechanism differs from the robot of the file in a way that its motion shows."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """One thing that the mechanism has differently than its file, and the links or joints that it is about."""
+
+    text: str
+    names: tuple[str, ...]
+    warn: bool = False  # whether `load_urdf` also issues a UrdfWarning
+
+    def __str__(self) -> str:
+        shown = ", ".join(self.names[:6]) + (f" and {len(self.names) - 6} more" if len(self.names) > 6 else "")
+        return f"{self.text}: {shown}" if shown else self.text
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the frame of a link is: the body it is part of (None: the world), and its pose there."""
+
+    body: str | None
+    point: tuple[float, ...]  # of the link's origin, from the body's centre of mass, body axes [m]
+    orientation: tuple[float, ...]  # link to body, quaternion (w, x, y, z)
+
+
+@dataclass(frozen=True)
+class UrdfReport:
+    """What became of a URDF file. `str(report)` is a page of text.
+
+    links     where every link of the file is now
+    effort    largest force or torque of every input [N, N m], infinite where the file gives none: as control limits
+              (-effort, effort)
+    velocity  largest speed of every input's joint [m/s, rad/s]; nothing enforces it
+    """
+
+    file: str
+    notes: tuple[Note, ...]
+    links: dict[str, Frame]
+    effort: Floats  # (nu,)
+    velocity: Floats  # (nu,)
+
+    __repr__ = brief_repr
+
+    def __str__(self) -> str:
+        merged = len(self.links) - len({f.body for f in self.links.values()})
+        lines = [f"{self.file}: {len(self.links)} links, {merged} of them part of another body or of the world"]
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+
+@dataclass(frozen=True, repr=False)
+class UrdfMechanism(Mechanism):
+    """A Mechanism that `load_urdf` made; `report` says what became of the file.
+
+    Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
+    PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in Dojo; and every kind
+    of Joint by its own name, but for "planar", which turns in URDF and whose kind without is "planarfixed"), and
+    <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (loops.py). A body's frame has the
+    axes of its first link and its origin at the centre of mass; `report.links` has the pose of every link in its body,
+    `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented (dry friction,
+    meshes, mimics).
+    """
+
+    report: UrdfReport | None = field(default=None, compare=False, repr=False)
+
+
+class Notes:
+    """Notes on the way, gathered by text."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, list[str]] = {}
+        self._warn: set[str] = set()
+
+    def add(self, text: str, names: Iterable[str] = (), *, warn: bool = False) -> None:
+        """Note something about some links or joints."""
+        self._names.setdefault(text, []).extend(names)
+        if warn:
+            self._warn.add(text)
+
+    def close(self) -> tuple[Note, ...]:
+        """All of them, those with a warning first."""
+        notes = [Note(text, tuple(names), text in self._warn) for text, names in self._names.items()]
+        return tuple(sorted(notes, key=lambda note: not note.warn))

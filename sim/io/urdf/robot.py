@@ -1,0 +1,240 @@
+"""Robot: links and joints as the file has them, every number read and checked; nothing is interpreted yet."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.urdf.report import Notes
+from sim.io.urdf.xml import Element
+from sim.mechanism import parts
+from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
+
+Floats = NDArray[np.float64]
+T = TypeVar("T", "UrdfLink", "UrdfJoint")
+
+# URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
+# of Joint that nobody else has a word for. A kind's own name is read, too, except for "planar", which may turn in URDF.
+KINDS = {
+    "fixed": "fixed",
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "planar": "planar_axis",
+    "floating": "floating",
+    "spherical": "spherical",
+    "ball": "spherical",
+    "planaraxis": "planar_axis",
+    "planarfree": "planar_free",
+    "cylindrical": "cylindrical",
+    "cylindricalfree": "cylindrical_free",
+    "fixedorientation": "fixed_orientation",
+    "orbital": "orbital",
+    "planarfixed": "planar",
+    "freerevolute": "free_revolute",
+    "prismaticorbital": "prismatic_orbital",
+    "planarorbital": "planar_orbital",
+    "freeorbital": "free_orbital",
+}
+KINDS |= {kind: kind for kind in parts.KINDS if kind not in KINDS}
+SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
+# elements that say nothing about the motion of bodies, or nothing that a step could use
+READ = {"link", "joint", "loop_joint"}
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A shape of a link. sizes: radius; x, y, z; or radius, length [m]. Empty for a kind that has no meaning here."""
+
+    kind: str
+    sizes: tuple[float, ...]
+    pose: Pose  # in the link
+
+
+@dataclass(frozen=True)
+class UrdfLink:
+    """A link. com and inertia are in the axes of the link; without an <inertial> the mass is zero."""
+
+    name: str
+    mass: float  # [kg]
+    com: Floats  # (3,) [m]
+    inertia: Floats  # (3, 3) about the centre of mass [kg m^2]
+    collisions: tuple[Geometry, ...]
+    visuals: tuple[Geometry, ...]
+    friction: float | None  # <contact><lateral_friction>, as PyBullet reads it
+    element: Element
+
+    @property
+    def empty(self) -> bool:
+        """Whether there is neither mass nor inertia."""
+        return self.mass == 0.0 and not self.inertia.any()
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint."""
+
+    name: str
+    kind: str  # one of sim.parts.KINDS
+    parent: str
+    child: str
+    pose: Pose  # of the joint frame, and so of the child's frame at coordinate zero, in the parent
+    axis: Floats  # (3,) in the joint frame, unit
+    limits: tuple[float, float] | None  # [m, rad]
+    damping: float  # [N s/m, N m s/rad]
+    effort: float  # [N, N m], infinite where there is none
+    velocity: float  # [m/s, rad/s], infinite where there is none
+    element: Element
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What the file says."""
+
+    name: str
+    links: dict[str, UrdfLink]
+    joints: dict[str, UrdfJoint]
+    mimics: tuple[str, ...]  # joints that follow another one
+
+
+def read_robot(root: Element, notes: Notes) -> Robot:
+    """The robot of a <robot> element; what it holds that is not represented goes into the notes."""
+    if root.tag != "robot":
+        raise root.error("expected a <robot> as the outermost element")
+    for element in root.children:
+        if element.tag.startswith("xacro:"):
+            raise element.error("this is a xacro file; run xacro on it first")
+    links = _by_name(root.all("link"), lambda e: _link(e, notes))
+    joints = _by_name(root.all("joint"), lambda e: _joint(e, notes))
+    if not links:
+        raise root.error("expected at least one <link>")
+    others = Counter(e.tag for e in root.children if e.tag not in READ)
+    if others:
+        notes.add("not read", (f"<{tag}> ({count})" for tag, count in others.items()))
+    mimics = tuple(name for name, joint in joints.items() if joint.element.one("mimic"))
+    return Robot(root.attributes.get("name") or "robot", links, joints, mimics)
+
+
+def _by_name(elements: list[Element], read: Callable[[Element], T]) -> dict[str, T]:
+    """The parts by name; a name that is given twice is refused."""
+    out: dict[str, T] = {}
+    for element in elements:
+        name = element.text("name")
+        if name in out:
+            raise element.error(f"the name is taken by the <{element.tag}> of line {out[name].element.line}")
+        out[name] = read(element)
+    return out
+
+
+def _pose(element: Element) -> Pose:
+    """The <origin> of an element: zero where it is left out."""
+    origin = element.one("origin")
+    if origin is None:
+        return HERE
+    zero = (0.0, 0.0, 0.0)
+    return Pose(roll_pitch_yaw(origin.vector("rpy", 3, zero)), origin.vector("xyz", 3, zero))
+
+
+def _link(element: Element, notes: Notes) -> UrdfLink:
+    mass, com, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
+    inertial = element.one("inertial")
+    if inertial is not None:
+        pose = _pose(inertial)
+        mass = inertial.need("mass").number("value")
+        if mass < 0.0:
+            raise inertial.need("mass").error(f"expected a mass >= 0, got {mass:g}")
+        xx, xy, xz, yy, yz, zz = (
+            inertial.need("inertia").number(f"i{ab}") for ab in ("xx", "xy", "xz", "yy", "yz", "zz")
+        )
+        given = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        com, inertia = pose.point, pose.rotation @ given @ pose.rotation.T
+    contact = element.one("contact")
+    lateral = contact.one("lateral_friction") if contact else None
+    friction = lateral.number("value") if lateral else None
+    if lateral and friction is not None and friction < 0.0:
+        raise lateral.error(f"expected a coefficient >= 0, got {friction:g}")
+    if contact and any(e.tag in ("rolling_friction", "spinning_friction", "restitution") for e in contact.children):
+        notes.add("rolling and spinning friction and restitution are not modelled", [element.text("name")])
+    shapes = [tuple(_geometry(e) for e in element.all(tag)) for tag in ("collision", "visual")]
+    return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], friction, element)
+
+
+def _geometry(element: Element) -> Geometry:
+    """The shape of a <collision> or <visual>."""
+    kinds = [e for e in element.need("geometry").children if e.tag != "material"]
+    if len(kinds) != 1:
+        raise element.need("geometry").error(f"expected one shape, got {len(kinds)}")
+    shape = kinds[0]
+    if shape.tag == "box":
+        sizes = tuple(float(x) for x in shape.vector("size", 3))
+    else:
+        sizes = tuple(shape.number(field) for field in SIZES.get(shape.tag, ()))
+    if any(size < 0.0 for size in sizes):
+        raise shape.error(f"expected sizes >= 0, got {', '.join(f'{s:g}' for s in sizes)}")
+    return Geometry(shape.tag, sizes, _pose(element))
+
+
+def _joint(element: Element, notes: Notes) -> UrdfJoint:
+    return read_joint(element, ("parent", "child"), _pose(element), notes)
+
+
+def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes) -> UrdfJoint:
+    """A joint between the links that the two elements `ends` name, with its frame at `pose` in the first."""
+    name, given = element.text("name"), element.text("type")
+    if given not in KINDS:
+        raise element.error(f"type {given!r} is not one of: {', '.join(KINDS)}")
+    kind = KINDS[given]
+    axis = np.array([1.0, 0.0, 0.0])
+    if (line := element.one("axis")) is not None and kind not in ("fixed", "floating", "spherical"):
+        axis = line.vector("xyz", 3)
+        if np.linalg.norm(axis) < 1e-9:
+            raise line.error("expected a direction, got the zero vector")
+        axis = axis / np.linalg.norm(axis)
+    dynamics, limit = element.one("dynamics"), element.one("limit")
+    damping = dynamics.number("damping", 0.0) if dynamics else 0.0
+    if dynamics and damping < 0.0:
+        raise dynamics.error(f"expected damping >= 0, got {damping:g}")
+    if dynamics and dynamics.number("friction", 0.0) != 0.0 and kind != "fixed":
+        notes.add("joints move without the dry friction that the file gives them, which is not modelled", [name])
+    bounds = [
+        limit.number(field, np.inf) if limit and field in limit.attributes else np.inf
+        for field in ("effort", "velocity")
+    ]
+    return UrdfJoint(
+        name,
+        kind,
+        element.need(ends[0]).text("link"),
+        element.need(ends[1]).text("link"),
+        pose,
+        axis,
+        _limits(name, given, limit, notes),
+        damping,
+        bounds[0],
+        bounds[1],
+        element,
+    )
+
+
+def _limits(name: str, given: str, limit: Element | None, notes: Notes) -> tuple[float, float] | None:
+    """(lower, upper) of a joint that can have them.
+
+    An empty range (lower > upper is PyBullet's sign for it) or one of zero length is none; so is a range left out,
+    which URDF demands of revolute and prismatic joints, and files in the wild leave out.
+    """
+    if given not in ("revolute", "prismatic"):
+        if limit and given not in ("continuous", "fixed") and {"lower", "upper"} & limit.attributes.keys():
+            notes.add("limits of joints with several degrees of freedom are not represented", [name], warn=True)
+        return None
+    if limit is None or not {"lower", "upper"} & limit.attributes.keys():
+        notes.add("joints without limits, because the file gives no range", [name])
+        return None
+    lower, upper = limit.number("lower", 0.0), limit.number("upper", 0.0)
+    if lower >= upper:
+        notes.add("joints without limits, because the range in the file is empty", [f"{name} [{lower:g}, {upper:g}]"])
+        return None
+    return lower, upper

@@ -1,0 +1,43 @@
+"""Axes and frames that follow from one direction: of free and fixed translations, and of contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism.parts import Joint
+
+Floats = NDArray[np.float64]
+
+
+def translation_axes(ntrans: int, axis: ArrayLike) -> Floats:
+    """Free translations as rows of a (3, 3) matrix, zero below: along the axis, across it, or x, y, z."""
+    out = np.zeros((3, 3))
+    unit = np.asarray(axis, dtype=np.float64)
+    if ntrans == 3:
+        out[:] = np.eye(3)
+    elif ntrans == 1:
+        out[0] = unit
+    elif ntrans == 2:
+        first, second = (e for k, e in enumerate(np.eye(3)) if k != np.argmax(np.abs(unit)))
+        out[0] = _normalised(first - unit * (unit @ first))
+        out[1] = _normalised(second - unit * (unit @ second) - out[0] * (out[0] @ second))
+    return out
+
+
+def fixed_axes(joint: Joint) -> Floats:
+    """Orthonormal directions along which a joint does not move, (3 - ntrans, 3), joint frame."""
+    free = translation_axes(joint.ntrans, joint.axis)[: joint.ntrans]
+    return np.linalg.svd(free, full_matrices=True)[2][joint.ntrans :] if joint.ntrans else np.eye(3)
+
+
+def contact_frame(normal: ArrayLike) -> Floats:
+    """Rows n, t1, t2 of a right-handed frame: t1 along x (along y for a normal near x), t2 = n x t1."""
+    n = np.asarray(normal, dtype=np.float64)
+    along = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    t1 = _normalised(along - n * (n @ along))
+    return np.array([n, t1, np.cross(n, t1)])
+
+
+def _normalised(a: Floats) -> Floats:
+    return np.asarray(a / np.linalg.norm(a))

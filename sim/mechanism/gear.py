@@ -1,0 +1,52 @@
+"""Gear: one joint coordinate that follows another one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.mechanism import checks
+from sim.mechanism.parts import Joint
+
+
+@dataclass(frozen=True)
+class Gear:
+    """q[joint] = ratio q[other] + offset: toothed wheels, belts, a rack, a joint that mimics another one.
+
+    ratio [rad/rad, m/rad, ...], offset [m, rad]. dof, other_dof: which coordinate, of joints with several; quaternions
+    have none. The gear acts on both coordinates as two motors would: on their children, and back on their parents.
+    """
+
+    joint: str
+    other: str
+    ratio: float = 1.0
+    offset: float = 0.0
+    dof: int = 0
+    other_dof: int = 0
+    name: str = ""  # default: that of the joint
+
+    def __post_init__(self) -> None:
+        checks.name("Gear(joint=...)", self.joint)
+        checks.name("Gear(other=...)", self.other)
+        object.__setattr__(self, "name", checks.name("Gear(name=...)", self.name or self.joint))
+        call = f"Gear({self.name!r}"
+        for field in ("ratio", "offset"):
+            object.__setattr__(self, field, checks.number(f"{call}, {field}=...)", getattr(self, field)))
+
+
+def check_gears(call: str, gears: Sequence[Gear], joints: Sequence[Joint]) -> None:
+    """Refuse gears between coordinates that are not there, or are one."""
+    by_name = {j.name: j for j in joints}
+    checks.distinct(f"{call}: gears", (g.name for g in gears))
+    for g in gears:
+        for name, dof in ((g.joint, g.dof), (g.other, g.other_dof)):
+            joint = by_name[checks.one_of(f"{call}: joint of gear {g.name!r}", name, by_name)]
+            scalar = joint.ntrans if joint.nrot == 3 else joint.nv
+            if not isinstance(dof, int | np.integer) or not 0 <= dof < scalar:
+                raise ValueError(
+                    f"{call}: gear {g.name!r}: joint {name!r} has {scalar} scalar coordinates, got {dof!r}"
+                )
+        if (g.joint, g.dof) == (g.other, g.other_dof):
+            raise ValueError(f"{call}: gear {g.name!r} couples joint {g.joint!r} with itself")

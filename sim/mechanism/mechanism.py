@@ -1,0 +1,422 @@
+"""Mechanism: bodies hung on joints in a tree, with contacts and inputs; sorted and validated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.closing import carried
+from sim.mechanism.collision import Collision
+from sim.mechanism.contact_candidates import Touch, touches
+from sim.mechanism.dofs import components, dof_names
+from sim.mechanism.gear import Gear, check_gears
+from sim.mechanism.naming import name_contacts, name_inputs
+from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
+from sim.mechanism.poses import poses
+from sim.mechanism.shape_contacts import shape_contacts
+from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
+from sim.mechanism.terrain import Terrain
+from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, repr=False)
+class Mechanism:
+    """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
+
+    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+              those that close loops
+    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
+              or all of q
+    """
+
+    bodies: Sequence[Body]
+    joints: Sequence[Joint]
+    contacts: Sequence[Contact] = ()
+    inputs: Sequence[Input] | None = None
+    gravity: ArrayLike = (0.0, 0.0, -9.81)  # [m/s^2]
+    name: str = "mechanism"
+    neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
+    collisions: Sequence[Collision] = ()
+    loops: Sequence[Joint] = ()  # joints with close=True are moved here
+    gears: Sequence[Gear] = ()
+
+    def __post_init__(self) -> None:
+        checks.name("Mechanism(name=...)", self.name)
+        call = f"Mechanism({self.name!r}"
+        for field, kind in _KINDS.items():
+            if field != "inputs" or self.inputs is not None:
+                object.__setattr__(self, field, _parts(f"{call}, {field}=...)", getattr(self, field), kind))
+        loops = (*self.loops, *(j for j in self.joints if j.close))
+        tree = tuple(j for j in self.joints if not j.close)
+        if self.inputs is None:
+            object.__setattr__(self, "inputs", _every_dof(tree))
+        driven = {part.joint for part in self.inputs or () if part.joint is not None}
+        bodies, tree, loops = carried(f"{call})", self.bodies, tree, loops, driven)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", tree)
+        object.__setattr__(self, "loops", check_loops(f"{call})", loops, self.bodies, self.joints))
+        bodies, joints = sort_tree(f"{call})", self.bodies, self.joints)
+        object.__setattr__(self, "bodies", bodies)
+        object.__setattr__(self, "joints", joints)
+        check_masses(f"{call})", bodies, joints)
+        check_axes(f"{call})", bodies, joints)
+        check_gears(f"{call})", self.gears, joints)
+        if self.nv == 0:
+            raise ValueError(f"{call}): no joint is free to move")
+        ends = dict.fromkeys([*self.body_names, WORLD])
+        for c in self.collisions:
+            for name in (c.a, c.b):
+                checks.one_of(f"{call}): body of collision {c.name!r}", name, ends)
+        checks.distinct(f"{call}): collisions", (c.name for c in self.collisions))
+        object.__setattr__(self, "contacts", name_contacts(f"{call})", self.contacts, self.body_names))
+        object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
+        object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
+        object.__setattr__(self, "neutral", self._coordinates(f"{call}, neutral=...)", self.neutral))
+
+    def __repr__(self) -> str:
+        parts: dict[str, Any] = {"bodies": self.bodies, "inputs": self.inputs, "contacts": self.contacts}
+        parts |= {"collisions": self.collisions, "loops": self.loops, "gears": self.gears}
+        sizes = "".join(f", {what} {len(found)}" for what, found in parts.items() if found)
+        return f"{type(self).__name__}({self.name}, nq {self.nq}, nv {self.nv}{sizes})"
+
+    @property
+    def nbody(self) -> int:
+        """Number of bodies, and of joints."""
+        return len(self.bodies)
+
+    @cached_property
+    def nq(self) -> int:
+        """Number of coordinates."""
+        return sum(j.nq for j in self.joints)
+
+    @cached_property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return sum(j.nv for j in self.joints)
+
+    @cached_property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the bodies, in tree order."""
+        return tuple(b.name for b in self.bodies)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in tree order."""
+        return tuple(j.name for j in self.joints)
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the contacts: those with the ground, then the contact points of the collisions."""
+        return (*(c.name for c in self.contacts), *(touch.name for touch in self.touches))
+
+    @cached_property
+    def touches(self) -> tuple[Touch, ...]:
+        """The contact points that the collisions may have."""
+        return tuple(touches(f"Mechanism({self.name!r})", self.bodies, self.joints, self.collisions))
+
+    @cached_property
+    def contact_normals(self) -> NDArray[np.float64]:
+        """(ncontact, 3) outward normals of the ground at the contacts, world axes."""
+        out = np.array([np.asarray(c.normal) for c in self.contacts], dtype=np.float64).reshape(-1, 3)
+        out.flags.writeable = False
+        return out
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the entries of u."""
+        return tuple(i.name for i in self.inputs or ())
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom, (nv,), in the order of v: "knee", "base x", "base rz"."""
+        return dof_names(self.joints)
+
+    def components(self, *names: str) -> NDArray[np.int64]:
+        """Numbers in a perturbation dx = [dq; dv] of joints and degrees of freedom.
+
+        "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their velocities, "q" and
+        "v" all coordinates and all velocities.
+        """
+        return components("Mechanism.components(...)", self.joints, names)
+
+    def q_slice(self, joint: str) -> slice:
+        """Where the coordinates of a joint are in q."""
+        return self._slices[checks.one_of("Mechanism.q_slice(joint)", joint, self._slices)][0]
+
+    def v_slice(self, joint: str) -> slice:
+        """Where the velocities of a joint are in v."""
+        return self._slices[checks.one_of("Mechanism.v_slice(joint)", joint, self._slices)][1]
+
+    @cached_property
+    def _slices(self) -> dict[str, tuple[slice, slice]]:
+        """By joint, where it is in q and in v."""
+        out, q, v = {}, 0, 0
+        for joint in self.joints:
+            out[joint.name] = slice(q, q := q + joint.nq), slice(v, v := v + joint.nv)
+        return out
+
+    def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
+        """This mechanism and another one, in one: its bodies, joints, contacts, inputs and collisions after ours.
+
+        pose     where the world of `other` is put: translation (3,) [m], or with a quaternion (7,). Its joints with the
+                 world, its obstacles and its neutral state move there; its contacts touch the ground that they touched
+                 before, and inputs along world axes keep them
+        prefix   put before every name of `other`; a ValueError says which name both have
+        """
+        return _added(self, other, pose, prefix, name or self.name)
+
+    def on(
+        self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
+    ) -> Mechanism:
+        """The same on other ground, under all contacts or those named; it stands there as high as it touches.
+
+        Contacts keep their friction; what normal and height they had is replaced. The shapes of `bodies` touch it too,
+        by balls and corners that are added as contacts (shape_contacts.py); options: of these (friction, law,
+        restitution).
+        """
+        return _on_terrain(self, terrain, contacts, bodies, **options)
+
+    def with_collisions(self, *collisions: Collision) -> Mechanism:
+        """The same with more collisions."""
+        return replace(self, collisions=[*self.collisions, *collisions])
+
+    def with_obstacle(
+        self, shape: Solid, bodies: Sequence[str] | None = None, name: str = "obstacle", **options: Any
+    ) -> Mechanism:
+        """The same with a fixed obstacle, placed in world axes by its centre and orientation.
+
+        What touches the ground touches it too: the balls of the contacts; or, when given, the shapes of `bodies`.
+        options: of Collision (friction, law, restitution).
+        """
+        return _with_obstacle(self, shape, bodies, name, **options)
+
+    def _coordinates(self, call: str, given: Any) -> tuple[float, ...]:
+        """q from a table by joint, or from a vector; quaternions are checked and normalised."""
+        q = np.zeros(self.nq)
+        table = {} if given is None else given
+        if isinstance(table, Mapping):
+            for name in table:
+                checks.one_of(f"{call}: joint", name, self._slices)
+        else:
+            values = checks.array(call, table, (self.nq,))
+            table = {j.name: values[self.q_slice(j.name)] for j in self.joints}
+        for joint in self.joints:
+            at = self.q_slice(joint.name)
+            if joint.nrot == 3:
+                q[at.stop - 4] = 1.0
+            if joint.name in table:
+                value = checks.array(f"{call}: joint {joint.name!r}", np.atleast_1d(table[joint.name]), (joint.nq,))
+                q[at] = value
+                if joint.nrot == 3:
+                    q[at.stop - 4 : at.stop] = checks.quaternion(f"{call}: joint {joint.name!r}", value[-4:])
+        return tuple(float(x) for x in q)
+
+
+_KINDS = {
+    "bodies": Body,
+    "joints": Joint,
+    "contacts": Contact,
+    "inputs": Input,
+    "collisions": Collision,
+    "loops": Joint,
+    "gears": Gear,
+}
+
+
+def _every_dof(joints: Sequence[Joint]) -> tuple[Input, ...]:
+    """An input for every degree of freedom of every joint but the floating ones."""
+    return tuple(Input(j.name, dof=d) for j in joints if j.kind != "floating" for d in range(j.nv))
+
+
+def _parts(call: str, given: Any, kind: type) -> tuple[Any, ...]:
+    """The parts as a tuple, each of the expected kind."""
+    parts = tuple(given) if isinstance(given, Iterable) else (given,)
+    for part in parts:
+        if not isinstance(part, kind):
+            raise ValueError(f"{call}: expected a list of {kind.__name__}, got {part!r}")
+    return parts
+
+
+# -- scenes: several robots and objects in one mechanism, obstacles, and other ground ----------------------------------
+
+_CLEAR = 1e-9  # [m] between the lowest contact and the ground, see stance.py
+
+
+def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name: str | None) -> Mechanism:
+    """Both in one mechanism, see `Mechanism.add`."""
+    call = "Mechanism.add"
+    if not isinstance(other, Mechanism):
+        raise ValueError(f"{call}(other): expected a Mechanism, got {other!r}")
+    if not np.array_equal(np.asarray(mech.gravity), np.asarray(other.gravity)):
+        raise ValueError(f"{call}(other): {mech.name!r} has the gravity {mech.gravity}, {other.name!r} {other.gravity}")
+    point, quat = _placed(f"{call}(pose)", pose)
+    neutral = np.concatenate([np.asarray(mech.neutral), _moved_neutral(other, point, quat)])
+    parts = _renamed(other, prefix)
+    _refuse_clashes(call, mech, parts, other.name)
+    joints = [_moved_joint(j, point, quat) for j in parts["joints"]]
+    loops = [_moved_joint(j, point, quat) for j in parts["loops"]]
+    collisions = [_moved_obstacle(c, point, quat) for c in parts["collisions"]]
+    return Mechanism(
+        [*mech.bodies, *parts["bodies"]],
+        [*mech.joints, *joints],
+        [*mech.contacts, *parts["contacts"]],
+        [*(mech.inputs or ()), *parts["inputs"]],
+        mech.gravity,
+        mech.name if name is None else name,
+        neutral,
+        [*mech.collisions, *collisions],
+        [*mech.loops, *loops],
+        [*mech.gears, *parts["gears"]],
+    )
+
+
+def _placed(call: str, pose: ArrayLike) -> tuple[Floats, Floats]:
+    """Translation and quaternion of (3,) or (7,) numbers."""
+    given = checks.array(call, pose, (None,))
+    if len(given) not in (3, 7):
+        raise ValueError(f"{call}: expected a translation (3,), or with a quaternion (7,), got shape {given.shape}")
+    quat = checks.quaternion(call, given[3:]) if len(given) == 7 else (1.0, 0.0, 0.0, 0.0)
+    return given[:3], np.asarray(quat)
+
+
+def _product(a: ArrayLike, b: ArrayLike) -> Floats:
+    """Hamilton product of two quaternions."""
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+    scalar = a[0] * b[0] - a[1:] @ b[1:]
+    return np.concatenate([[scalar], a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])])
+
+
+def _renamed(mech: Mechanism, prefix: str) -> dict[str, list[Any]]:
+    """The parts of a mechanism with the prefix before every name."""
+    names = {
+        "bodies": ("name",),
+        "joints": ("name", "parent", "child"),
+        "contacts": ("name", "body"),
+        "inputs": ("name", "joint", "body"),
+        "collisions": ("name", "a", "b"),
+        "loops": ("name", "parent", "child"),
+        "gears": ("name", "joint", "other"),
+    }
+
+    def changed(part: Any, keys: Sequence[str]) -> Any:
+        given = {key: getattr(part, key) for key in keys}
+        return replace(part, **{k: v if v is None or v == WORLD else prefix + v for k, v in given.items()})
+
+    return {field: [changed(part, keys) for part in getattr(mech, field)] for field, keys in names.items()}
+
+
+def _refuse_clashes(call: str, mech: Mechanism, parts: dict[str, list[Any]], other: str) -> None:
+    """Refuse names that both have."""
+    joints = {j.name for j in (*mech.joints, *mech.loops)}
+    taken = {field: {p.name for p in getattr(mech, field)} for field in parts} | {"joints": joints, "loops": joints}
+    singular = dict(zip(parts, ("body", "joint", "contact", "input", "collision", "joint", "gear"), strict=True))
+    for field, found in parts.items():
+        for part in found:
+            if part.name in taken[field]:
+                raise ValueError(
+                    f"{call}(other): both have a {singular[field]} {part.name!r}; "
+                    f"give a prefix=... for the names of {other!r}"
+                )
+
+
+def _moved_joint(joint: Joint, point: Floats, quat: Floats) -> Joint:
+    """A joint with the world moved; of one that floats, the coordinates are moved instead."""
+    if joint.parent != WORLD or (joint.kind == "floating" and not joint.close):
+        return joint
+    place = point + rotation_matrix(quat) @ np.asarray(joint.parent_point)
+    return replace(joint, parent_point=place, orientation=_product(quat, joint.orientation))
+
+
+def _moved_neutral(mech: Mechanism, point: Floats, quat: Floats) -> Floats:
+    """The neutral coordinates, those of floating roots moved: q' = F^-1 T F q, F the frame of the joint."""
+    q = np.array(mech.neutral, dtype=np.float64)
+    for joint in mech.joints:
+        if joint.parent != WORLD or joint.kind != "floating":
+            continue
+        at = mech.q_slice(joint.name)
+        frame, origin = np.asarray(joint.orientation), np.asarray(joint.parent_point)
+        back = frame * (1.0, -1.0, -1.0, -1.0)
+        place = rotation_matrix(quat) @ (origin + rotation_matrix(frame) @ q[at][:3]) + point
+        q[at.start : at.start + 3] = rotation_matrix(back) @ (place - origin)
+        q[at.start + 3 : at.stop] = _product(back, _product(quat, _product(frame, q[at][3:])))
+    return q
+
+
+def _moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collision:
+    """An obstacle moves with the scene it comes with."""
+    shape = collision.shape_b
+    if collision.b != WORLD or shape is None:
+        return collision
+    centre = point + rotation_matrix(quat) @ np.asarray(shape.center)
+    return replace(collision, shape_b=replace(shape, center=centre, orientation=_product(quat, shape.orientation)))
+
+
+def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, name: str, **options: Any) -> Mechanism:
+    """See `Mechanism.with_obstacle`."""
+    call = "Mechanism.with_obstacle"
+    if bodies is None:
+        balls = [c for c in mech.contacts if c.radius > 0.0]
+        if not balls:
+            raise ValueError(f"{call}: {mech.name!r} has no contact with a radius; say which bodies=[...]")
+        found = [
+            Collision(c.body, None, Sphere(radius=c.radius, center=c.point), shape, name=f"{name}-{c.name}", **options)
+            for c in balls
+        ]
+    else:
+        for body in bodies:
+            checks.one_of(f"{call}(bodies=...)", body, mech.body_names)
+        found = [Collision(body, None, None, shape, name=f"{name}-{body}", **options) for body in bodies]
+    return mech.with_collisions(*found)
+
+
+def _on_terrain(
+    mech: Mechanism, terrain: Terrain, contacts: Sequence[str] | None, bodies: Sequence[str], **options: Any
+) -> Mechanism:
+    """See `Mechanism.on`."""
+    call = "Mechanism.on"
+    if not isinstance(terrain, Terrain):
+        raise ValueError(f"{call}(terrain): expected a Terrain, got {terrain!r}")
+    names = [c.name for c in mech.contacts]
+    for name in contacts or ():
+        checks.one_of(f"{call}(contacts=...)", name, names)
+    for name in bodies:
+        checks.one_of(f"{call}(bodies=...)", name, mech.body_names)
+    if options and not bodies:
+        raise ValueError(f"{call}({', '.join(options)}=...): of the contacts of bodies=[...]; none are given")
+    shaped = [c for b in mech.bodies if b.name in bodies for c in shape_contacts(f"{call}(bodies=...)", b, **options)]
+    level: Any = {"normal": (0.0, 0.0, 1.0), "height": 0.0, "terrain": terrain}
+    chosen = [*(names if contacts is None else contacts), *(c.name for c in shaped)]
+    found = [*mech.contacts, *shaped]
+    moved = replace(mech, contacts=[replace(c, **level) if c.name in chosen else c for c in found])
+    return replace(moved, neutral=_standing(moved))
+
+
+def _standing(mech: Mechanism) -> Floats:
+    """Neutral coordinates with every floating root as high as its lowest contact touches the ground."""
+    q = np.array(mech.neutral, dtype=np.float64)
+    at = poses(mech.joints, q)
+    for joint in mech.joints:
+        if joint.parent != WORLD or joint.kind != "floating":
+            continue
+        hanging = {joint.child}
+        for other in mech.joints:
+            if other.parent in hanging:
+                hanging.add(other.child)
+        first = mech.q_slice(joint.name).start
+        rises = []
+        for c in mech.contacts:
+            centre = at[c.body].at(c.point)
+            slope = float(c.normal_at(centre)[2])
+            if c.body in hanging and slope > 0.0:
+                rises.append((_CLEAR - float(c.gap(centre))) / slope)
+        if rises:
+            q[first : first + 3] += max(rises) * rotation_matrix(joint.orientation)[2]
+    return q

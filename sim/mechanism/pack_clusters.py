@@ -1,0 +1,49 @@
+"""Clusters of contacts: those on one body against one direction, and the ball around them (inactive.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.model.model import Model
+
+Floats = NDArray[np.float64]
+
+STIFFNESS = 1000.0  # largest e (inactive.py) of a contact that is left out, in units of the tolerance
+
+
+def pack_clusters(model: Model) -> None:
+    """Contacts that follow one another on one body, against one direction: the ball around them (inactive.py)."""
+    count = len(model.contact_height)
+    level = model.contact_terrain == 0
+    joined = (np.diff(model.contact_body[:count]) == 0) & level[1:] & level[:-1]
+    joined &= np.diff(model.contact_hold[:count]) == 0
+    joined &= np.all(model.contact_frame[1:] == model.contact_frame[:-1], axis=1)
+    ends = [*(1 + np.flatnonzero(~joined)).tolist(), count]
+    for first, end in zip([0, *ends[:-1]], ends if count else [], strict=False):
+        points, radii = model.contact_point[first:end], model.contact_radius[first:end]
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        around = float(np.max(np.linalg.norm(points - centre, axis=1) + radii))
+        arm = float(np.max(np.linalg.norm(points, axis=1) + radii))
+        body = int(model.contact_body[first])
+        mass, turning = _mobility(model, body)
+        inertia, easy = model.body_inertia[body], turning**0.5
+        swing = max(_swing(inertia, p) + r * easy for p, r in zip(points, radii, strict=True))
+        spread = float(np.max(np.linalg.norm(points - centre, axis=1)))
+        mobility = mass + swing * swing + 2.0 * spread * swing * easy
+        friction = model.contact_friction[first:end].max()
+        model.cluster_end[first] = end
+        model.cluster[first] = *centre, around, arm, mobility, friction, _swing(inertia, points.mean(axis=0)) * easy
+
+
+def _swing(inertia: Floats, p: Floats) -> float:
+    """Largest |J^-1/2 (p x f)| of a unit force f: how easily a body turns under a force at p."""
+    values, axes = np.linalg.eigh(inertia.reshape(3, 3))
+    return float(np.linalg.norm(np.cross(axes.T, p) / np.sqrt(values)[:, None], ord=2))
+
+
+def _mobility(model: Model, body: int) -> tuple[float, float]:
+    """1/m and 1/J, J the least principal moment of inertia: no joint makes a body easier to move."""
+    least = float(np.linalg.eigvalsh(model.body_inertia[body].reshape(3, 3))[0])
+    mass = float(model.body_mass[body])
+    return (1.0 / mass, 1.0 / least) if mass > 0.0 else (np.inf, np.inf)

@@ -1,0 +1,72 @@
+"""The numbers of collisions in a Model: contact points, the balls around shapes, tables of polytopes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim.mechanism.contact_candidates import Touch, couples
+from sim.mechanism.mechanism import Mechanism
+from sim.model import shape_kinds
+from sim.model.model import Law, Model
+
+
+def pack_collisions(mech: Mechanism, model: Model) -> None:
+    """The numbers of the pairs, and of the couplings that they make."""
+    found = mech.touches
+    bodies = couples(found)
+    ground = len(mech.contacts)
+    for j, touch in enumerate(found):
+        c = ground + j
+        model.contact_body[c] = touch.bodies[0]
+        model.contact_law[c] = Law[touch.law.upper()] if touch.friction > 0.0 else Law.IMPACT
+        model.contact_friction[c] = touch.friction
+        model.contact_restitution[c] = touch.restitution
+        model.pair_coupling[j] = bodies.index(touch.bodies)
+        model.pair_kind[j], model.pair_feature[j] = touch.kind, touch.feature
+        model.pair_sizes[j] = touch.sizes
+        model.pair_place[2 * j : 2 * j + 2] = touch.places
+    _pack_far(found, model)
+    _pack_hulls(found, model)
+    for k, (a, b) in enumerate(bodies):
+        model.coupling_body[k] = a, b
+        model.coupling_row[k + 1] = model.coupling_row[k] + 6
+
+
+def _pack_far(found: Sequence[Touch], model: Model) -> None:
+    """pair_far and body_reach."""
+    firsts = [j for j, touch in enumerate(found) if touch.feature == 0]
+    if not firsts:
+        return
+    degree = Counter(i for j in firsts for i in found[j].bodies)
+    for j, end in zip(firsts, [*firsts[1:], len(found)], strict=True):
+        touch = found[j]
+        arms, mobility, turning = [0.0, 0.0], 0.0, 0.0
+        for side, i in enumerate(touch.bodies):
+            if i < 0:
+                continue
+            arm = float(np.linalg.norm(touch.places[side, :3])) + touch.radii[side]
+            least = float(np.linalg.eigvalsh(model.body_inertia[i].reshape(3, 3))[0])
+            free = model.body_mass[i] > 0.0 and arm < np.inf
+            arms[side] = arm
+            mobility += 1.0 / model.body_mass[i] + arm**2 / least if free else np.inf
+            turning += arm / least if free else np.inf
+            model.body_reach[i] = max(model.body_reach[i], arm)
+        most = max(degree[i] for i in touch.bodies if i >= 0)
+        model.pair_far[j] = sum(touch.radii), *arms, mobility, turning, most, end - j
+
+
+def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
+    """hull, and where in it the polytopes of every point are."""
+    end, rows = 0, [0, 0]
+    for j, touch in enumerate(found):
+        for k, table in enumerate(touch.hulls):
+            rows[k] = end
+            model.hull[end : end + len(table)] = table
+            end += len(table)
+        if touch.kind % shape_kinds.SWAPPED == shape_kinds.Pair.POLYTOPE_POLYTOPE:
+            model.pair_sizes[j, [0, 4]] = rows
+        elif touch.kind % shape_kinds.SWAPPED == shape_kinds.Pair.POLYTOPE_CYLINDER:
+            model.pair_sizes[j, 0] = rows[0]

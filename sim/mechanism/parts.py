@@ -1,0 +1,328 @@
+"""Body, Joint, Contact, Input: the parts a user puts together into a Mechanism. Each checks its own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import Shape, Solid
+from sim.mechanism.terrain import Terrain
+
+WORLD = "world"
+# free translations and free rotations of each kind of joint
+KINDS: dict[str, tuple[int, int]] = {
+    "fixed": (0, 0),
+    "prismatic": (1, 0),  # along the axis
+    "planar": (2, 0),  # across the axis
+    "fixed_orientation": (3, 0),
+    "revolute": (0, 1),  # about the axis
+    "cylindrical": (1, 1),
+    "planar_axis": (2, 1),  # across and about the axis: the base of a planar robot
+    "free_revolute": (3, 1),
+    "orbital": (0, 2),  # in any direction across the axis, never about it
+    "prismatic_orbital": (1, 2),
+    "planar_orbital": (2, 2),
+    "free_orbital": (3, 2),
+    "spherical": (0, 3),
+    "cylindrical_free": (1, 3),
+    "planar_free": (2, 3),
+    "floating": (3, 3),
+}
+LAWS = ("impact", "linear", "nonlinear")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body. Its frame has its origin at the centre of mass.
+
+    inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; left out, that of `shape`.
+    A body of mass 0, without inertia and shape, is the middle of a joint put together from several, as hinges one after
+    the other; something with a mass has to hang on it.
+    """
+
+    name: str
+    mass: float = 1.0  # [kg]
+    inertia: ArrayLike | None = None
+    shape: Shape | Polytope | None = None
+
+    def __post_init__(self) -> None:
+        checks.name("Body(name=...)", self.name)
+        call = f"Body({self.name!r}"
+        if self.mass != 0 or self.inertia is not None or self.shape is not None:
+            object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
+        if self.shape is not None and not isinstance(self.shape, Solid):
+            known = "Sphere, Box, Cylinder, Capsule or Polytope"
+            raise ValueError(f"{call}, shape=...): expected {known}, got {self.shape!r}")
+        object.__setattr__(self, "inertia", inertia_of(call, self))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What lets `child` move relative to `parent`.
+
+        joint frame   at `parent_point` in the parent, turned by `orientation` (quaternion, joint to parent)
+        coordinates   translations first, then rotations; at zero the child's axes are those of the joint frame
+                      one rotation: its angle; two, of the orbital kinds: the rotation vector along the two directions
+                      of the plane across the axis (sim/dynamics/joints/swing.py); three: a quaternion
+        `axis`        in the joint frame; a plane across it has its coordinates along x, y, z in this order, without
+                      the one nearest to the axis (axis y: x then z)
+
+    Points are measured from the centres of mass [m]. spring [N/m, N m/rad], damper [N s/m, N m s/rad] and rest take one
+    number or one per degree of freedom; a quaternion joint has one spring constant, and its rest is a rotation vector.
+    limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite. cone: largest angle of
+    the child's axis from the parent's, for kinds with three rotations [rad]. armature [kg, kg m^2]: inertia that moves
+    with a coordinate and with nothing else, as a geared rotor's; none on the rotations of a quaternion.
+
+    close: the child hangs on another joint already, and this one closes a loop. With a spring, a damper, limits,
+    armature, an input or two rotations it has coordinates of its own, and the child is cut there: a second part of it,
+    the body "child.name", hangs on this joint and is welded to the first (sim/mechanism/closing.py).
+
+    kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
+    prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating. The plane of
+    the planar kinds is across the axis; orbital kinds turn about all but the axis, the other three about all.
+    """
+
+    kind: str
+    parent: str | None
+    child: str
+    name: str = ""  # default: that of the child
+    parent_point: ArrayLike = (0.0, 0.0, 0.0)
+    child_point: ArrayLike = (0.0, 0.0, 0.0)
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    spring: ArrayLike = 0.0
+    damper: ArrayLike = 0.0
+    rest: ArrayLike = 0.0
+    limits: Sequence[Any] | None = None
+    cone: float | None = None
+    armature: ArrayLike = 0.0
+    close: bool = False
+
+    def __post_init__(self) -> None:
+        checks.name("Joint(child=...)", self.child)
+        object.__setattr__(self, "name", checks.name("Joint(name=...)", self.name or self.child))
+        call = f"Joint({self.name!r}"
+        checks.one_of(f"{call}, kind=...)", self.kind, KINDS)
+        object.__setattr__(self, "parent", checks.name(f"{call}, parent=...)", self.parent or WORLD))
+        for field in ("parent_point", "child_point"):
+            object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
+        object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
+        object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
+        for field in ("spring", "damper", "rest", "armature"):
+            object.__setattr__(self, field, per_dof(call, self, field))
+        object.__setattr__(self, "limits", limits_of(f"{call}, limits=...)", self))
+        object.__setattr__(self, "cone", cone_of(f"{call}, cone=...)", self))
+
+    @property
+    def ntrans(self) -> int:
+        """Number of free translations."""
+        return KINDS[self.kind][0]
+
+    @property
+    def nrot(self) -> int:
+        """Number of free rotations."""
+        return KINDS[self.kind][1]
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom."""
+        return self.ntrans + self.nrot
+
+    @property
+    def nq(self) -> int:
+        """Number of coordinates: one per degree of freedom, four for three rotations."""
+        return self.nv + (self.nrot == 3)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
+
+    law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
+    terrain: ground that is no half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
+    restitution: share of the normal velocity that an impact gives back, see sim/contact/restitution.py.
+    """
+
+    body: str
+    point: ArrayLike = (0.0, 0.0, 0.0)  # from the centre of mass, body axes [m]
+    radius: float = 0.0  # [m]
+    friction: float = 0.5
+    law: str = "nonlinear"
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    height: float = 0.0  # [m]
+    name: str = ""  # default: that of the body, numbered when it has several
+    terrain: Terrain | None = None
+    restitution: float = 0.0
+
+    def __post_init__(self) -> None:
+        checks.name("Contact(body=...)", self.body)
+        call = f"Contact({self.name or self.body!r}"
+        object.__setattr__(self, "point", checks.vector(f"{call}, point=...)", self.point, 3))
+        for field in ("radius", "friction"):
+            value = checks.number(f"{call}, {field}=...)", getattr(self, field), at_least=0.0)
+            object.__setattr__(self, field, value)
+        checks.one_of(f"{call}, law=...)", self.law, LAWS)
+        object.__setattr__(self, "normal", checks.direction(f"{call}, normal=...)", self.normal))
+        object.__setattr__(self, "height", checks.number(f"{call}, height=...)", self.height))
+        object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
+        if self.terrain is not None:
+            self._put_on(f"{call}, terrain=...)", self.terrain)
+
+    def _put_on(self, call: str, terrain: Terrain) -> None:
+        """A slope is a half-space; other terrain lies above and below the level plane."""
+        if not isinstance(terrain, Terrain):
+            raise ValueError(f"{call}: expected a Terrain, got {terrain!r}")
+        if self.normal != (0.0, 0.0, 1.0):
+            raise ValueError(f"{call}: a contact with terrain has no normal of its own, got normal={self.normal}")
+        if terrain.plane is not None:
+            normal, height = terrain.plane
+            object.__setattr__(self, "normal", normal)
+            object.__setattr__(self, "height", height + self.height * normal[2])
+            object.__setattr__(self, "terrain", None)
+
+    def gap(self, centres: ArrayLike) -> NDArray[np.float64]:
+        """Distance from the ground of the ball with its centre at `centres` (..., 3), world axes [m]."""
+        at = np.asarray(centres, dtype=np.float64)
+        if self.terrain is None:
+            return np.asarray(at @ np.asarray(self.normal) - self.radius - self.height)
+        surface = self.terrain.surface(float(self.radius))
+        return (at[..., 2] - surface.height(at[..., 0], at[..., 1]) - self.height) * self.normal_at(at)[..., 2]
+
+    def normal_at(self, centres: ArrayLike) -> NDArray[np.float64]:
+        """Outward normal of the ground at the ball with its centre at `centres` (..., 3), (..., 3)."""
+        at = np.asarray(centres, dtype=np.float64)
+        if self.terrain is None:
+            return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
+        return self.terrain.surface(float(self.radius)).normal(at[..., 0], at[..., 1])
+
+
+@dataclass(frozen=True)
+class Input:
+    """One entry of u: a force or torque on a joint coordinate, or a wrench on a body at its centre of mass.
+
+    Input("knee")                                 the torque of a joint with one degree of freedom [N m]
+    Input("base", dof=3)                          its fourth degree of freedom [N or N m]
+    Input(body="block", force=(1, 0, 0))          u newtons along x, world axes
+    Input(body="drone", force=(0, 0, 1), torque=(0, 0, 0.02), frame="body")
+    """
+
+    joint: str | None = None
+    dof: int = 0
+    body: str | None = None
+    force: ArrayLike = (0.0, 0.0, 0.0)
+    torque: ArrayLike = (0.0, 0.0, 0.0)
+    frame: str = "world"
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.joint is None) == (self.body is None):
+            raise ValueError("Input(...): give either a joint or body=...")
+        call = f"Input({(self.name or self.joint or self.body)!r}"
+        for field in ("force", "torque"):
+            object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
+        checks.one_of(f"{call}, frame=...)", self.frame, ("world", "body"))
+        wrench = np.array([self.force, self.torque], dtype=np.float64)
+        if self.body is not None and not wrench.any():
+            raise ValueError(f"{call}): give a force=... or a torque=... per unit of the input")
+        if self.joint is not None and wrench.any():
+            raise ValueError(f"{call}): force and torque are for an input on a body")
+
+
+# -- checks of what a user gives, per part -----------------------------------------------------------------------------
+
+
+def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
+    """The inertia as rows, after the tests that every rigid body passes."""
+    if body.mass == 0.0:
+        return ((0.0, 0.0, 0.0),) * 3
+    if body.inertia is None:
+        if body.shape is None:
+            raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
+        if np.any(np.asarray(body.shape.center)):
+            raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
+        matrix = body.shape.inertia(body.mass)
+    else:
+        matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
+        matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
+    if not np.allclose(matrix, matrix.T, rtol=0, atol=1e-9 * np.abs(matrix).max()):
+        raise ValueError(f"{call}, inertia=...): expected a symmetric matrix, got {matrix.tolist()}")
+    matrix = 0.5 * (matrix + matrix.T)
+    a, b, c = np.linalg.eigvalsh(matrix)
+    if a <= 0.0:
+        raise ValueError(f"{call}, inertia=...): not positive definite, its principal moments are {a:g}, {b:g}, {c:g}")
+    if c > (a + b) * (1 + 1e-6):
+        raise ValueError(
+            f"{call}, inertia=...): no rigid body has principal moments {a:g}, {b:g}, {c:g}: "
+            "the largest exceeds the sum of the others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in matrix)
+
+
+def per_dof(call: str, joint: Joint, field: str) -> tuple[float, ...]:
+    """One value per degree of freedom."""
+    call, value = f"{call}, {field}=...)", getattr(joint, field)
+    if np.ndim(value) == 0:
+        values = (checks.number(call, value),) * joint.nv
+        if field == "rest" and joint.nrot == 3 and any(values):
+            raise ValueError(f"{call}: expected {joint.nv} numbers, the last three a rotation vector, got {value!r}")
+    else:
+        values = checks.vector(call, value, joint.nv)
+    if field != "rest" and any(x < 0.0 for x in values):
+        raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
+    if field == "armature" and joint.nrot == 3 and any(values[-3:]):
+        raise ValueError(f"{call}: the rotations of a quaternion joint have none, got {value!r}")
+    if field == "spring" and joint.nrot == 3 and len(set(values[-3:])) > 1:
+        raise ValueError(f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}")
+    return values
+
+
+def limits_of(call: str, joint: Joint) -> tuple[tuple[float, float], ...]:
+    """One (lo, hi) per degree of freedom, infinite where there is none."""
+    free = (-np.inf, np.inf)
+    given = joint.limits
+    if given is None:
+        return (free,) * joint.nv
+    if not hasattr(given, "__len__"):
+        raise ValueError(f"{call}: expected (lo, hi), or one such pair per degree of freedom, got {given!r}")
+    if len(given) == 2 and all(np.ndim(x) == 0 for x in given) and (joint.nv == 1 or any(x is not None for x in given)):
+        given = (given,)
+    if len(given) != joint.nv:
+        raise ValueError(f"{call}: expected {joint.nv} pairs (lo, hi), one per degree of freedom, got {len(given)}")
+    out = []
+    for dof, pair in enumerate(given):
+        lo, hi = bounds(call, free if pair is None else pair)
+        if joint.nrot == 3 and dof >= joint.ntrans and (lo, hi) != free:
+            raise ValueError(
+                f"{call}: the three rotations of a {joint.kind} joint have no bounds; cone=... limits them"
+            )
+        out.append((lo, hi))
+    return tuple(out)
+
+
+def cone_of(call: str, joint: Joint) -> float | None:
+    """The largest angle of a cone, between 0 and pi, on kinds with three rotations."""
+    if joint.cone is None:
+        return None
+    if joint.nrot != 3:
+        raise ValueError(f"{call}: a {joint.kind} joint has no three rotations to limit; see limits=...")
+    angle = checks.number(call, joint.cone, above=0.0)
+    if angle > 3.1:
+        raise ValueError(f"{call}: expected an angle below 3.1 rad, got {angle:g}")
+    return angle
+
+
+def bounds(call: str, pair: Any) -> tuple[float, float]:
+    """(lo, hi) with lo < hi; None stands for no bound."""
+    try:
+        lo, hi = (float(x) if x is not None else s * np.inf for x, s in zip(pair, (-1, 1), strict=True))
+    except (TypeError, ValueError):
+        raise ValueError(f"{call}: expected a pair (lo, hi), got {pair!r}") from None
+    if not lo < hi or lo == np.inf or hi == -np.inf:
+        raise ValueError(f"{call}: expected lo < hi, got ({lo:g}, {hi:g})")
+    return lo, hi

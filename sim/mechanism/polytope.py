@@ -1,0 +1,130 @@
+"""Polytope: the convex hull of points, as the shape of a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
+
+Floats = NDArray[np.float64]
+
+_PARALLEL = 1e-9  # difference of the normals of two facets in one plane
+_FLAT = 1e-9  # volume, relative to that of the box around the points, below which they span no body
+
+
+@dataclass(frozen=True)
+class Polytope(Solid):
+    """The convex hull of points (n, 3) in the frame of the shape [m]; at least four, not all in one plane.
+
+    `vertices` keeps the corners of the hull only. A body that takes its inertia from the shape has its origin at the
+    centre of mass: `Polytope.about_centroid(points)` moves it there.  ValueError: points that span no volume.
+    """
+
+    vertices: ArrayLike
+
+    __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        from scipy.spatial import ConvexHull, QhullError
+
+        super().__post_init__()
+        points = checks.array("Polytope(vertices=...)", self.vertices, (None, 3))
+        if len(points) < 4:
+            raise ValueError(f"Polytope(vertices=...): expected at least 4 points, got {len(points)}")
+        size = np.ptp(points, axis=0)
+        try:
+            hull = ConvexHull(points)
+        except QhullError:
+            hull = None
+        if hull is None or not hull.volume > _FLAT * size.max() ** 3:
+            raise ValueError(f"Polytope(vertices=...): its {len(points)} points span no volume")
+        object.__setattr__(self, "vertices", tuple(tuple(float(x) for x in p) for p in points[np.sort(hull.vertices)]))
+
+    @classmethod
+    def about_centroid(cls, vertices: ArrayLike, **place: Any) -> Polytope:
+        """The same with the centroid of the solid at the origin; place: center and orientation."""
+        raw = cls(vertices)
+        return cls(np.asarray(raw.vertices) - raw.centroid, **place)
+
+    def _moments(self) -> tuple[float, Floats, Floats]:
+        """Volume, integral of x (3,), and of x x^T (3, 3), as sums over tetrahedra from the origin to the facets."""
+        from scipy.spatial import ConvexHull
+
+        points = np.asarray(self.vertices)
+        hull = ConvexHull(points)
+        volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
+        for corners, plane in zip(hull.simplices, hull.equations, strict=True):
+            v = points[corners]
+            six = float(np.linalg.det(v))
+            if np.cross(v[1] - v[0], v[2] - v[0]) @ plane[:3] < 0.0:
+                six = -six
+            total = v.sum(axis=0)
+            volume += six / 6.0
+            first += six / 24.0 * total
+            second += six / 120.0 * (v.T @ v + np.outer(total, total))
+        return volume, first, second
+
+    @property
+    def centroid(self) -> Floats:
+        """Centre of the solid (3,), in the frame of the shape [m]."""
+        volume, first, _ = self._moments()
+        return first / volume
+
+    def inertia(self, mass: float) -> Floats:
+        """Inertia (3, 3) about the origin of the shape, body axes [kg m^2].  ValueError: that is not its centroid."""
+        volume, first, second = self._moments()
+        size = float(np.ptp(np.asarray(self.vertices), axis=0).max())
+        if np.abs(first / volume).max() > 1e-9 * size:
+            raise ValueError(
+                f"Polytope: its centroid is at {np.round(first / volume, 9).tolist()}; a body has its origin there: "
+                "use Polytope.about_centroid(vertices), or give inertia=..."
+            )
+        C = mass / volume * second
+        R = rotation_matrix(self.orientation)
+        return np.asarray(R @ (np.trace(C) * np.eye(3) - C) @ R.T)
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """Principal moments of inertia about the centroid, ascending [kg m^2]."""
+        a, b, c = np.linalg.eigvalsh(self.inertia(mass))
+        return float(a), float(b), float(c)
+
+
+def hull_table(shape: Solid) -> tuple[Floats, float]:
+    """The table of hull.py, (n, 4), of a shape without what is around it, and the radius of that [m]."""
+    if isinstance(shape, Sphere):
+        return np.array([[1.0, 0.0, 0.0, 0.0], np.zeros(4)]), shape.radius
+    if isinstance(shape, Capsule):
+        half = 0.5 * shape.length
+        return np.array([[2.0, 1, 0, 0], [0, 0, -half, 0], [0, 0, half, 0], [0, 1, -1, -1]]), shape.radius
+    if isinstance(shape, Box):
+        return _table(0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))), 0.0
+    assert isinstance(shape, Polytope)
+    return _table(np.asarray(shape.vertices)), 0.0
+
+
+def _table(points: Floats) -> Floats:
+    """Rows of a polytope with these corners; facets in one plane are one face."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(points)
+    faces: list[Floats] = []
+    face_of = []
+    for plane in hull.equations:
+        same = [k for k, f in enumerate(faces) if np.abs(f - plane)[:3].max() < _PARALLEL]
+        face_of.append(same[0] if same else len(faces))
+        if not same:
+            faces.append(plane)
+    edges: dict[tuple[int, int], set[int]] = {}
+    for corners, face in zip(hull.simplices, face_of, strict=True):
+        for a, b in combinations(sorted(int(c) for c in corners), 2):
+            edges.setdefault((a, b), set()).add(face)
+    sharp = [[a, b, *sorted(pair)] for (a, b), pair in edges.items() if len(pair) == 2]
+    rows = [[len(points), len(sharp), len(faces), 0], *([*p, 0] for p in points), *sharp]
+    return np.array([*rows, *([*f[:3], -f[3]] for f in faces)], dtype=np.float64)

@@ -1,0 +1,244 @@
+"""Terrain: ground that is no level plane, as what a user writes; a slope, steps, or any smooth height z = f(x, y).
+
+A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). What the centre
+of a ball cannot sink below, the surface at its radius, is a height field too,
+
+    F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2),
+
+and is computed once for every radius (ball_surface.py): kernels then know points only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.ball_surface import raised
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, spline_shares
+
+Floats = NDArray[np.float64]
+
+_EDGE = 16  # grid lines across an edge of a step
+_MARGIN = 8  # level grid lines around what is not smooth: the waves of a spline fade by .27 per line
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
+
+    heights    (nx, ny) above the lines of a grid, a C2 spline in between [m]; one column (nx, 1): the same for all y.
+               Beyond the grid the ground goes on level, at the height of its edge
+    origin     (x, y) of heights[0, 0] [m]
+    spacing    (dx, dy) of the grid [m]
+    direction  (x, y) of the first grid axis in the plane
+    plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
+    name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
+
+    Derivatives by what the heights are made of follow from those by the heights. Of a loss L, by the rises of stairs:
+
+        by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
+        by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]
+
+    A slope is a half-space: its parameters are contact_normal and contact_height, of all contacts "contact_normal:*".
+    """
+
+    heights: ArrayLike = ((0.0,),)
+    origin: ArrayLike = (0.0, 0.0)
+    spacing: ArrayLike = (1.0, 1.0)
+    direction: ArrayLike = (1.0, 0.0)
+    plane: tuple[Any, float] | None = None
+    name: str = "ground"
+    coefficients: Floats = field(init=False, repr=False)  # (nx + 2, ny + 2) of the spline
+
+    __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        heights = np.array(checks.array("Terrain(heights=...)", self.heights, (None, None)))
+        if heights.size == 0:
+            raise ValueError(f"Terrain(heights=...): expected one height at least, got shape {heights.shape}")
+        heights.flags.writeable = False
+        object.__setattr__(self, "name", checks.name("Terrain(name=...)", self.name))
+        object.__setattr__(self, "heights", heights)
+        object.__setattr__(self, "origin", checks.vector("Terrain(origin=...)", self.origin, 2))
+        spacing = checks.vector("Terrain(spacing=...)", self.spacing, 2)
+        if min(spacing) <= 0.0:
+            raise ValueError(f"Terrain(spacing=...): expected numbers > 0, got {spacing}")
+        object.__setattr__(self, "spacing", spacing)
+        object.__setattr__(self, "direction", _heading("Terrain(direction=...)", self.direction))
+        if self.plane is not None:
+            normal = checks.direction("Terrain(plane=...): normal", self.plane[0])
+            if normal[2] <= 0.0:
+                raise ValueError(f"Terrain(plane=...): expected a normal that points up, got {normal}")
+            object.__setattr__(self, "plane", (normal, checks.number("Terrain(plane=...): height", self.plane[1])))
+        object.__setattr__(self, "coefficients", spline_coefficients(heights))
+
+    @staticmethod
+    def from_function(f: Callable[[Floats, Floats], ArrayLike], x: ArrayLike, y: ArrayLike) -> Terrain:
+        """The spline through f at the grid lines x (nx,) and y (ny,), equally spaced [m].
+
+        f takes and returns arrays: f(X, Y) with X and Y of shape (nx, ny). A spline is off by about
+        (spacing / wavelength)^4 of the height of a wave; `terrain.height(x, y)` tells.
+        """
+        if not callable(f):
+            raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
+        lines = [_lines(f"Terrain.from_function({name})", given) for name, given in (("x", x), ("y", y))]
+        X, Y = np.meshgrid(*lines, indexing="ij")
+        values = np.array(np.broadcast_to(checks.floats("Terrain.from_function(f)", f(X, Y)), X.shape))
+        heights = checks.array("Terrain.from_function(f)", values, X.shape)
+        spacing = [line[1] - line[0] if len(line) > 1 else 1.0 for line in lines]
+        return Terrain(heights, (lines[0][0], lines[1][0]), spacing)
+
+    @staticmethod
+    def slope(angle: float, direction: ArrayLike = (1.0, 0.0), height: float = 0.0) -> Terrain:
+        """A plane that rises by `angle` [rad] towards `direction` (x, y), and has this height at x = y = 0 [m]."""
+        angle = checks.number("Terrain.slope(angle)", angle)
+        if not abs(angle) < 0.5 * np.pi:
+            raise ValueError(f"Terrain.slope(angle): expected less than a right angle, got {angle:g} rad")
+        u, w = _heading("Terrain.slope(direction)", direction)
+        normal = (-np.sin(angle) * u, -np.sin(angle) * w, np.cos(angle))
+        return Terrain(plane=(normal, checks.number("Terrain.slope(height)", height) * normal[2]))
+
+    @staticmethod
+    def steps(
+        rises: Sequence[float],
+        depth: float = 0.3,
+        start: float = 0.0,
+        edge: float = 0.04,
+        direction: ArrayLike = (1.0, 0.0),
+    ) -> Terrain:
+        """Stairs across `direction`: the ground rises by rises[k] at start + k depth [m]; it is level before and after.
+
+        Each rise is spread over `edge` [m] by the quintic 6 t^5 - 15 t^4 + 10 t^3, so that its edges are rounded with
+        the radius edge^2 / (5.77 |rise|) [m] and its face is 1.875 |rise| / edge steep.
+        """
+        call = "Terrain.steps"
+        jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
+        depth, edge = (checks.number(f"{call}({n}=...)", v, above=0.0) for n, v in (("depth", depth), ("edge", edge)))
+        start = checks.number(f"{call}(start=...)", start)
+        if edge > depth:
+            raise ValueError(f"{call}(edge=...): expected at most the depth {depth:g}, got {edge:g}")
+        dx = edge / _EDGE
+        margin = 0.5 * edge + _MARGIN * dx
+        s = np.arange(-margin, (len(jumps) - 1) * depth + margin + 0.5 * dx, dx)
+        t = np.clip((s[:, None] - depth * np.arange(len(jumps))) / edge + 0.5, 0.0, 1.0)
+        heights = (t**3 * (10.0 - 15.0 * t + 6.0 * t**2)) @ jumps
+        u, w = _heading(f"{call}(direction=...)", direction)
+        place = start + s[0]
+        return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Height of the ground at (x, y), any shape [m]."""
+        x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+        if self.plane is not None:
+            (a, b, c), d = self.plane
+            return np.asarray((d - a * x - b * y) / c)
+        return self._spline(self.coefficients, x, y)[0]
+
+    def normal(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Outward normal of the ground at (x, y), (..., 3)."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        if self.plane is not None:
+            return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
+        _, fx, fy = self._spline(self.coefficients, x, y)
+        n = np.stack([-fx, -fy, np.ones_like(fx)], axis=-1)
+        return np.asarray(n / np.linalg.norm(n, axis=-1, keepdims=True))
+
+    def _spline(self, coefficients: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+        """(F, F_x, F_y) of the spline with these coefficients."""
+        (ox, oy), (dx, dy), (C, S) = (np.asarray(a, float) for a in (self.origin, self.spacing, self.direction))
+        s, t = (C * (x - ox) + S * (y - oy)) / dx, (C * (y - oy) - S * (x - ox)) / dy
+        f, fs, ft = spline(coefficients, s, t)
+        fs, ft = fs / dx, ft / dy
+        return f, C * fs - S * ft, S * fs + C * ft
+
+    def offset(self, radius: float) -> Terrain:
+        """The surface that the centre of a ball of this radius cannot sink below, over a grid that is as much wider."""
+        return self._offset(radius)[0]
+
+    def surface(self, radius: float) -> Terrain:
+        """`offset`, computed once per radius."""
+        return self._kept(radius)[0]
+
+    def height_gradient(self, radius: float, rows: Floats) -> Floats:
+        """(n, nx, ny) gradients by the heights, from those by the coefficients of the surface at this radius.
+
+        rows: (n, ncoefficient).  The surface at a height of its grid is as high as the ground where the ball touches.
+        """
+        surface, touched = self._kept(radius)
+        gradient = rows.reshape(len(rows), *surface.coefficients.shape)
+        if touched is not None:
+            kept = self.__dict__.setdefault("_shares", {})
+            if radius not in kept:
+                kept[radius] = spline_shares(self.coefficients.shape, touched[..., 0], touched[..., 1])
+            gradient = spline_gradient(gradient).reshape(len(rows), -1) @ kept[radius]
+            gradient = gradient.reshape(-1, *self.coefficients.shape)
+        return spline_gradient(gradient)
+
+    def radius_rate(self, radius: float) -> Floats:
+        """d(coefficients of `surface`)/d(radius), whose values are sqrt(1 + |grad|^2) of the ground that is touched."""
+        kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
+        if radius not in kept:
+            touched = self._kept(radius)[1]
+            if touched is None:
+                touched = np.stack(np.meshgrid(*(np.arange(float(n)) for n in self.shape), indexing="ij"), axis=-1)
+            _, fs, ft = spline(self.coefficients, touched[..., 0], touched[..., 1])
+            dx, dy = np.asarray(self.spacing)
+            kept[radius] = spline_coefficients(np.sqrt(1.0 + (fs / dx) ** 2 + (ft / dy) ** 2))
+        return kept[radius]
+
+    def _kept(self, radius: float) -> tuple[Terrain, Floats | None]:
+        kept = self.__dict__.setdefault("_surfaces", {})
+        if radius not in kept:
+            kept[radius] = self._offset(radius)
+        found: tuple[Terrain, Floats | None] = kept[radius]
+        return found
+
+    def _offset(self, radius: float) -> tuple[Terrain, Floats | None]:
+        """The surface, and where balls over its grid touch, (..., 2) in our grid; None where it is ourselves."""
+        if radius == 0.0 or self.plane is not None:
+            return self, None
+        spacing, direction = np.asarray(self.spacing), np.asarray(self.direction)
+        pads = [0 if n == 1 else int(np.ceil(radius / d)) + _MARGIN for n, d in zip(self.shape, spacing, strict=True)]
+        lines = [d * np.arange(-p, n + p) for n, d, p in zip(self.shape, spacing, pads, strict=True)]
+        here = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+        heights, arm = raised(self.coefficients, spacing, here, radius)
+        x, y = (-p * d for p, d in zip(pads, spacing, strict=True))
+        start = np.asarray(self.origin) + x * direction + y * np.array([-direction[1], direction[0]])
+        return Terrain(heights, start, spacing, direction, name=self.name), (here + arm) / spacing
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of sqrt(1 + |grad F|^2) and of |second derivative| [1/m], from the differences of coefficients."""
+        P, (dx, dy) = np.pad(self.coefficients, 2, mode="edge"), np.asarray(self.spacing, float)
+        slopes = np.abs(np.diff(P, axis=0)).max() / dx, np.abs(np.diff(P, axis=1)).max() / dy
+        xx, yy = np.abs(np.diff(P, 2, axis=0)).max() / dx**2, np.abs(np.diff(P, 2, axis=1)).max() / dy**2
+        xy = np.abs(np.diff(np.diff(P, axis=0), axis=1)).max() / (dx * dy)
+        return float(np.sqrt(1.0 + np.dot(slopes, slopes))), float(np.sqrt(xx**2 + 2.0 * xy**2 + yy**2))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of grid lines across both axes."""
+        nx, ny = self.coefficients.shape
+        return nx - 2, ny - 2
+
+
+def _heading(call: str, direction: ArrayLike) -> tuple[float, float]:
+    """A unit vector in the plane."""
+    x, y, _ = checks.direction(call, (*checks.vector(call, direction, 2), 0.0))
+    return x, y
+
+
+def _lines(call: str, given: ArrayLike) -> Floats:
+    """Equally spaced grid lines."""
+    lines = checks.array(call, given, (None,))
+    if len(lines) == 0 or (len(lines) > 1 and not lines[0] < lines[1]):
+        raise ValueError(f"{call}: expected growing numbers, got {lines.tolist()[:3]}...")
+    if not np.allclose(np.diff(lines), lines[-1] - lines[-2] if len(lines) > 1 else 0.0, rtol=1e-6, atol=0.0):
+        raise ValueError(f"{call}: expected equally spaced grid lines, as of np.linspace")
+    return lines

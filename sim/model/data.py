@@ -1,0 +1,170 @@
+"""Work: what kernels write, as a NamedTuple of arrays; the glossary is in model.py, the shapes are in layout.py too."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from sim.model.model import IntegerMatrix, Integers, Matrix, Vector
+
+
+class Work(NamedTuple):
+    """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards."""
+
+    origin: Vector  # (3,) the reference point O
+    # configurations 1, 2 and 3, and the motion between them
+    theta1: Vector  # (nq,) coordinates at 1
+    theta3: Vector  # (nq,) coordinates at 3
+    nu: Vector  # (nv,) the unknown v25
+    nu_trial: Vector  # (nv,) v25 before the step of the line search
+    dnu: Vector  # (nv,) Newton step
+    pos1: Matrix  # (nbody, 3)
+    quat1: Matrix  # (nbody, 4)
+    rot1: Matrix  # (nbody, 9)
+    pos2: Matrix
+    quat2: Matrix
+    rot2: Matrix
+    pos3: Matrix
+    quat3: Matrix
+    rot3: Matrix
+    S1: Matrix  # (nv, 6) joint columns d(pose 1)/d(q2) at constant v15
+    S2: Matrix  # (nv, 6) test directions
+    S3: Matrix  # (nv, 6) d(pose 3)/d(q2) at constant v25
+    S3nu: Matrix  # (nv, 6) d(pose 3)/d(v25)
+    inertia_world: Matrix  # (nbody, 9) at configuration 2
+    momentum_in: Matrix  # (nbody, 6) momentum of interval 1-2 at node 2 plus applied impulses, at the centre of mass
+    momentum_out: Matrix  # (nbody, 6) momentum of interval 2-3, likewise without impulses
+    body_impulse: Matrix  # (nbody, 6) force and torque impulses of BODY inputs, world axes, at the centre of mass
+    arm: Matrix  # (nbody, 6) at configuration 2, world axes: joint frame from the parent, joint point from the body
+    turn_matrix: Matrix  # (nbody, 9) rotation matrix of the turn from configuration 2 to 1 or 3, less the identity
+    move_in: Matrix  # (nbody, 3) displacement of the centre of mass over interval 1-2
+    move: Matrix  # (nbody, 3) displacement over interval 2-3
+    turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
+    turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
+    balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O
+    node_inertia: Matrix  # (nbody, 9) inertia at the node whose energy is asked for, world axes
+    node_momentum: Matrix  # (nbody, 6) momentum there, summed over the subtree, about O
+    node_p: Vector  # (nv,) the same in joint coordinates
+    node_share: Vector  # (nv,) scratch
+    wrench: Matrix  # (nbody, 6) momentum balance with contacts; summed over the subtree by `project`
+    subtree: Matrix  # (nbody, 6) scratch of tree sums
+    residual: Vector  # (nv,) generalized residual
+    rhs: Vector  # (nv,)
+    # elimination
+    A: Matrix  # (nbody, 36) Newton matrix of each body, contacts condensed
+    articulated: Matrix  # (6 nbody, 8) articulated matrix of each subtree, and scratch in the last two columns
+    U: Matrix  # (nv, 6) columns A S3nu
+    L: Matrix  # (nv, 8) rows D^-1 S2^T A, six numbers, and scratch
+    D: Matrix  # (nbody, 37) LU factors of the joint blocks S2^T A S3nu + joint_block, and their row exchanges
+    joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
+    z: Vector  # (nv,)
+    twist: Matrix  # (nbody, 6) body twists of the last solve
+    # near and far contacts
+    counts: (
+        Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; steps handed on by carry_over.py
+    )
+    near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
+    far_first: Integers  # (nground,) first contacts of the far clusters
+    pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
+    pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
+    pair_kept: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
+    loop_led: Integers  # (2,) rows of loop_lead in use; 1: in place of constraints too
+    loop_used: Integers  # (nrow,) scratch
+    coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
+    couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
+    pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] see choice.py
+    far: Matrix  # (nground, 37) see contact/inactive.py
+    far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
+    # contacts
+    cone: Matrix  # (ncontact, 12) cone variables, see contact/ground_contact.py
+    cone_step: Matrix  # (ncontact, 12)
+    cone_trial: Matrix  # (ncontact, 12)
+    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
+    contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
+    contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
+    bounce: Matrix  # (ncontact, 22) see contacts/restitution.py
+    bounce_share: Vector  # (1,)
+    contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
+    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contacts/softening.py
+    contact_w: Matrix  # (ncontact, 3) constant part of the same
+    contact_scale: Matrix  # (ncontact, 16) scaling of the cone
+    # pairs
+    shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
+    shape_rot: Matrix  # (2 npair, 9)
+    pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
+    pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
+    pair_apart: Vector  # (npair,) half the gap ahead of a far collision, 0 of a near one, at its first pair
+    pair_far_state: Vector  # (3,) see pairs/inactive_pairs.py
+    far_pose: Matrix  # (nbody, 7) poses where the far collisions were evaluated
+    far_wrench: Matrix  # (nbody, 6) their wrenches about O
+    pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
+    pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
+    pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
+    pair_shift: Matrix  # (npair, 18) displacement of the contact point by the relative twist
+    pair_Ca: Matrix  # (npair, 18) d(gap, slip)/d(twist of a)
+    pair_Cb: Matrix  # (npair, 18)
+    pair_rows: Matrix  # (2, 6) scratch
+    pair_scratch: Vector  # (18,)
+    # couplings
+    coupling_K: Matrix  # (2 ncoupling, 36) d(wrench on a)/d(twist of a), then of b
+    coupling_K2: Matrix  # (2 ncoupling, 36) the same by twists of configuration 2
+    couple_B: Matrix  # (nrow, 6) wrench on a of a unit force
+    couple_G: Matrix  # (nrow, 6) constraint directions of loops at configuration 3
+    couple_R: Matrix  # (nrow, 12) what a force resists, of the twists of a and b
+    couple_E: Vector  # (nrow,) how much it gives, 0 for loops
+    couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
+    couple_T: Matrix  # (nrow, nrow) the dense system
+    couple_pivots: Matrix  # (nrow, 2)
+    couple_rank: Vector  # (4,) rank and size of the dense system, its least pivot that counts, least deficiency
+    couple_scale: Vector  # (nrow,)
+    couple_x: Matrix  # (nrow, 1)
+    couple_gap: Vector  # (nrow,) of loops
+    couple_force: Vector  # (nrow,) impulses of loops
+    couple_step: Vector  # (nrow,)
+    couple_trial: Vector  # (nrow,)
+    couple_panel: Matrix  # (nrow, 2 nv + nu)
+    couple_wrench: Vector  # (6,) scratch
+    loop_frame: Matrix  # (nloop, 12)
+    loop_turn: Matrix  # (nloop, 9)
+    loop_velocity: Vector  # (nv,) where a step begins to look for its velocity
+    loop_start: Vector  # (nv,) where it looks for another one
+    loop_kept: Vector  # (nv,) the first of them
+    loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
+    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loops/bifurcation.py
+    loop_scale: Vector  # (nrow,) scratch
+    loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
+    gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
+    # limits
+    bound: Matrix  # (nlimit, 2) slack, impulse
+    bound_step: Matrix  # (nlimit, 2)
+    bound_trial: Matrix  # (nlimit, 2)
+    bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
+    bound_gap: Vector  # (nlimit,)
+    bound_w: Vector  # (nlimit,)
+    # prediction
+    reach_of: Integers  # (nreach,) contacts and limits that may touch; of a contact's three rows, the first
+    reach: Matrix  # (nv, nreach) rates of their gaps and slips, eliminated on the way down the tree
+    delassus: Matrix  # (nreach, nreach) transposed: rates by unit impulses
+    reach_rate: Vector  # (nreach,) gaps and slips
+    reach_impulse: Vector  # (nreach,)
+    reach_friction: Vector  # (nreach,) coefficients, in the first row of a contact
+    # derivatives
+    A1: Matrix  # (nbody, 36) d(balance)/d(pose 1), about O
+    A2: Matrix  # (nbody, 36)
+    A3: Matrix  # (nbody, 36)
+    F: Matrix  # (nv, 24) scratch; from 12 on, six numbers, what turns of test directions make of the residual wrench
+    G: Matrix  # (nv, 24) rows of test directions times the composites, 18, and scratch
+    S_across: Matrix  # (18, nwide) S1, S2, S3, a dof per column
+    F_across: Matrix  # (12, nwide) composites times unit columns, likewise
+    dR_dq: Matrix  # (nv, nwide) nwide: nv, and zeros up to a multiple of LANES (solvers/lanes.py)
+    dR_dv: Matrix  # (nv, nwide)
+    columns: Matrix  # (nv, ncolumn) right-hand sides and solutions, 2 nv + nu and zeros
+    triangles: Matrix  # (nv, nwide) of the substitution with `columns`, see elimination_panel.py
+    triangle_across: Matrix  # (12, nwide) U, S3nu, a dof per column
+    panel: Matrix  # (6 nbody, npanel) twists of all columns where there are couplings, otherwise scratch of deep trees
+    step_A: Matrix  # (2 nv, 2 nv) of one step of a knot
+    step_B: Matrix  # (2 nv, nu)
+    chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
+    step_x: Matrix  # (2, nq + nv) states inside a knot
+    report: Vector  # (6,) of a step nobody asks about
+    pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/model/pace.py

@@ -1,0 +1,206 @@
+"""Layout of Model and Work: one table of shapes, from which Python allocates every field and kernels find it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.model.data import Work
+from sim.model.model import Model
+from sim.model.slots import Slot
+from solvers.lanes import LANES, SIDE, whole
+from solvers.record import Field, record, table
+
+__all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
+           "allocate_work", "model_view", "sizes_of", "table", "work_view"]  # fmt: skip
+
+Shape = tuple[int | str, ...]
+
+_REACH = 48  # rows of contacts and limits that a prediction takes
+
+
+def _shapes(text: str) -> dict[str, Shape]:
+    """{name: shape} of fields written as "name rows columns"; columns left out for a vector."""
+    rows = [field.split() for field in text.split(",")]
+    return {name: tuple(int(n) if n.isdigit() else n for n in shape) for name, *shape in rows}
+
+
+MODEL_INTS = _shapes(
+    """
+    body_parent nbody, body_leaf nbody, body_qadr nbody+1, body_vadr nbody+1, joint_ntrans nbody, joint_nrot nbody,
+    body_above nbody nblock, body_below nbody nblock,
+    dofs_above nbody nv, dofs_below nbody nv, count_above nbody, count_below nbody,
+    dof_body nv, dof_qadr nv, contact_body ncontact, contact_law ncontact, cluster_end nground, optional nslot,
+    contact_terrain nground, contact_hold nground, terrain_size nterrain 3,
+    pair_coupling npair, pair_kind npair, pair_feature npair, coupling_body ncoupling 2, coupling_row ncoupling+1,
+    loop_ntrans nloop, loop_nrot nloop, gear_dof ngear 2,
+    limit_dof nlimit, limit_cone nlimit, input_kind nu, input_index nu
+    """
+)
+
+MODEL_FLOATS = _shapes(
+    """
+    body_mass nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
+    joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_swing_axes nbody 6, dof_spring nv,
+    dof_damper nv, dof_armature nv, dof_rest nv,
+    contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
+    contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
+    contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
+    body_reach nbody, hull nhull 4, loop_point nloop 6, loop_offset nloop 9, loop_axes nloop 9, loop_axis nloop 9,
+    gear_ratio ngear, gear_offset ngear, limit_sign nlimit, limit_bound nlimit,
+    input_wrench nu 6, gravity 3
+    """
+)
+
+WORK_INTS = _shapes(
+    """
+    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 2,
+    loop_led 2, loop_used nrow, reach_of nreach, coupling_live ncoupling, couple_live nrow 2
+    """
+)
+
+WORK_FLOATS = _shapes(
+    """
+    origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
+    pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
+    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, body_impulse nbody 6,
+    arm nbody 6, turn_matrix nbody 9, move_in nbody 3, move nbody 3, turn_in nbody 4, turn nbody 4,
+    balance nbody 6, node_inertia nbody 9, node_momentum nbody 6, node_p nv, node_share nv,
+    wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
+    articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
+    joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
+    contact_kin ncontact 27, contact_frame nground 9,
+    contact_turn nground 18, bounce ncontact 22, bounce_share 1,
+    contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
+    bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
+    shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
+    pair_frame npair 12, pair_trial 1 43,
+    pair_before npair 13, pair_apart npair, pair_far_state 3, far_pose nbody 7, far_wrench nbody 6,
+    pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
+    coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
+    couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
+    couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
+    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
+    loop_open nrow, gear_rate ngear 2,
+    A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
+    triangles nv nwide, triangle_across 12 nwide,
+    dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
+    step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
+    far nground 37, far_law 2,
+    reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
+    """
+)
+
+MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
+WORK_FIELDS = {**WORK_INTS, **WORK_FLOATS}
+
+
+class Sizes(NamedTuple):
+    """Counts of one mechanism."""
+
+    nbody: int
+    nq: int
+    nv: int
+    ncontact: int
+    nlimit: int
+    nu: int
+    npair: int = 0  # contacts between two bodies, or of one with an obstacle
+    ncoupling: int = 0  # two bodies with pairs, and closed loops
+    nrow: int = 0  # unknown forces of the couplings
+    nloop: int = 0
+    nhull: int = 1  # rows of the tables of polytopes
+    ngear: int = 0
+    nterrain: int = 0  # height fields: one per terrain and radius of its contacts
+    nheight: int = 0  # their coefficients
+
+
+def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
+    """Rows and columns of one field."""
+    nv, nu = sizes.nv, sizes.nu
+    columns = max(2 * nv + whole(nu), nv + whole(nv))  # with what lanes write behind dR_dv and the inputs
+    columns = -(-columns // SIDE) * SIDE
+    named = {
+        **sizes._asdict(),
+        "nbody+1": sizes.nbody + 1,
+        "6nbody": 6 * sizes.nbody,
+        "2nv+nu": 2 * sizes.nv + sizes.nu,
+        "2nv": 2 * sizes.nv,
+        "nx": sizes.nq + sizes.nv,
+        "nground": sizes.ncontact - sizes.npair,
+        "2npair": 2 * sizes.npair,
+        "ncoupling+1": sizes.ncoupling + 1,
+        "2ncoupling": 2 * sizes.ncoupling,
+        "nslot": len(Slot),
+        "nblock": whole(nv) // LANES,
+        "nwide": whole(nv),
+        "ncolumn": columns,
+        "npanel": columns if sizes.nrow else LANES,
+        "nreach": min(3 * (sizes.ncontact - sizes.npair) + sizes.nlimit, _REACH),
+    }
+    rows, cols = (named[n] if isinstance(n, str) else n for n in (*shape, 1)[:2])
+    return rows, cols
+
+
+def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
+    """Zeroed arrays of these shapes, end to end in one buffer."""
+    extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
+    line = 128 // 8  # a pair of cache lines: what two threads write must not share one
+    buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
+    first = -(buffer.ctypes.data // 8) % line
+    arrays, start = {}, first
+    for name, (rows, cols) in extents.items():
+        if len(fields[name]) == 2 and cols % LANES == 0:  # rows of whole lanes begin where cache lines do
+            start = first + whole(start - first)
+        flat = buffer[start : start + rows * cols]
+        arrays[name] = flat if len(fields[name]) == 1 else flat.reshape(rows, cols)
+        start += rows * cols
+    return arrays
+
+
+def allocate_model(sizes: Sizes) -> Model:
+    """A Model of zeros."""
+    return Model(**_carve(MODEL_INTS, sizes, np.int64), **_carve(MODEL_FLOATS, sizes, np.float64))
+
+
+def allocate_work(sizes: Sizes) -> Work:
+    """The scratch of one thread."""
+    return Work(**_carve(WORK_INTS, sizes, np.int64), **_carve(WORK_FLOATS, sizes, np.float64))
+
+
+def sizes_of(model: Model) -> Sizes:
+    """Counts of a packed mechanism."""
+    return Sizes(
+        nbody=len(model.body_parent),
+        nq=int(model.body_qadr[-1]),
+        nv=len(model.dof_body),
+        ncontact=len(model.contact_body),
+        nlimit=len(model.limit_dof),
+        nu=len(model.input_kind),
+        npair=len(model.pair_kind),
+        ncoupling=len(model.coupling_body),
+        nrow=int(model.coupling_row[-1]) + len(model.gear_dof),
+        nloop=len(model.loop_ntrans),
+        nhull=len(model.hull),
+        ngear=len(model.gear_dof),
+        nterrain=len(model.terrain_size),
+        nheight=len(model.terrain_heights),
+    )
+
+
+def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
+    """What compiled code knows about the fields: widths that are numbers are constants there."""
+    return [
+        Field(
+            name,
+            name in MODEL_INTS or name in WORK_INTS,
+            None if len(shapes[name]) == 1 else int(shapes[name][1]) if isinstance(shapes[name][1], int) else 0,
+        )
+        for name in cls._fields
+    ]
+
+
+model_view = record(Model, _fields(Model, MODEL_FIELDS))
+work_view = record(Work, _fields(Work, WORK_FIELDS))

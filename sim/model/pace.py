@@ -1,0 +1,68 @@
+"""Pace: loops over steps go back to Python every few hundredths of a second, which hears Ctrl-C between two of them.
+
+A signal waits until Python runs again. So a call of a long loop is made in pieces: a kernel stops at the first step
+after its deadline and says how far it came; Python lets it go on from there, with all that the step before left in its
+Work, so that what comes of it is the same to the last bit.
+
+    for _ in pieces(settings, steps):
+        done = roll(..., settings, ..., done)
+        if done == steps: break
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from time import perf_counter
+
+from sim.model.data import Work
+from sim.model.model import Vector
+from solvers.clock import PAUSE, seconds
+from solvers.jit import kernel
+
+__all__ = ["DEADLINE", "is_due", "pieces", "rows", "start_pace"]
+
+DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by solvers/clock.py
+_LOOK = 64.0  # work between two looks at the clock, which cost as much as a tenth of the smallest step
+_ROWS = 64  # of the first piece
+_ONE = (None,)
+
+
+def pieces(settings: Vector, steps: int) -> Iterable[None]:
+    """A deadline for each piece of a call of so many steps, as many as it takes; a single step has none."""
+    return _ONE if steps <= 1 else _pieces(settings)
+
+
+def _pieces(settings: Vector) -> Iterator[None]:
+    while True:
+        settings[DEADLINE] = seconds() + PAUSE
+        yield
+
+
+def rows(count: int) -> Iterable[slice]:
+    """Rows 0 to `count` in pieces that take about as long, for loops over rows that have nothing to do with another."""
+    return (slice(0, count),) if count <= _ROWS else _rows(count)
+
+
+def _rows(count: int) -> Iterator[slice]:
+    first, size = 0, _ROWS
+    while first < count:
+        begin = perf_counter()
+        yield slice(first, min(first + size, count))
+        first += size
+        size = max(1, min(2 * size, int(size * PAUSE / max(perf_counter() - begin, 1e-9))))
+
+
+@kernel
+def start_pace(work: Work, settings: Vector) -> None:
+    """Note the deadline."""
+    work.pace[0] = settings[DEADLINE]
+
+
+@kernel
+def is_due(work: Work, effort: float) -> bool:
+    """Whether it is time to go back to Python, after a step of that effort: its iterations, and columns solved for."""
+    work.pace[1] += effort
+    if work.pace[1] < _LOOK:
+        return False
+    work.pace[1] = 0.0
+    return seconds() > work.pace[0]

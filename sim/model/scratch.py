@@ -1,0 +1,42 @@
+"""Scratch: the buffers of a step, made once per thread, so that one Simulator may be used from several."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import numpy as np
+
+from sim.model.layout import Sizes, allocate_work, table
+from sim.model.model import Vector
+from solvers.record import Table
+
+_CORES = os.cpu_count() or 1
+_CHUNKS = 4  # per core: evens out items that take longer
+
+
+class Scratch:
+    """Tables of Works, of the thread that asks."""
+
+    def __init__(self, sizes: Sizes, contact_frame: Vector) -> None:
+        self._sizes, self._contact_frame = sizes, contact_frame
+        self._kept = threading.local()
+
+    def tables(self, count: int) -> Table:
+        """Tables of `count` Works, (count, ...)."""
+        works = self._kept.__dict__.setdefault("works", [])
+        while len(works) < count:
+            works.append(allocate_work(self._sizes))
+            works[-1].contact_frame[:] = self._contact_frame
+        if len(self._kept.__dict__.get("tables", ())) < count:
+            self._kept.tables = np.array([table(work) for work in works])
+        out: Table = self._kept.tables[:count]
+        return out
+
+    def table(self) -> Table:
+        """Table of the first Work."""
+        return self.tables(1)[0]
+
+    def chunks(self, count: int) -> Table:
+        """Tables for a parallel call over `count` items, one per chunk."""
+        return self.tables(max(1, min(count, _CHUNKS * _CORES)))

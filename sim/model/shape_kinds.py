@@ -1,0 +1,88 @@
+"""Shape, Pair: which pairs of shapes can touch, how their sizes are laid out, and how many contact points they have."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
+SWAPPED = 64  # added to a Pair: the two have changed places
+OUT = 43  # length of what `collide` writes
+EDGES = 8  # points of two polytopes beside their corners: pairs of edges that cross
+SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
+CROSSINGS = 9  # points of a cylinder and another shape that are no corners: places where edges, axes and rims cross
+RIM_POINTS = 8  # points on a rim that a plane may touch
+
+
+class Shape(IntEnum):
+    """Shape of a collision, with its sizes [m]. Centred on the origin of its frame, long along z."""
+
+    SPHERE = 0  # radius
+    CAPSULE = 1  # radius, half length of the segment
+    BOX = 2  # half extents along x, y, z
+    CYLINDER = 3  # radius, half length
+    HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
+    POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
+    STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
+
+
+class Pair(IntEnum):
+    """Kind of a collision: shape a against shape b, in this order."""
+
+    SPHERE_SPHERE = 0
+    SPHERE_CAPSULE = 1
+    SPHERE_BOX = 2
+    SPHERE_CYLINDER = 3
+    SPHERE_HALFSPACE = 4
+    CAPSULE_CAPSULE = 5
+    CAPSULE_BOX = 6
+    CAPSULE_HALFSPACE = 7
+    BOX_BOX = 8
+    BOX_HALFSPACE = 9
+    CYLINDER_HALFSPACE = 10
+    STRING = 11
+    POLYTOPE_POLYTOPE = 12
+    POLYTOPE_CYLINDER = 13
+    CYLINDER_CYLINDER = 14
+
+
+_PAIRS = {
+    (Shape.SPHERE, Shape.SPHERE): Pair.SPHERE_SPHERE,
+    (Shape.SPHERE, Shape.CAPSULE): Pair.SPHERE_CAPSULE,
+    (Shape.SPHERE, Shape.BOX): Pair.SPHERE_BOX,
+    (Shape.SPHERE, Shape.CYLINDER): Pair.SPHERE_CYLINDER,
+    (Shape.SPHERE, Shape.HALFSPACE): Pair.SPHERE_HALFSPACE,
+    (Shape.CAPSULE, Shape.CAPSULE): Pair.CAPSULE_CAPSULE,
+    (Shape.CAPSULE, Shape.BOX): Pair.CAPSULE_BOX,
+    (Shape.CAPSULE, Shape.HALFSPACE): Pair.CAPSULE_HALFSPACE,
+    (Shape.BOX, Shape.BOX): Pair.BOX_BOX,
+    (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
+    (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
+    (Shape.STRING, Shape.STRING): Pair.STRING,
+    (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
+    (Shape.POLYTOPE, Shape.CYLINDER): Pair.POLYTOPE_CYLINDER,
+    (Shape.CYLINDER, Shape.CYLINDER): Pair.CYLINDER_CYLINDER,
+}
+
+_COUNT = {
+    Pair.CAPSULE_CAPSULE: 3,  # ends of the overlap, crossing
+    Pair.CAPSULE_BOX: 5,  # ends of the part above the face, crossing of an edge, corners of an edge
+    Pair.CAPSULE_HALFSPACE: 2,  # ends
+    Pair.BOX_BOX: 13,  # first and last points of four clipped edges, four corners of b, closest point elsewhere
+    Pair.BOX_HALFSPACE: 8,  # corners
+    Pair.CYLINDER_HALFSPACE: 8,  # lowest points of two rims, three fixed points on each
+    Pair.CYLINDER_CYLINDER: 2 * RIM_POINTS + CROSSINGS,  # on the rims of each; where axes and rims cross
+}
+
+
+def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
+    """Kind of the pair, and whether the two have to change places to match its order; None if there is no such pair."""
+    if (a, b) in _PAIRS:
+        return _PAIRS[a, b], False
+    if (b, a) in _PAIRS:
+        return _PAIRS[b, a], True
+    return None
+
+
+def count(kind: Pair) -> int:
+    """How many contact points the pair may have: features of `collide`; polytopes: contact_candidates.py."""
+    return _COUNT.get(kind, 1)

@@ -1,0 +1,112 @@
+"""Slots of the optional kernels (optional.py) in the table `Model.optional`; link.py fills the table."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Slot(IntEnum):
+    """The number of each optional kernel: machine code on disk holds it, never the order of imports."""
+
+    # what all scenes do, compiled once
+    STEP = 0
+    INTERIOR_POINT = 1
+    NEWTON = 2
+    GRADIENT = 3
+    # derivatives of deep trees
+    SOLVE_DEEP_PANEL = 4
+    # contacts and limits
+    REPORT_CONTACTS = 5
+    WORST_CONTACT = 6
+    ADD_STIFFNESS = 7
+    ADD_LIMIT_DERIVATIVES = 8
+    # joints with two rotations, and cones
+    SWING_POSE = 9
+    SWING_CURVATURE = 10
+    CONE_GAP = 11
+    CONE_BLOCK = 12
+    CONE_DERIVATIVE = 13
+    # loops, and pairs of bodies in contact
+    FACTOR_COUPLING = 14
+    SOLVE_COUPLING = 15
+    SOLVE_COUPLING_PANEL = 16
+    ADD_COUPLING_COMPOSITES = 17
+    ADD_COUPLING_DERIVATIVES = 18
+    START_LOOPS = 19
+    APPLY_LOOPS = 20
+    KEEP_LOOPS = 21
+    MOVE_LOOPS = 22
+    PAIR_KINEMATICS = 23
+    PAIR_RATE = 24
+    CONDENSE_PAIRS = 25
+    APPLY_PAIRS = 26
+    PAIR_CONSTANTS = 27
+    REPORT_PAIRS = 28
+    # friction pyramids
+    START_PYRAMID = 29
+    PYRAMID_ERROR = 30
+    PYRAMID_PRODUCTS = 31
+    PYRAMID_PRODUCTS_AHEAD = 32
+    PYRAMID_BOUNDARY = 33
+    RETURN_PYRAMID = 34
+    CONDENSE_PYRAMID = 35
+    PYRAMID_CONSTANT = 36
+    RECOVER_PYRAMID = 37
+    # springs of quaternion joints
+    SPRING_IMPULSE = 38
+    ADD_SPRING_BLOCK = 39
+    ADD_BALL_SPRING_DERIVATIVES = 40
+    # terrain
+    PLACE_ON_TERRAIN = 41
+    TURN_ON_TERRAIN = 42
+    ADD_FRAME_MATRIX = 43
+    TERRAIN_GAP = 44
+    EVALUATE_ON_TERRAIN = 45
+    # restitution
+    FIND_IMPACTS = 46
+    SUBTRACT_FLOORS = 47
+    IMPACTS_GAINED = 48
+    ADD_BOUNCE_COMPOSITES = 49
+    ADD_BOUNCE_DERIVATIVES = 50
+    # which pairs, and which of their elements
+    BEGIN_PAIRS = 51
+    ENLIST_PAIRS = 52
+    CHOOSE_PAIRS = 53
+    OVERLAPPING = 54
+    FAR_PAIR_IMPULSES = 55
+    PAIRS_CAME_NEAR = 56
+    ALL_NEAR = 57
+    # gears
+    APPLY_GEARS = 58
+    # derivatives by the heights of a terrain, and by radii on it
+    ADD_HEIGHT_GRADIENT = 59
+    ADD_SURFACE_RADIUS = 60
+    # loops that pass singular configurations
+    CLOSE_VELOCITY = 61
+    LOOPS_REGULAR = 62
+    STAY_REGULAR = 63
+    PREDICT_LOOPS = 64
+    LOOPS_GAINED = 65
+    LOOP_SLACK = 66
+    LEAD_AGAIN = 67
+    MEET_AHEAD = 68
+    IS_FARTHER = 69
+    # taut strings
+    IS_TAUT = 70
+    PULL_FROM_BEFORE = 71
+    STRING_ARM = 72
+    ADD_STRING_STIFFNESS = 73
+    ADD_STRING_TURN = 74
+    ADD_MOVED_END = 75
+    # cylinders against polytopes and cylinders
+    CYLINDER_DISTANCE = 76
+    COLLIDE_CYLINDERS = 77
+    CHOOSE_CYLINDERS = 78
+    CYLINDER_BEFORE = 79
+    # joints with two rotations, over an interval
+    SWING_TURN = 80
+    # energy from collisions
+    PAIRS_GAINED = 81
+    PAIR_SLACK = 82
+    # steps of scenes with loops
+    SOLVE_LOOPS = 83

@@ -1,1 +1,0 @@
-"""Contacts between two bodies, or of a body with an obstacle, as part of a step."""

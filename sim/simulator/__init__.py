@@ -1,0 +1,1 @@
+"""Simulator: settings, checks of arguments, results, and the compiled calls behind each method."""

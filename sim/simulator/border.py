@@ -1,0 +1,174 @@
+"""Border: what Simulator's methods accept; each message names the method, the argument, and what is wrong with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.integrators.policy import Policy
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.simulator.calls import Calls
+from solvers.status import MESSAGES, Status
+
+Floats = NDArray[np.float64]
+
+_UNIT = 1e-6  # by how much the length of a quaternion may be off
+
+
+class Border:
+    """Checks of states, inputs and maximal states of one mechanism."""
+
+    def __init__(self, mechanism: Mechanism, calls: Calls) -> None:
+        self.mechanism, self._calls = mechanism, calls
+        self.nbody, self.nx, self.nu = mechanism.nbody, calls.nx, calls.nu
+        self.time_step = calls.settings.time_step
+
+    def states(self, call: str, xs: Floats) -> Floats:
+        """A copy of the states (..., nx), with quaternions of length one."""
+        out = np.array(xs, dtype=np.float64)
+        bad = self._calls.normalise(out.reshape(-1, self.nx), _UNIT)
+        if bad >= 0:
+            row, body = divmod(bad, self.nbody)
+            at = f" in row {row}" if out.ndim > 1 else ""
+            joint = self.mechanism.joints[body]
+            stop = self.mechanism.q_slice(joint.name).stop
+            length = float(np.linalg.norm(out.reshape(-1, self.nx)[row, stop - 4 : stop]))
+            raise ValueError(f"{call}: joint {joint.name!r}{at}: expected a unit quaternion, got length {length:g}")
+        return out
+
+    def state(self, method: str, x: ArrayLike, name: str = "x") -> Floats:
+        """One state (nx,)."""
+        call = f"Simulator.{method}({name})"
+        return self.states(call, checks.array(call, x, (self.nx,)))
+
+    def stacked(self, method: str, name: str, x: ArrayLike) -> tuple[Floats, tuple[int, ...]]:
+        """States as rows, and their leading axes."""
+        call = f"Simulator.{method}({name})"
+        out = self.states(call, shaped(call, x, (self.nx,)))
+        return out.reshape(-1, self.nx), out.shape[:-1]
+
+    def paired(
+        self, method: str, first: tuple[str, ArrayLike, int], second: tuple[str, ArrayLike, int]
+    ) -> tuple[Floats, Floats, tuple[int, ...]]:
+        """Two arguments as rows, broadcast to common leading axes."""
+        a, b = (shaped(f"Simulator.{method}({n})", v, (size,)) for n, v, size in (first, second))
+        try:
+            lead = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+        except ValueError:
+            raise ValueError(
+                f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
+                "do not broadcast"
+            ) from None
+        # copies: what broadcast_to returns is read-only, and kernels would be compiled once more for it
+        rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
+        return rows[0], rows[1], lead
+
+    def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:
+        """Inputs of the given shape."""
+        return checks.array(f"Simulator.{method}({name})", u, shape)
+
+    def kappa(self, method: str, kappa: float | None) -> float | None:
+        """A positive kappa, or None for that of the simulator."""
+        return None if kappa is None else checks.number(f"Simulator.{method}(kappa=...)", kappa, above=0.0)
+
+    def policy(self, call: str, start: Floats, us: Floats, parts: tuple[ArrayLike | None, ...]) -> Policy:
+        """Policy around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
+        ndx, knots = self._calls.ndx, len(us)
+        shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
+        xs, ks, Ks, gaps = (
+            np.zeros(shape) if part is None else checks.array(f"{call}({name}=...)", part, shape)
+            for name, part, shape in zip(("xs", "ks", "Ks", "gaps"), parts, shapes, strict=True)
+        )
+        if parts[0] is None:
+            if parts[2] is not None:
+                raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
+            xs[:] = start
+        return Policy(self.states(f"{call}(xs=...)", xs), us, ks, Ks, gaps, *self._calls.unknown)
+
+    def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
+        """(lower, upper) of every input, infinite where free."""
+        if limits is None:
+            return np.full(self.nu, -np.inf), np.full(self.nu, np.inf)
+        try:
+            lo, hi = (np.array(np.broadcast_to(checks.floats(call, b), (self.nu,))) for b in limits)
+        except (TypeError, ValueError):
+            raise ValueError(f"{call}(limits=...): expected (lower, upper), each as wide as u ({self.nu})") from None
+        if not np.all(lo <= hi):
+            raise ValueError(f"{call}(limits=...): expected lower <= upper")
+        return lo, hi
+
+    def finite(self, method: str, out: Floats, *given: Floats) -> Floats:
+        """What a call made of the rows (n, ...) of its arguments; refused where it is too large for a float."""
+        if checks.finite(out):
+            return out
+        row = int(np.argwhere(~np.isfinite(out.reshape(len(given[0]), -1)).all(axis=1))[0, 0])
+        size, name = max((self._largest(rows[row]) for rows in given), key=lambda found: abs(found[0]))
+        at = f" in row {row}" if len(given[0]) > 1 else ""
+        raise ValueError(
+            f"Simulator.{method}{at}: the result is not finite, because numbers overflow or the mass matrix is "
+            f"singular; the largest entry is {size:g}, of {name}"
+        )
+
+    def _largest(self, row: Floats) -> tuple[float, str]:
+        """(largest entry of a state, a perturbation or a maximal state, the joint or body it belongs to)."""
+        flat = row.ravel()
+        k, nq = int(np.abs(flat).argmax()), self.mechanism.nq
+        if len(flat) == 13 * self.nbody and row.ndim == 2:
+            return float(flat[k]), f"body {self.mechanism.body_names[k // 13]!r}"
+        place, at = (self.mechanism.q_slice, k) if len(flat) == self.nx and k < nq else (self.mechanism.v_slice, k - nq)
+        if len(flat) != self.nx:
+            at = k % self.mechanism.nv
+        return float(flat[k]), next(f"joint {n!r}" for n in self.mechanism.joint_names if at < place(n).stop)
+
+    def check_maximal(self, method: str, zs: Floats) -> None:
+        """Quaternions of length one, and less than half a turn per step."""
+        with np.errstate(over="ignore"):
+            length = np.linalg.norm(zs[..., 6:10], axis=-1)
+            turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
+        for bad, what in (
+            (np.abs(length - 1.0) > _UNIT, "expected a unit quaternion"),
+            (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
+        ):
+            if bad.any():
+                raise ValueError(
+                    f"Simulator.{method}(z): body {self.mechanism.body_names[np.argwhere(bad)[0, 1]]!r}: {what}"
+                )
+        zs[..., 6:10] /= length[..., None]
+
+    def check_joints(self, zs: Floats, back: Floats, tolerance: float) -> None:
+        """Refuse maximal states that their own minimal states do not reproduce."""
+        dot = np.clip(np.abs(np.einsum("...i,...i->...", zs[..., 6:10], back[..., 6:10])), 0.0, 1.0)
+        now = np.linalg.norm(zs[..., :3] - back[..., :3], axis=-1)
+        change = self.time_step * (zs - back)
+        moved = np.linalg.norm(change[..., 3:6], axis=-1) + np.linalg.norm(change[..., 10:], axis=-1)
+        error = np.maximum(now + 2.0 * np.sqrt(2.0 * (1.0 - dot)), moved)
+        if (error > tolerance).any():
+            body = int(np.argwhere(error > tolerance)[0, 1])
+            joint, worst = self.mechanism.joint_names[body], float(error[error > tolerance][0])
+            raise ValueError(
+                f"Simulator.minimal(z): joint {joint!r} is violated by {worst:.1e} (joint_tolerance={tolerance:g})"
+            )
+
+
+def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    """`value` as a finite array that ends in `shape`, with any leading axes."""
+    ndim = np.ndim(value)
+    lead = (None,) * max(0, ndim - len(shape))
+    try:
+        return checks.array(call, value, (*lead, *shape))
+    except ValueError as error:
+        text = str(error)
+        if ndim > len(shape) and "expected shape" in text:
+            tail = ", ".join(map(str, shape))
+            text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"
+        raise ValueError(text) from None
+
+
+def whole(call: str, value: Any, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
+    return int(value)

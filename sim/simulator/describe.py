@@ -1,0 +1,154 @@
+"""describe: what a scene consists of, what a step has to compute for it, and what is left out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.mechanism.contact_candidates import Touch
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import mechanism_sizes
+from sim.mechanism.parts import WORLD, Contact, Joint
+from sim.mechanism.shapes import Solid
+from sim.simulator.omitted_contacts import reach
+
+if TYPE_CHECKING:
+    from sim.simulator.simulator import Simulator
+
+
+def describe(sim: Simulator) -> str:
+    """A page of text."""
+    mech = sim.mechanism
+    lines = [
+        f"{mech.name}: {_count(sim.nbody, 'body', 'bodies')}, {_count(sim.nv, 'degree', 'degrees')} of freedom, "
+        f"{_total_mass(mech):.4g} kg",
+        f"  state x ({sim.nx},) = q ({sim.nq},), v ({sim.nv},);  perturbation dx ({sim.ndx},);  input u ({sim.nu},)",
+        f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
+        "joints",
+        *(_joint_line(mech, j) for j in mech.joints),
+        *_loop_lines(sim),
+        *_titled("inputs", [f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)]),
+        *_contact_lines(mech),
+        *_collision_lines(mech),
+        "a step",
+        *(f"  {what:<18}{state}" for what, state in _parts(mech, sim.order)),
+        *_far_lines(sim),
+    ]
+    return "\n".join(lines)
+
+
+def _total_mass(mech: Mechanism) -> float:
+    return sum(b.mass for b in mech.bodies)
+
+
+def _span(s: slice) -> str:
+    """Indices as a user would write them."""
+    return "-" if s.start == s.stop else str(s.start) if s.stop == s.start + 1 else f"{s.start}:{s.stop}"
+
+
+def _joint_line(mech: Mechanism, joint: Joint) -> str:
+    """Name, kind, place in the tree, coordinates, and what else is on the joint."""
+    extra = [
+        word
+        for word, there in (
+            ("spring", any(np.atleast_1d(np.asarray(joint.spring)))),
+            ("damper", any(np.atleast_1d(np.asarray(joint.damper)))),
+            ("limits", any(np.isfinite(b) for pair in joint.limits or () for b in pair)),
+            ("cone", joint.cone is not None),
+            ("armature", any(np.atleast_1d(np.asarray(joint.armature)))),
+        )
+        if there
+    ]
+    at = f"q[{_span(mech.q_slice(joint.name))}], v[{_span(mech.v_slice(joint.name))}]"
+    tail = f"  with {', '.join(extra)}" if extra else ""
+    return f"  {joint.name:<18}{joint.kind:<16}{joint.parent} -> {joint.child}:  {at}{tail}"
+
+
+def _loop_lines(sim: Simulator) -> list[str]:
+    """What closes loops, and how many of its constraints say something new."""
+    loops, gears = sim.mechanism.loops, sim.mechanism.gears
+    if not loops and not gears:
+        return []
+    lines = [f"  {j.name:<18}{j.kind:<16}{j.parent} -> {j.child}:  {6 - j.nv} constraints" for j in loops]
+    lines += [f"  {g.name:<18}{'gear':<16}{g.joint} = {g.ratio:g} {g.other} + {g.offset:g}" for g in gears]
+    return ["loops", *lines, f"  {sim.loop_rank()}"]
+
+
+def _contact_lines(mech: Mechanism) -> list[str]:
+    lines = []
+    for c in mech.contacts:
+        law = c.law if c.friction > 0 else "impact"
+        shape = f"ball of {c.radius:g} m" if c.radius else "point"
+        more = f", restitution {c.restitution:g}" if c.restitution else ""
+        more += ", on terrain" if c.terrain is not None else ""
+        lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}{more}")
+    return _titled("contacts", lines)
+
+
+def _collision_lines(mech: Mechanism) -> list[str]:
+    """Which shapes touch, and at how many points they may."""
+    lines = []
+    for c in mech.collisions:
+        points = sum(touch.name == c.name or touch.name.startswith(f"{c.name}_") for touch in mech.touches)
+        met = _count(points, "point", "points") if points else "fixed to one another, left out"
+        kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
+        more = f", restitution {c.restitution:g}" if c.restitution else ""
+        law = c.law if c.friction > 0 else "impact"
+        lines.append(
+            f"  {c.name:<18}{kinds[0]} on {c.a}, {kinds[1]} {'of the' if c.b == WORLD else 'on'} {c.b}: "
+            f"{met}, law {law}, friction {c.friction:g}{more}"
+        )
+    return _titled("collisions", lines)
+
+
+def _solid(mech: Mechanism, body: str, shape: Solid | None) -> str:
+    """What kind of shape a collision has on a body."""
+    own = shape if shape is not None or body == WORLD else mech.bodies[mech.body_names.index(body)].shape
+    return type(own).__name__.lower()
+
+
+def _titled(title: str, lines: list[str]) -> list[str]:
+    """The lines below their title, and no title without lines."""
+    return [title, *lines] if lines else []
+
+
+def _count(number: int, one: str, many: str) -> str:
+    return f"{number} {one if number == 1 else many}"
+
+
+def _far_lines(sim: Simulator) -> list[str]:
+    """From how far on contacts are left out of the solver at this kappa and tolerance."""
+    if not sim.ncontact:
+        return []
+    distances = reach(sim.model, sim.time_step, sim.kappa, sim.tolerance)
+    last = int(np.argmax(distances))
+    nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
+    span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {sim.mechanism.contact_names[last]} {farthest} m"
+    return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
+
+
+def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
+    """What a step computes, and what it leaves out."""
+    nlimit = mechanism_sizes(mech).nlimit
+    points: list[Contact | Touch] = [*mech.contacts, *mech.touches]
+    cones = sum(c.friction > 0 and c.law == "nonlinear" for c in points)
+    pyramids = sum(c.friction > 0 and c.law == "linear" for c in points)
+    impacts = len(points) - cones - pyramids
+    springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
+    dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
+    solver = "interior point" if points or nlimit else "Newton's method; interior point left out"
+    if order > 2:
+        from sim.integrators.tableau import tableau
+
+        far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
+        solver = (
+            f"{solver}; while contacts and limits are far none: {far}" if mech.contacts or nlimit else f"none: {far}"
+        )
+    counts = (
+        ("contacts", len(points), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
+        ("joint limits", nlimit, _count(nlimit, "bound", "bounds")),
+        ("springs", springs, _count(springs, "joint", "joints")),
+        ("dampers", dampers, _count(dampers, "joint", "joints")),
+    )
+    return [("solver", solver), *((what, text if n else "left out") for what, n, text in counts)]

@@ -1,0 +1,104 @@
+"""Horizon: rollouts and derivatives of trajectories of one length, as a planner asks for them again and again.
+
+Its arrays are those that it returned before, so they are not checked again; what a rollout learns about its steps is
+handed on to the next one nearby.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.integrators.policy import Policy
+from sim.simulator.border import Border
+from sim.simulator.calls import Calls
+from sim.simulator.results import Linearization
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Horizon", "Steps", "Trial"]
+
+
+class Steps(NamedTuple):
+    """Cone variables of the steps of a rollout: where those of a rollout nearby start to look for theirs."""
+
+    cones: Floats  # (T, ncontact, 12)
+    bounds: Floats  # (T, nlimit, 2)
+
+
+class Trial(NamedTuple):
+    """A rollout; what comes after the last solved knot is undefined."""
+
+    x: Floats  # (T + 1, nx)
+    u: Floats  # (T, nu) [N, N m]
+    status: Status
+    knot: int  # number of solved knots
+    steps: Steps | None  # None where a knot has several
+
+
+class Horizon:
+    """Trajectories of `knots` knots, each of `substeps` time steps, with inputs within `limits`.
+
+    Arrays are float64, C-contiguous and finite, states have unit quaternions: `states` makes them so.
+    """
+
+    def __init__(self, calls: Calls, border: Border, knots: int, substeps: int, limits: tuple[Floats, Floats]) -> None:
+        self._calls, self._border, self._substeps, self._limits = calls, border, substeps, limits
+        self._k = np.zeros((knots, calls.nu))
+        self._K = np.zeros((knots, calls.nu, calls.ndx))
+        self._gaps = np.zeros((knots + 1, calls.ndx))
+
+    def states(self, call: str, xs: Floats) -> Floats:
+        """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
+        return self._border.states(call, xs)
+
+    def roll(
+        self,
+        x0: Floats,
+        xs: Floats,
+        us: Floats,
+        kappa: float,
+        *,
+        k: Floats | None = None,
+        K: Floats | None = None,
+        gaps: Floats | None = None,
+        alpha: float = 1.0,
+        linear: Linearization | None = None,
+        steps: Steps | None = None,
+    ) -> Trial:
+        """Rollout from x0 (nx,) under the gains around (xs, us), as `Simulator.closed_loop`.
+
+        linear: derivatives at (xs, us), steps: those of the rollout (xs, us); they tell where a step may look first.
+        """
+        derivatives = self._calls.unknown[:2] if linear is None else (linear.A, linear.B)
+        cones = self._calls.unknown[2:] if steps is None else steps
+        policy = Policy(
+            xs,
+            us,
+            self._k if k is None else k,
+            self._K if K is None else K,
+            self._gaps if gaps is None else gaps,
+            *derivatives,
+            *cones,
+        )
+        keep = self._substeps == 1
+        knot, path = self._calls.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
+        kept = Steps(path.cones, path.bounds) if keep else None
+        return Trial(path.xs, path.us, Status(int(path.report[0])), knot, kept)
+
+    def linearize(self, xs: Floats, us: Floats, kappa: float, guess: Floats | None = None) -> Linearization:
+        """Derivatives of all knots, as `Simulator.linearize_trajectory`.
+
+        guess: (T, nx) where the velocities after each knot are looked for first; by default in the later rows of xs.
+        """
+        A, B, x_next, reports = self._calls.linearize(xs, us, self._substeps, kappa, guess)
+        return Linearization(A, B, x_next, reports[:, 0].astype(np.int64), accuracy=reports[:, 5])
+
+    def gaps(self, linear: Linearization, xs: Floats) -> Floats:
+        """(T + 1, ndx) f(x_t, u_t) (-) x_t+1, in the rows of the later knots; zero in the first."""
+        gaps = np.zeros_like(self._gaps)
+        gaps[1:] = self._calls.difference(xs[1:], linear.x_next)
+        return gaps

@@ -1,0 +1,236 @@
+"""The optional kernels that a mechanism uses (solvers/optional.py): linked before the first call that needs them.
+
+Addresses are those of this process, so they are no part of a mechanism that is copied into another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.contact.contact_report import report_contacts, worst_contact
+from sim.contact.inactive_terrain import evaluate_on_terrain
+from sim.contact.pairs.active_features import choose_pairs, overlapping
+from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
+from sim.contact.pairs.inactive_pairs import all_near, begin_pairs, enlist_pairs, far_pair_impulses, pairs_came_near
+from sim.contact.pairs.pair_contact import pair_kinematics
+from sim.contact.pairs.pair_energy import pair_slack, pairs_gained
+from sim.contact.pairs.pair_jacobian import pair_rate
+from sim.contact.pairs.pair_report import report_pairs
+from sim.contact.pairs.pair_stiffness import apply_pairs, condense_pairs, pair_constants
+from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
+from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
+from sim.contact.pyramid import (
+    condense_pyramid,
+    pyramid_boundary,
+    pyramid_constant,
+    pyramid_error,
+    pyramid_products,
+    pyramid_products_ahead,
+    recover_pyramid,
+    return_pyramid,
+    start_pyramid,
+)
+from sim.contact.restitution import find_impacts, impacts_gained, subtract_floors
+from sim.contact.terrain_contact import add_frame_matrix, place_on_terrain, terrain_gap, turn_on_terrain
+from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
+from sim.derivatives.parameters.height_columns import add_height_gradient
+from sim.derivatives.parameters.string_columns import add_moved_end
+from sim.derivatives.parameters.surface import add_surface_radius
+from sim.derivatives.restitution_gradient import add_bounce_composites, add_bounce_derivatives
+from sim.derivatives.step_gradient import gradient
+from sim.dynamics.elimination_deep import solve_deep_panel
+from sim.dynamics.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
+from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
+from sim.dynamics.joints.limits import add_limit_derivatives
+from sim.dynamics.joints.swing import swing_curvature, swing_pose, swing_turn
+from sim.dynamics.loops.branch_motion import (
+    is_farther,
+    lead_again,
+    loops_regular,
+    meet_ahead,
+    predict_loops,
+    stay_regular,
+)
+from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops, start_loops
+from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling, solve_coupling_panel
+from sim.dynamics.loops.gears import apply_gears
+from sim.dynamics.loops.loop_velocity import close_velocity
+from sim.dynamics.loops.loop_work import loop_slack, loops_gained
+from sim.model.model import Law, Model
+from sim.model.shape_kinds import SWAPPED, Pair
+from sim.solve.inequalities import add_stiffness
+from sim.solve.interior_point import interior_point
+from sim.solve.loop_branch import solve_loops
+from sim.solve.newton import newton
+from sim.step import step
+from solvers.optional import link
+
+_LOOPS = (
+    factor_coupling,
+    solve_coupling,
+    start_loops,
+    apply_loops,
+    keep_loops,
+    move_loops,
+)
+_MOTION_OF_LOOPS = (
+    solve_loops,
+    loops_regular,
+    stay_regular,
+    predict_loops,
+    meet_ahead,
+    is_farther,
+    lead_again,
+    loops_gained,
+    loop_slack,
+)
+_PAIRS = (
+    pair_kinematics,
+    pair_rate,
+    condense_pairs,
+    apply_pairs,
+    pair_constants,
+    report_pairs,
+    choose_pairs,
+    overlapping,
+    begin_pairs,
+    enlist_pairs,
+    far_pair_impulses,
+    pairs_came_near,
+    pairs_gained,
+    pair_slack,
+)
+_CYLINDERS = (
+    cylinder_distance,
+    collide_cylinders,
+    choose_cylinders,
+    cylinder_before,
+)
+_STRINGS = (is_taut, pull_from_before, string_arm, add_string_stiffness)
+_PYRAMIDS = (
+    start_pyramid,
+    pyramid_error,
+    pyramid_products,
+    pyramid_products_ahead,
+    pyramid_boundary,
+    return_pyramid,
+    condense_pyramid,
+    pyramid_constant,
+    recover_pyramid,
+)
+_TERRAIN = (
+    place_on_terrain,
+    turn_on_terrain,
+    add_frame_matrix,
+    terrain_gap,
+    evaluate_on_terrain,
+)
+_IMPACTS = (find_impacts, subtract_floors, impacts_gained)
+_COUPLING_GRADIENT = (
+    add_coupling_composites,
+    add_coupling_derivatives,
+    solve_coupling_panel,
+)
+
+
+_DEEP = 24.0  # dofs above one, on average, from where wrenches and twists take less (sim/dynamics/elimination_deep.py)
+
+
+def _has_ball_springs(model: Model) -> bool:
+    first = model.body_vadr[:-1] + model.joint_ntrans
+    return bool(np.any(model.dof_spring[first[model.joint_nrot == 3]] > 0.0))
+
+
+def _has_strings(model: Model) -> bool:
+    return bool(np.any(model.pair_kind % SWAPPED == int(Pair.STRING)))
+
+
+def link_poses(model: Model) -> None:
+    """What every call of a mechanism may need."""
+    if np.any(model.joint_nrot == 2):
+        link(model.optional, swing_pose, swing_turn)
+    if _has_ball_springs(model):
+        link(model.optional, add_spring_block)
+
+
+def link_nodes(model: Model) -> None:
+    """What velocities and energies at the nodes of a motion need: those of loops follow from their constraints."""
+    if len(model.loop_ntrans) + len(model.gear_dof):
+        link(model.optional, factor_coupling, solve_coupling, close_velocity)
+
+
+def link_smooth(model: Model) -> None:
+    """What steps of higher order need."""
+    if np.any(model.joint_nrot == 2):
+        link(model.optional, swing_curvature)
+
+
+def link_step(model: Model) -> None:
+    """What a time step needs: the interior point only where there are contacts or limits."""
+    hard = len(model.contact_body) + len(model.limit_dof) > 0
+    link(model.optional, step)
+    if hard:
+        link(model.optional, interior_point, worst_contact, report_contacts)
+    else:
+        link(model.optional, newton)
+    if np.any(model.limit_cone):
+        link(model.optional, cone_gap, cone_block)
+    if _has_ball_springs(model):
+        link(model.optional, spring_impulse)
+    if np.any(model.contact_law == int(Law.LINEAR)):
+        link(model.optional, *_PYRAMIDS)
+    if len(model.coupling_body) + len(model.gear_dof):
+        link(model.optional, *_LOOPS)
+        link_nodes(model)
+    if len(model.loop_ntrans):
+        link(model.optional, *_MOTION_OF_LOOPS)
+    if len(model.loop_ntrans) + len(model.gear_dof):
+        link(model.optional, apply_gears)
+    if len(model.pair_kind):
+        link(model.optional, *_PAIRS)
+    if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
+        link(model.optional, *_CYLINDERS)
+    if _has_strings(model):
+        link(model.optional, *_STRINGS)
+    if np.any(model.contact_terrain):
+        link(model.optional, *_TERRAIN)
+    if np.any(model.contact_restitution):
+        link(model.optional, *_IMPACTS)
+
+
+def link_gradient(model: Model) -> None:
+    """What the derivatives of a time step need beyond it."""
+    link(model.optional, gradient)
+    if np.sum(model.count_above[model.dof_body]) > _DEEP * len(model.dof_body):
+        link(model.optional, solve_deep_panel)
+    if len(model.contact_body) + len(model.limit_dof):
+        link(model.optional, add_stiffness)
+    if len(model.limit_dof):
+        link(model.optional, add_limit_derivatives)
+    if np.any(model.limit_cone):
+        link(model.optional, cone_derivative)
+    if np.any(model.joint_nrot == 2):
+        link(model.optional, swing_curvature)
+    if _has_ball_springs(model):
+        link(model.optional, add_ball_spring_derivatives)
+    if len(model.coupling_body) + len(model.gear_dof):
+        link(model.optional, *_COUPLING_GRADIENT)
+    if len(model.pair_kind):
+        link(model.optional, all_near)
+    if _has_strings(model):
+        link(model.optional, add_string_turn)
+    if np.any(model.contact_restitution):
+        link(model.optional, add_bounce_composites, add_bounce_derivatives)
+
+
+def link_parameters(model: Model) -> None:
+    """What derivatives by parameters need beyond that."""
+    if np.any(model.contact_terrain):
+        link(model.optional, add_surface_radius)
+    if _has_strings(model):
+        link(model.optional, add_moved_end)
+
+
+def link_heights(model: Model) -> None:
+    """What gradients by the heights of a terrain need beyond that."""
+    link(model.optional, add_height_gradient)

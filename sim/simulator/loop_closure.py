@@ -1,0 +1,234 @@
+"""States of mechanisms with closed loops: how far the loops are open, and the nearest state that closes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.dynamics.loops.closest_root import jacobian, nearest, newton
+from sim.dynamics.loops.loop_rank import LoopRank
+from sim.mechanism.axes import contact_frame, fixed_axes
+from sim.mechanism.closing import is_weld
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import WORLD, Joint
+from sim.mechanism.shapes import rotation_matrices, rotation_matrix
+from sim.simulator.calls import Calls
+
+Floats = NDArray[np.float64]
+
+_APART = 0.1  # [m], and as much of an angle: a share of a body further from the rest of it is brought there first
+_ASIDE = 0.03  # [m, rad]
+_ALONE = 2  # starts of each distance of one loop alone, which are only to explain why all of them stay open
+_STARTS = 30  # repetitions, each of which halves the error at least
+_DEPENDENT = 1e-6  # singular values below this share of the largest belong to redundant constraints
+
+
+def _angle(sine: Floats, cosine: Floats) -> Floats:
+    """The rotation vectors along sin(angle) direction, of rows."""
+    size = np.linalg.norm(sine, axis=1)
+    return sine * (np.arctan2(size, cosine) / np.where(size > 0.0, size, np.inf))[:, None]
+
+
+class _Frame(NamedTuple):
+    """What of a loop joint does not move."""
+
+    turn: Floats  # (3, 3) joint to parent
+    held: Floats  # (n, 3) directions along which it does not slide
+    axes: Floats  # (3, 3) its axis, and two across
+
+
+class Closure:
+    """The loop constraints of a mechanism, as sim/dynamics/loops/closure.py has them, for Python."""
+
+    def __init__(self, mechanism: Mechanism, calls: Calls) -> None:
+        self._mechanism, self._calls = mechanism, calls
+        self._nq = mechanism.nq
+        self._h = calls.settings.time_step
+        self._frames = {
+            j.name: _Frame(rotation_matrix(j.orientation), fixed_axes(j), contact_frame(j.axis))
+            for j in mechanism.loops
+        }
+
+    def gaps(self, x: Floats) -> dict[str, Floats]:
+        """By loop joint and gear, what its constraints miss at x: distances [m], then angles [rad].
+
+        Angles and not the sines of the step (sim/dynamics/loops/closure.py), which vanish after half a turn as well.
+        """
+        return {name: gap[0] for name, gap in self._gaps(x[None]).items()}
+
+    def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
+        """`gaps` of every row, or one of them."""
+        mech = self._mechanism
+        z = self._calls.maximal(xs, mech.nbody)
+        out = {joint.name: self._gap(joint, z) for joint in mech.loops if only in ("", joint.name)}
+        for gear in mech.gears:
+            if only in ("", name := f"gear {gear.name}"):
+                a, b = mech.q_slice(gear.joint).start + gear.dof, mech.q_slice(gear.other).start + gear.other_dof
+                out[name] = xs[:, [a]] - gear.ratio * xs[:, [b]] - gear.offset
+        return out
+
+    def _gap(self, joint: Joint, z: Floats) -> Floats:
+        names, fixed = self._mechanism.body_names, self._frames[joint.name]
+        a = z[:, names.index(joint.child)]
+        Ra = rotation_matrices(a[:, 6:10])
+        apart, Q = a[:, :3] + Ra @ np.asarray(joint.child_point) - np.asarray(joint.parent_point), fixed.turn
+        if joint.parent != WORLD:
+            b = z[:, names.index(joint.parent or "")]
+            Rb = rotation_matrices(b[:, 6:10])
+            apart = a[:, :3] + Ra @ np.asarray(joint.child_point) - b[:, :3] - Rb @ np.asarray(joint.parent_point)
+            Q = Rb @ fixed.turn
+        back = np.swapaxes(Q, -1, -2)
+        E = back @ Ra
+        if joint.nrot == 1:
+            axis = E @ fixed.axes[0]
+            turned = _angle(axis @ fixed.axes[1:].T, axis @ fixed.axes[0])
+        else:
+            sine = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1)
+            turned = _angle(0.5 * sine, 0.5 * (np.trace(E, axis1=1, axis2=2) - 1.0))
+        held = (back @ apart[:, :, None])[:, :, 0] @ fixed.held.T
+        return np.concatenate([held, turned if joint.nrot < 3 else turned[:, :0]], axis=1)
+
+    def close(self, x: Floats, *, search: bool = True) -> Floats:
+        """The state near x whose loops are closed at both ends of its interval.
+
+        search: whether to look further away where Newton's method finds none, as from a linkage in one line.
+        ValueError: there is none near, with the loop that stays open and by how much.
+        """
+        nv = self._mechanism.nv
+        x = self._placed(x, search)
+
+        def before(dv: Floats) -> Floats:
+            back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros((len(dv), nv))], axis=1)
+            return self._calls.integrate(np.tile(x, (len(dv), 1)), back)
+
+        x[self._nq :] += self._solve(before)
+        return x
+
+    def _placed(self, x: Floats, search: bool) -> Floats:
+        """The state near x whose loops are closed at its end."""
+        place = self._around(self._with_shares(x))
+        return place(self._solve(place, search)[None])[0]
+
+    def start(self, q: Floats, v: Floats) -> Floats:
+        """The closed state near q whose velocity at the node is the part of v along the loops.
+
+        Closing the interval before the node changes the velocity by O(h), which is made up for by repetition.
+        """
+        q = self._reachable(q)
+        wanted = self._calls.node_velocities(self._calls.started(q, v)[None])[0]
+        given, best, x = wanted.copy(), np.inf, q
+        for _ in range(_STARTS):
+            state = self.close(self._calls.started(q, given))
+            off = wanted - self._calls.node_velocities(state[None])[0]
+            if not np.abs(off).max() < 0.5 * best:
+                break
+            x, best = state, np.abs(off).max()
+            given = given + off
+        return x
+
+    def _reachable(self, q: Floats) -> Floats:
+        """q, or the closed configuration near it where Newton's method finds none from there."""
+        x = np.concatenate([q, np.zeros(self._mechanism.nv)])
+        try:
+            self._placed(x, search=False)
+        except ValueError:
+            return self._placed(x, search=True)[: self._nq]
+        return q
+
+    def _with_shares(self, x: Floats) -> Floats:
+        """A copy of x where shares of bodies (closing.py) that are far from the rest of it are brought there."""
+        gaps = self.gaps(x)
+        far = [j for j in self._mechanism.loops if is_weld(j) and np.abs(gaps[j.name]).max() > _APART]
+        x = x.copy()
+        names = self._mechanism.body_names
+        for weld in far:
+            z = self._calls.maximal(x[None], self._mechanism.nbody)
+            z[0, names.index(weld.child)] = z[0, names.index(weld.parent or "")]
+            joint = self._mechanism.joints[names.index(weld.child)]
+            for at in (self._mechanism.q_slice(joint.name), self._v_slice(joint.name)):
+                x[at] = self._calls.minimal(z)[0][at]
+        return x
+
+    def _v_slice(self, joint: str) -> slice:
+        at = self._mechanism.v_slice(joint)
+        return slice(self._nq + at.start, self._nq + at.stop)
+
+    def rank(self, x: Floats) -> LoopRank:
+        """Which constraints are redundant at the configuration of x, loops in their order.
+
+        And which of them are so at this configuration only: next to it, along what the loops allow, they count.
+        """
+        here, free = self._rank_at(x)
+        near = [self._rank_at(y)[0] for y in self._next_to(x, free)]
+        count = sum(here.constraints.values()) - sum(here.redundant.values())
+        more = [sum(r.constraints.values()) - sum(r.redundant.values()) - count for r in near]
+        return here._replace(singular=max(0, *more, 0), nearby=max((r.weakest for r in near), default=here.weakest))
+
+    def _next_to(self, x: Floats, free: Floats) -> list[Floats]:
+        """Closed states at rest, _ASIDE away from x along some of its free directions (n, nv)."""
+        rng = np.random.default_rng(0)
+        states = []
+        for _ in range(2 if len(free) else 0):
+            d = rng.normal(size=len(free)) @ free
+            moved = self._around(x)(d[None] * (_ASIDE / np.abs(d).max()))[0]
+            moved[self._nq :] = 0.0
+            try:
+                states.append(self.close(moved, search=False))
+            except ValueError:  # an isolated configuration
+                continue
+        return states
+
+    def _rank_at(self, x: Floats) -> tuple[LoopRank, Floats]:
+        """The rank at one configuration, and the directions (n, nv) that its constraints leave."""
+        nv = self._mechanism.nv
+        rows = jacobian(self._error(self._around(x)), np.zeros(nv))
+        size = {name: len(gap) for name, gap in self.gaps(x).items()}
+        end, found, redundant = 0, 0, {}
+        for name, own in size.items():
+            end += own
+            values = np.linalg.svd(rows[:end], compute_uv=False)
+            independent = int(np.sum(values > _DEPENDENT * values[0]))
+            redundant[name] = own - (independent - found)
+            found = independent
+        rest = values[found:].max() if found < len(values) else 0.0
+        rank = LoopRank(size, redundant, nv - found, float(values[found - 1] / values[0]), float(rest / values[0]))
+        return rank, np.linalg.svd(rows)[2][found:]
+
+    def _solve(self, place: Callable[[Floats], Floats], search: bool = False) -> Floats:
+        """The small d (nv,) with closed loops at the state of place(d[None]).
+
+        search: whether to look further away where Newton's method finds none.
+        """
+        nv = self._mechanism.nv
+        error = self._error(place)
+        zero = nearest(error, nv) if search else newton(error, np.zeros(nv))
+        if not zero.found:
+            raise ValueError(self._refusal(place, zero.d, search))
+        return zero.d
+
+    def _around(self, x: Floats) -> Callable[[Floats], Floats]:
+        """The states (m, nx) whose configurations are d (m, nv) away from that of x."""
+        return lambda d: self._calls.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
+
+    def _error(self, place: Callable[[Floats], Floats], name: str = "") -> Callable[[Floats], Floats]:
+        """The gaps (m, n) at the states place(d), of all loops and gears or of one."""
+        return lambda d: np.concatenate(list(self._gaps(place(d), name).values()), axis=1)
+
+    def _refusal(self, place: Callable[[Floats], Floats], d: Floats, search: bool) -> str:
+        """What to say when the state place(d) is the best that was found."""
+        gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d[None])[0]).items()}
+        names = [*gaps] if search and len(gaps) > 1 else []
+        alone = [name for name in names if not nearest(self._error(place, name), len(d), _ALONE).found]
+        worst = max(alone or gaps, key=lambda name: gaps[name])
+        welds = {j.name: j.name.removeprefix(f"{j.parent}.") for j in self._mechanism.loops if is_weld(j)}
+        what = worst if worst.startswith("gear ") else f"loop joint {welds.get(worst, worst)!r}"
+        why = "two loops contradict each other"
+        if alone or len(gaps) == 1:
+            why = "links are too short, or its frames contradict the joints of the tree"
+        return (
+            f"Mechanism({self._mechanism.name!r}): {what} cannot be closed near this state, it is off by "
+            f"{gaps[worst]:.2g} at best; give neutral=... a configuration near one that closes, or see whether {why}"
+        )

@@ -1,0 +1,40 @@
+"""What a step leaves out of its solver because it is far, and from how far on: inactive.py for people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism.pack_clusters import STIFFNESS
+from sim.model.model import Model
+from sim.simulator.results import SimulationError
+from solvers.status import MESSAGES
+
+if TYPE_CHECKING:
+    from sim.simulator.simulator import Simulator
+
+
+def left_out(sim: Simulator, x: ArrayLike, u: ArrayLike | None) -> tuple[str, ...]:
+    """Names of the contacts that the step from x under u leaves out.  SimulationError: the step cannot be solved."""
+    result = sim.step(x, u)
+    if not result.success:
+        raise SimulationError(f"Simulator.left_out: {MESSAGES[result.status]}", result.status)
+    return tuple(name for name, far in zip(sim.mechanism.contact_names, sim._calls.far(), strict=True) if far)
+
+
+def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
+    """Gap from which on each contact of a body at rest is left out, (ncontact,) [m].
+
+    Twice the positive root a of the bound in inactive.py:
+
+    1000 tolerance a^2 = n kappa ((mu^2 + h (1 + mu)) M + h (1 + mu) T a)
+    """
+    out = np.zeros(len(model.contact_body))
+    for first in np.flatnonzero(model.cluster_end):
+        _, _, _, _, _, mobility, mu, turn = model.cluster[first]
+        share = len(out) * kappa / (STIFFNESS * tolerance)
+        b, c = share * time_step * (1.0 + mu) * turn, share * (mu * mu + time_step * (1.0 + mu)) * mobility
+        out[first : model.cluster_end[first]] = b + np.sqrt(b * b + 4.0 * c)
+    return out

@@ -1,0 +1,81 @@
+"""Calls by parameters: what a simulator says of its parameters by name, and derivatives by them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.derivatives.parameters.parameters import KINDS, Parameters, Plan, all_parameters
+from sim.derivatives.parameters.selection import select, with_values
+from sim.integrators.adjoint import Sweep
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.model.model import Vector
+from sim.simulator.calls import Calls
+from sim.simulator.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
+
+Floats = NDArray[np.float64]
+_VARIABLES = ("state", "input")
+
+
+class ParameterCalls:
+    """Derivatives by the parameters of one simulator; selections of parameters are those of `select`."""
+
+    def __init__(self, calls: Calls, mechanism: Mechanism, time_step: float) -> None:
+        self._calls, self._mechanism, self._time_step = calls, mechanism, time_step
+        self._known = all_parameters(mechanism, time_step)
+        # those made so far: finding parameters by name takes longer than their derivatives
+        self._selections: dict[tuple[str, ...], tuple[Parameters, Plan]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of all parameters."""
+        return tuple(p.name for p in self._known)
+
+    def select(self, call: str, wrt: Sequence[str]) -> tuple[tuple[str, ...], Parameters, Plan]:
+        """The names, one or several; those of them that are parameters, and the terms of their columns."""
+        asked = _different_names(call, wrt)
+        names = tuple(name for name in asked if name not in _VARIABLES)
+        if names and self._calls.settings.order != 2:
+            raise ValueError(f"{call}: expected a simulator of order 2, got order {self._calls.settings.order}")
+        return asked, *self._selection(call, names)
+
+    def values(self, call: str, wrt: Sequence[str]) -> Parameters:
+        """Parameters by name."""
+        return self._selection(call, _different_names(call, wrt))[0]
+
+    def _selection(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, Plan]:
+        if names not in self._selections:
+            self._selections[names] = select(call, self._known, names)
+        return self._selections[names]
+
+    def with_values(self, call: str, values: Mapping[str, ArrayLike]) -> tuple[Mechanism, float]:
+        """The mechanism and the time step with other values of parameters."""
+        return with_values(call, self._mechanism, self._time_step, values)
+
+    def columns(self, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
+        """See `parameter_columns`."""
+        return parameter_columns(self._calls, self._mechanism, step, A, plan)
+
+    def roll(
+        self, x: Vector, us: Floats, plan: Plan, kappa: float | None
+    ) -> tuple[int, Floats, Floats, Floats, Floats, Floats]:
+        """See `roll_parameters`."""
+        return roll_parameters(self._calls, self._mechanism, x, us, plan, kappa)
+
+    def sweep(self, path: tuple[Floats, Floats], loss: Floats, plan: Plan, kappa: float | None) -> tuple[int, Sweep]:
+        """See `adjoint_sweep`."""
+        return adjoint_sweep(self._calls, self._mechanism, path, loss, plan, kappa)
+
+
+def _different_names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:
+    """The names, one or several, all different."""
+    names = (wrt,) if isinstance(wrt, str) else tuple(wrt)
+    for name in names:
+        if not isinstance(name, str):
+            raise ValueError(f"{call}: expected names, got {name!r}")
+        checks.one_of(f"{call}: kind", name.split(":")[0].split("[")[0], (*_VARIABLES, *KINDS))
+    checks.distinct(call, names)
+    return names

@@ -1,0 +1,217 @@
+"""Calls of a simulator of higher order with contacts or limits: order 2 near them, the higher order while all is far.
+
+Both have the same states, x = [q; v] with v = M(q)^-1 p of the node. For order 2, p is the momentum that the discrete
+Legendre transform gives the node; that is one to one with the mean velocity of the interval before it, so going over
+from one order to the other changes neither q nor p: momentum and energy are the same on both sides. Which order a step
+has depends on its state and input alone (phases.py).
+
+Between order-2 steps nothing is converted: their states, with mean velocities, are handed on.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.integrators import legendre, phases, rollout
+from sim.integrators.hamilton_gradient import Slopes
+from sim.integrators.policy import Path, Policy
+from sim.model.model import Integers, Model, Vector
+from sim.model.pace import pieces
+from sim.simulator.calls import CONTACT, REPORT, Calls, Floats, interrupted
+from sim.simulator.high_order_calls import HighOrder
+from sim.simulator.link import link_smooth, link_step
+from sim.simulator.results import Interrupted
+from sim.simulator.settings import Settings
+from solvers.status import Status
+
+_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is far again are thrown away
+
+
+class March(NamedTuple):
+    """Steps from one state on; what comes after the last solved one is undefined."""
+
+    knot: int  # number of solved steps
+    xs: Floats  # (T + 1, nx)
+    reports: Floats  # (T, 6)
+    contacts: Floats  # (T, ncontact, 11)
+    means: Floats  # (T, nx) the states of order 2 where the steps of order 2 begin
+    near: NDArray[np.bool_]  # (T,) which those are
+
+
+class Phased(HighOrder):
+    """The kernels of one packed mechanism with contacts or limits."""
+
+    def __init__(self, model: Model, settings: Settings) -> None:
+        super().__init__(model, settings)
+        self._second = Calls(model, settings._replace(order=2))
+        self._last = threading.local()
+
+    def march(self, x: Vector, us: Floats, kappa: float | None = None) -> March:
+        """Steps from x under us (T, nu)."""
+        steps, ncontact = len(us), self.sizes.ncontact
+        out = March(
+            0,
+            np.zeros((steps + 1, self.nx)),
+            np.zeros((steps, REPORT)),
+            np.zeros((steps, ncontact, CONTACT)),
+            np.zeros((steps, self.nx)),
+            np.zeros(steps, dtype=bool),
+        )
+        out.xs[0] = x
+        t, mean = 0, None
+        try:
+            while t < steps:
+                taken, why = self._fly(phases.Flight(us[t:], out.xs[t:], out.reports[t:], out.contacts[t:]), kappa)
+                t += taken
+                if why != phases.NEAR:
+                    break
+                if taken or mean is None:
+                    status, mean = self._second.start(out.xs[t, : self.sizes.nq], out.xs[t, self.sizes.nq :])
+                    if status != Status.SOLVED:
+                        out.reports[t] = status, 0.0, np.inf, 0.0, -1.0
+                        break
+                taken, mean = self._stay(out, t, us, mean, kappa)
+                t += taken
+                if mean is None:
+                    break
+        except KeyboardInterrupt as stop:
+            t += stop.result if isinstance(stop, Interrupted) else int(out.near[t:].sum())
+            raise Interrupted((t, out.xs, interrupted(out.reports, t), out.contacts)) from None
+        self._last.near = bool(t and out.near[t - 1])
+        if t < steps:
+            np.nan_to_num(out.reports[t], copy=False, nan=np.inf, posinf=np.inf)
+        return out._replace(knot=t)
+
+    def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
+        """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
+        model, work = self._table(link_smooth, link_step), self._scratch.table()
+        settings, scheme = self.settings.array(kappa), self._scheme()
+        taken, why = 0, int(Status.SOLVED)
+        try:
+            for _ in pieces(settings, len(flight.us)):
+                taken, why = phases.roll_far(model, work, settings, scheme, flight, taken)
+                if taken == len(flight.us) or why != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted(taken) from None
+        return int(taken), int(why)
+
+    def _stay(self, out: March, first: int, us: Floats, mean: Vector, kappa: float | None) -> tuple[int, Vector | None]:
+        """Steps of order 2 from the state `mean` at step `first` until all is far: their number, and the last state.
+
+        None in its place where a step is not solved.
+        """
+        model, work, settings = self._table(link_step), self._second._scratch.table(), self.settings.array(kappa)
+        t, piece, nq = first, _PIECE, self.sizes.nq
+        while t < len(us):
+            count = min(piece, len(us) - t)
+            means = np.zeros((count + 1, self.nx))
+            means[0] = mean
+            rows, solved = slice(t, t + count), 0
+            line = us[rows], means, out.reports[rows], out.contacts[rows]
+            for _ in pieces(settings, count):
+                solved = int(rollout.roll(model, work, settings, *line, solved))
+                if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
+                    break
+            nodes = means[1 : solved + 1].copy()
+            nodes[:, nq:] = self._second.node_velocities(nodes)
+            far = phases.first_far(self._model, self._scratch.table(), settings, self._scheme(), nodes)
+            taken = min(far + 1, solved)
+            out.xs[t + 1 : t + 1 + taken] = nodes[:taken]
+            out.means[t : t + taken], out.near[t : t + taken] = means[:taken], True
+            t, mean, piece = t + taken, means[taken], min(2 * piece, _LARGEST)
+            if far < solved:
+                break
+            if solved < count:
+                return t - first, None
+        return t - first, mean
+
+    def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
+        """As Calls.roll."""
+        m = self.march(x, us)
+        return m.knot, m.xs, m.reports, m.contacts
+
+    def far(self) -> NDArray[np.bool_]:
+        """As Calls.far; all of them where the step was of higher order."""
+        return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
+
+    def closed_loop(
+        self,
+        x: Vector,
+        policy: Policy,
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """As Calls.closed_loop; nothing of what the policy knows of its steps is used."""
+        knots = len(policy.us)
+        path = self._path(knots, keep=keep, cones=False)
+        path.xs[0] = x
+        total = 0.0
+        for t in range(knots):
+            try:
+                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
+                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
+                m = self.march(path.xs[t], np.repeat(path.us[t : t + 1], substeps, axis=0), kappa)
+            except KeyboardInterrupt:
+                interrupted(path.report[None], 0)
+                raise Interrupted((t, path)) from None
+            path.report[:REPORT] = m.reports[min(m.knot, substeps - 1)]
+            if m.knot < substeps:
+                return t, path
+            total += m.reports[:, 1].sum()
+            path.xs[t + 1] = m.xs[-1]
+            if alpha < 1.0:
+                path.xs[t + 1] = self.integrate(m.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+        path.report[1] = total
+        return knots, path
+
+    def linearize(
+        self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
+    ) -> tuple[Floats, ...]:
+        """As Calls.linearize, on one core: products of the derivatives of the steps, each by its own order."""
+        self._check_swings()
+        n = len(us)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        for t in range(n):
+            m = self.march(xs[t], np.repeat(us[t : t + 1], substeps, axis=0), kappa)
+            reports[t] = m.reports[min(m.knot, substeps - 1)]
+            steps = (self._step_slopes(m, s, us[t], kappa) for s in range(substeps)) if m.knot == substeps else ()
+            dx, du = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
+            for dx_dx, dx_du, report in steps:
+                dx, du = dx_dx @ dx, dx_dx @ du + dx_du
+                if report[0] != Status.SOLVED:
+                    reports[t] = report
+            if reports[t, 0] == Status.SOLVED:
+                A[t], B[t], x_next[t] = dx, du, m.xs[-1]
+        return A, B, x_next, reports
+
+    def _step_slopes(self, m: March, s: int, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector]:
+        """(d(next state)/d(state), by the input, report) of step s."""
+        if not m.near[s]:
+            A, B, _, report = super().linearize(m.xs[s : s + 1], u[None], 1, kappa)
+            return A[0], B[0], report[0]
+        A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa)
+        after = self._node_slopes(x_next[0])
+        return after @ A[0] @ np.linalg.inv(self._node_slopes(m.means[s])), after @ B[0], report[0]
+
+    def _node_slopes(self, mean: Vector) -> Floats:
+        """d(q, v of the node)/d(q, mean velocity) of a state of order 2:  p_v dv = dp - p_q dq,  (ndx, ndx)."""
+        nv = self.sizes.nv
+        slopes = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42)))
+        by_q, by_mean = np.zeros((nv, nv)), np.zeros((nv, nv))
+        none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
+        out = np.eye(self.ndx)
+        legendre.legendre_slopes(
+            self._model, self._scratch.table(), self.settings.time_step, none, mean, slopes, by_q, by_mean
+        )
+        out[nv:] = np.linalg.solve(slopes.p_v, np.hstack([by_q - slopes.p_q, by_mean]))
+        return out

@@ -1,0 +1,68 @@
+"""Settings of a time step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import WORLD
+from sim.model.model import Vector
+
+__all__ = ["Settings", "default_kappa", "free_parts"]
+
+_CREEP = 1e-9  # [m/s]
+_EARTH = 9.81  # [m/s^2] where there is no gravity
+_SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
+
+
+class Settings(NamedTuple):
+    """Settings of a time step."""
+
+    time_step: float  # [s]
+    kappa: float  # central-path parameter [N s m]
+    tolerance: float
+    max_iterations: int
+    order: int = 2  # of a step
+
+    def array(self, kappa: float | None = None) -> Vector:
+        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without the order,
+        which chooses the kernels.
+        """
+        level = self.kappa if kappa is None else kappa
+        return np.array((self.time_step, level, self.tolerance, self.max_iterations, np.inf), dtype=np.float64)
+
+
+def free_parts(mechanism: Mechanism) -> list[float]:
+    """Masses of the groups of bodies that joints hold together and that can move [kg]."""
+    group = {body.name: body.name for body in mechanism.bodies}
+
+    def leader(name: str) -> str:
+        while group[name] != name:
+            name = group[name]
+        return name
+
+    for joint in (*mechanism.joints, *mechanism.loops):
+        if WORLD not in (joint.parent, joint.child):
+            group[leader(joint.child)] = leader(str(joint.parent))
+    free = {leader(joint.child) for joint in mechanism.joints if joint.nv > 0}
+    return [sum(body.mass for body in mechanism.bodies if leader(body.name) == head) for head in free]
+
+
+def default_kappa(mechanism: Mechanism, time_step: float) -> float:
+    """Central-path parameter of a simulator that was given none [N s m]:
+
+        kappa = 1e-9 m/s * m |g| h,    between 1e-13 and 1e-6
+
+    m is the mass of the lightest part that no joint holds to another [kg], h the time step [s], |g| the size of
+    gravity, 9.81 m/s^2 where there is none. Such a part, at rest on n contacts that share its weight, floats n * 1e-9 m
+    above the ground whatever it weighs and at every time step, and creeps down a slope a with
+    n * 1e-9 m/s * tan a / (cos a (mu^2 - tan^2 a)): less than 1e-6 m in 10 s, but for slopes close to the cone.
+    Where bodies collide, m is the mass of all parts: each may carry the others, and the gap below its load has to stay
+    above the rounding of positions.
+    """
+    masses = free_parts(mechanism)
+    mass = sum(masses) if mechanism.collisions else min(masses)
+    gravity = float(np.linalg.norm(np.asarray(mechanism.gravity))) or _EARTH
+    return float(np.clip(_CREEP * mass * gravity * time_step, _SMALLEST, _LARGEST))

@@ -1,0 +1,56 @@
+"""The step of a scene with loops: its solution on the branch of the motion, also at singular poses.
+
+Where loops are regular (branch_motion.py), they move on one branch, and the step is solved as any other. At a singular
+pose branches meet (bifurcation.py): the motion goes on along the one on which it arrived.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.loops.branch_motion import (
+    is_farther,
+    lead_again,
+    loops_regular,
+    meet_ahead,
+    predict_loops,
+    stay_regular,
+)
+from sim.model.data import Work
+from sim.model.model import Model, Vector
+from sim.model.options import Guess, Options, Outcome
+from sim.model.slots import Slot
+from sim.solve.solve_step import solve_step
+from solvers.jit import inlined
+from solvers.optional import optional
+from solvers.status import Status
+
+_SOLVED = int(Status.SOLVED)
+_LEADS = 2  # times that directions of loops are found anew
+
+
+@inlined
+def _after(r: Outcome, last: Outcome) -> Outcome:
+    """The last of several solves, with the iterations of all."""
+    return Outcome(last.status, r.iterations + last.iterations, last.residual, last.violation)
+
+
+@optional(Slot.SOLVE_LOOPS)
+def solve_loops(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+    """`solve_step` on the branch of the loops' motion."""
+    r = Outcome(_SOLVED, 0, 0.0, 0.0)
+    if loops_regular(model, work):
+        r = _after(r, solve_step(model, work, options, q, v, u, guess))
+        if stay_regular(model, work, r.status):
+            return r
+        guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
+    if predict_loops(model, work, options.h, q, v, guess.velocity):
+        guess = Guess(work.loop_velocity, guess.impulses)
+    r = _after(r, solve_step(model, work, options, q, v, u, guess))
+    if r.status == _SOLVED and meet_ahead(model, work):
+        r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
+        if is_farther(model, work, r.status):
+            r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
+    for _ in range(_LEADS):
+        if r.status != _SOLVED or not lead_again(model, work, options.h, q):
+            break
+        r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses)))
+    return r

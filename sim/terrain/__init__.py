@@ -1,1 +1,0 @@
-"""Ground that is no level plane."""
