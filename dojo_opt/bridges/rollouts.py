@@ -77,7 +77,7 @@ class Rollouts:
         if len(x0s) > 1 and thetas.shape[1] == 0:
             batch = self.sim.rollout_batch(x0s, inputs)
             out[:] = batch.x
-            for row in np.flatnonzero(batch.status != Status.SOLVED)[:1]:
+            for row in np.flatnonzero(batch.statuses != Status.SOLVED)[:1]:
                 self._roll(x0s[row], inputs[row], thetas[row], f"row {row}: ")
         else:
             self._each(len(x0s), lambda i: np.copyto(out[i], self._roll(x0s[i], inputs[i], thetas[i], f"row {i}: ")))

@@ -33,6 +33,7 @@ class Work(NamedTuple):
     inertia_world: Matrix  # (nbody, 9) at configuration 2
     momentum_in: Matrix  # (nbody, 6) momentum of interval 1-2 at node 2 plus applied impulses, at the centre of mass
     momentum_out: Matrix  # (nbody, 6) momentum of interval 2-3, likewise without impulses
+    external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     body_impulse: Matrix  # (nbody, 6) force and torque impulses of BODY inputs, world axes, at the centre of mass
     arm: Matrix  # (nbody, 6) at configuration 2, world axes: joint frame from the parent, joint point from the body
     turn_matrix: Matrix  # (nbody, 9) rotation matrix of the turn from configuration 2 to 1 or 3, less the identity

@@ -65,7 +65,7 @@ WORK_FLOATS = _shapes(
     """
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
-    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, body_impulse nbody 6,
+    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, external nbody 6, body_impulse nbody 6,
     arm nbody 6, turn_matrix nbody 9, move_in nbody 3, move nbody 3, turn_in nbody 4, turn nbody 4,
     balance nbody 6, node_inertia nbody 9, node_momentum nbody 6, node_p nv, node_share nv,
     wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,

@@ -214,7 +214,7 @@ def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
     assert _numbers(t) and _numbers(t.contacts)
     linear = sim.linearize_trajectory(x[None], u[None])
     assert _numbers(linear)
-    if not r.success or linear.status[0] != 0:
+    if not r.success or linear.statuses[0] != 0:
         with pytest.raises(dojo.SimulationError):
             sim.linearize(x, u)
         return
@@ -246,4 +246,4 @@ def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
         linear = sim.linearize_trajectory(np.tile(sim.neutral(), (3, 1)), np.zeros((3, 1)))
         assert np.isfinite(t.contacts.impulse).all() and np.isfinite(t.contacts.gap).all()
         assert np.isfinite(linear.A).all() and np.isfinite(linear.B).all()
-        assert not t.success and linear.status.all()
+        assert not t.success and linear.statuses.all()
