@@ -117,7 +117,7 @@ class Continuation:
         known = self._known is not None and self._known[0] == stage.kappa_eval
         linear = self._known[1] if self._known and known else self._horizon.linearize(now.x, now.u, stage.kappa_eval)
         self._known = None
-        if np.any(linear.statuses):
+        if np.any(linear.status):
             return Status.SOLVED if self.roll_with_gains(stage.kappa_eval) else Status.SIMULATION_FAILED
         gaps = self._horizon.gaps(linear, now.x)
         closed = float(np.abs(gaps).max()) <= self._options.gap

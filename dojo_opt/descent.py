@@ -83,14 +83,14 @@ class Descent:
         for level in (kappa, 10.0 * kappa, kappa_eval):
             apart = level != kappa_eval
             linear = self._horizon.linearize(now.x, now.u, level, self._guess(now, level) if apart else None)
-            failed = np.flatnonzero(linear.statuses)
+            failed = np.flatnonzero(linear.status)
             if failed.size == 0:
                 if apart:
                     self._apart = level, linear.x_next - now.x[1:]
                 self.use(linear, now)
                 self.detail = ""
                 return Status.SOLVED
-            status = Status(int(linear.statuses[failed[0]]))
+            status = Status(int(linear.status[failed[0]]))
             self.detail = f" Derivatives at knot {failed[0]}, {status.name}: {MESSAGES[status]}"
         return status
 

@@ -40,7 +40,7 @@ def fit(horizon: Horizon, objective: Objective, sim: Any, now: Iterate, stages: 
     best, chosen, known = np.inf, 0, None
     for i in range(count - 1, -1, -1):
         linear = horizon.linearize(now.x, now.u, stages[i].kappa_eval)
-        misfit = np.inf if np.any(linear.statuses) else float(np.sum(horizon.gaps(linear, now.x) ** 2))
+        misfit = np.inf if np.any(linear.status) else float(np.sum(horizon.gaps(linear, now.x) ** 2))
         if misfit <= _GOOD * best and misfit < np.inf:
             chosen, known = i, (stages[i].kappa_eval, linear)
         elif best < np.inf:

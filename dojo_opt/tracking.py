@@ -28,9 +28,9 @@ def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -
     """
     sim = problem.sim
     line = sim.linearize_trajectory(plan.x, plan.u, substeps=problem.substeps, kappa=kappa)
-    if np.any(line.statuses != Status.SOLVED):
-        t = int(np.flatnonzero(line.statuses != Status.SOLVED)[0])
-        raise ValueError(f"tracking_gains: knot {t} of the plan is not solved: {Status(int(line.statuses[t])).name}")
+    if np.any(line.status != Status.SOLVED):
+        t = int(np.flatnonzero(line.status != Status.SOLVED)[0])
+        raise ValueError(f"tracking_gains: knot {t} of the plan is not solved: {Status(int(line.status[t])).name}")
     n = sim.ndx
     g = np.zeros((problem.horizon + 1, n + sim.nu))
     H = np.zeros((problem.horizon + 1, n + sim.nu, n + sim.nu))

@@ -77,7 +77,7 @@ class Rollouts:
         if len(x0s) > 1 and thetas.shape[1] == 0:
             batch = self.sim.rollout_batch(x0s, inputs)
             out[:] = batch.x
-            for row in np.flatnonzero(batch.statuses != Status.SOLVED)[:1]:
+            for row in np.flatnonzero(batch.status != Status.SOLVED)[:1]:
                 self._roll(x0s[row], inputs[row], thetas[row], f"row {row}: ")
         else:
             self._each(len(x0s), lambda i: np.copyto(out[i], self._roll(x0s[i], inputs[i], thetas[i], f"row {i}: ")))
@@ -142,6 +142,8 @@ class Rollouts:
     def _gradient(self, xs: Floats, us: Floats, theta: Floats, loss: Floats) -> tuple[Floats, Floats, Floats]:
         """Gradients by dx_0 (ndx,), the inputs (T, nu) and theta (n,) of one rollout; loss: (T + 1, ndx) that by dx."""
         names = self._space.wrt if self._space is not None and theta.size else ()
-        blocks = self._simulator(theta).vjp((xs, us), loss, wrt=("state", "input", *names), kappa=self._kappa)
+        blocks = self._simulator(theta).vjp(
+            (xs, us), loss, wrt=("state", "input", *names), kappa=self._kappa, throw=True
+        )
         by_theta = self._space.chain(theta, blocks) if self._space is not None and theta.size else theta
         return blocks["state"], blocks["input"], by_theta

@@ -82,8 +82,8 @@ class Gait:
         for _ in range(iterations):
             linear = sim.linearize_trajectory(x[:-1], tau)
             missing = x[1:, sim.nq :] - linear.x_next[:, sim.nq :]
-            if np.any(linear.statuses):
-                t = int(np.flatnonzero(linear.statuses)[0])
+            if np.any(linear.status):
+                t = int(np.flatnonzero(linear.status)[0])
                 raise ValueError(f"Gait.torques({self.name}): the reference cannot be followed at step {t}")
             tau += np.linalg.solve(linear.B[:, sim.nv :], missing[..., None])[..., 0]
         return tau

@@ -247,7 +247,10 @@ class Motions(NamedTuple):
     us: Cube  # (n, T, nu)
     reports: Cube  # (n, 1, 6) of the last step of each, zeros
     knots: Integers  # (n,) number of solved steps, zeros
-    nothing: Motion  # without rows: what is not kept
+    wrenches: Cube  # these without rows: they are not kept
+    contacts: Cube
+    A: Cube
+    B: Cube
 
 
 @kernel
@@ -255,11 +258,12 @@ def _roll_rows(model_at: Table, work_at: Table, settings: Vector, rows: tuple[in
     """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
     steps = motions.us.shape[1]
     for i in range(rows[0], rows[1]):
-        report, none = motions.reports[i], motions.nothing
+        report = motions.reports[i]
         if report[0, 0] == _SOLVED and motions.knots[i] < steps:
             if seconds() > settings[DEADLINE]:
                 return
-            one = Motion(motions.xs[i], motions.us[i], none.wrenches, report, none.contacts, none.A, none.B)
+            x, u = motions.xs[i], motions.us[i]
+            one = Motion(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
             motions.knots[i] = roll(model_at, work_at, settings, one, motions.knots[i])
             if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return

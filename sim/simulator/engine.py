@@ -274,8 +274,7 @@ class Engine:
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         xs[:, 0] = x0s
-        nothing = Motion(xs[0, :0], us[0, :0], self.no_wrenches, reports[0], self._no_contacts, *self.unknown[:2])
-        motions = rollout.Motions(xs, us, reports, knots, nothing)
+        motions = rollout.Motions(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
         model, works, settings = self.linked(link_step), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, 0]
         try:

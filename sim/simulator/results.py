@@ -51,25 +51,32 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Result:
-    """How a call ended. Subclasses have a `status`, of the first step that was not solved, and may have a `detail`."""
+    """How a call ended. `status` is one Status, or an array with that of each knot or rollout."""
 
-    status: Status
+    status: Any
     detail: str = ""  # the sentence about an unsolved step, with its numbers
 
     @property
     def success(self) -> bool:
         """Whether all steps reached their tolerance."""
-        return self.status == Status.SOLVED
+        return self._end() == Status.SOLVED
 
     @property
     def message(self) -> str:
-        """The status as a sentence."""
-        return self.detail or MESSAGES[self.status]
+        """The first status that is not SOLVED, or SOLVED, as a sentence."""
+        return self.detail or MESSAGES[self._end()]
 
     def check(self) -> None:
         """SimulationError unless all steps were solved."""
         if not self.success:
-            raise SimulationError(self.message, self.status)
+            raise SimulationError(self.message, self._end())
+
+    def _end(self) -> Status:
+        """The first status that is not SOLVED, or SOLVED."""
+        if isinstance(self.status, Status):
+            return self.status
+        unsolved = self.status[self.status != Status.SOLVED]
+        return Status(int(unsolved[0])) if len(unsolved) else Status.SOLVED
 
 
 Ended = TypeVar("Ended", bound=Result)
@@ -179,12 +186,6 @@ class Shot(Result):
         return cls(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
 
-def first_unsolved(statuses: Integers) -> Status:
-    """The first status that is not SOLVED, or SOLVED."""
-    unsolved = statuses[statuses != Status.SOLVED]
-    return Status(int(unsolved[0])) if len(unsolved) else Status.SOLVED
-
-
 @dataclass(frozen=True)
 class Jacobian(Result):
     """Derivatives of one step: `A, B = jacobian`, and jacobian["mass"] by a name of wrt=...
@@ -216,6 +217,9 @@ class Jacobian(Result):
     def __len__(self) -> int:
         return 2
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.blocks
+
     def __getitem__(self, name: str | int) -> Floats:
         self.check()
         return self.blocks[("state", "input")[name] if isinstance(name, int) else name]
@@ -224,6 +228,11 @@ class Jacobian(Result):
         """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them."""
         self.check()
         return self.blocks.keys()
+
+    def values(self) -> Iterable[Floats]:
+        """The blocks."""
+        self.check()
+        return self.blocks.values()
 
     def items(self) -> Iterable[tuple[str, Floats]]:
         """Names and blocks."""
@@ -238,18 +247,13 @@ class Linearization(Result):
     A: Floats  # (T, ndx, ndx)
     B: Floats  # (T, ndx, nu)
     x_next: Floats  # (T, nx)
-    statuses: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
+    status: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
     parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
     # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
     detail: str = ""
 
     __repr__ = brief_repr
-
-    @property
-    def status(self) -> Status:  # type: ignore[override]
-        """That of the first knot that was not solved."""
-        return first_unsolved(self.statuses)
 
 
 @dataclass(frozen=True)
@@ -278,16 +282,11 @@ class Batch(Result):
     """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state."""
 
     x: Floats  # (n, T + 1, nx)
-    statuses: Integers  # (n,) Status of each rollout
+    status: Integers  # (n,) Status of each rollout
     knot: Integers  # (n,) number of solved steps
     detail: str = ""
 
     __repr__ = brief_repr
-
-    @property
-    def status(self) -> Status:  # type: ignore[override]
-        """That of the first rollout that was not solved."""
-        return first_unsolved(self.statuses)
 
     @classmethod
     def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:

@@ -126,7 +126,7 @@ def test_torques_move_the_reference_as_it_moves(sim):
     gaps = sim.difference(linear.x_next, g.x[1:])[:, : sim.nv]
     idle = sim.linearize_trajectory(g.x, np.zeros_like(us))
     fallen = sim.difference(idle.x_next, g.x[1:])[:, : sim.nv]
-    assert np.all(linear.statuses == 0) and np.sqrt((gaps**2).mean()) < 0.25 * np.sqrt((fallen**2).mean())
+    assert np.all(linear.status == 0) and np.sqrt((gaps**2).mean()) < 0.25 * np.sqrt((fallen**2).mean())
 
 
 @pytest.mark.parametrize(

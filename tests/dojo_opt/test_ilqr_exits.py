@@ -105,7 +105,7 @@ class Broken(DoubleIntegrator):
     def linearize_trajectory(self, xs, us, substeps=1, kappa=None):
         lin = super().linearize_trajectory(xs, us, substeps, kappa)
         lin.A[self.knot] *= self.factor
-        lin.statuses[self.knot] = self.status
+        lin.status[self.knot] = self.status
         return lin
 
 

@@ -69,7 +69,7 @@ class Stepper:
         """Next states (-) the next state of x; NaN where a step fails."""
         batch = self._sim.rollout_batch(xs, us[:, None])
         ends = np.array([self._sim.difference(x, self._origin) for x in batch.x[:, 1]])
-        ends[batch.statuses != 0] = np.nan
+        ends[batch.status != 0] = np.nan
         return ends
 
     def jacobian(self, eps: float, *, centred: bool = True) -> Matrix:

@@ -92,7 +92,7 @@ def chained(motion: Motion, time_step: float, kappa: float) -> Derivative:
     def run() -> tuple[float, float]:
         xs = sim.rollout(x, us, throw=True).x
         linear = sim.linearize_trajectory(xs, us, kappa=kappa)
-        if np.any(linear.statuses):
+        if np.any(linear.status):
             raise RuntimeError(f"report gradients: {motion.name}: a step of {time_step:g} s cannot be differentiated")
         S = _start_slope(sim, motion)
         for A, B in zip(linear.A, linear.B, strict=True):

@@ -61,7 +61,7 @@ def ours(heights: Vector, kappa: float) -> Curve:
     xs = np.tile(np.r_[0.0, 0.0, RADIUS, 1.0, np.zeros(5), -SPEED, np.zeros(3)], (len(heights), 1))
     xs[:, 2] += heights
     linear = sim.linearize_trajectory(xs, np.zeros((len(xs), sim.nu)), kappa=kappa)
-    if np.any(linear.statuses):
+    if np.any(linear.status):
         raise RuntimeError(f"report gradients: touch-down at kappa {kappa:g} is not solved")
     return Curve(f"dojo-opt, kappa {kappa:g}", kappa, linear.x_next[:, 9], linear.A[:, 8, 2])
 
