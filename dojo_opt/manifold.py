@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import inverse_right_jacobian, quat_exp, quat_log, quat_mul
 
 Vector = NDArray[np.float64]

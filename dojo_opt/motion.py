@@ -10,8 +10,8 @@ import numpy as np
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import rotation_matrix
-from sim.model.model import Vector
 from sim.simulator.simulator import Simulator
+from solvers.types import Vector
 
 Array = Vector
 

@@ -7,15 +7,15 @@ from sim.dynamics.loops.closure import start_loops
 from sim.dynamics.loops.loop_work import loops_gained
 from sim.dynamics.momentum_balance import begin_step
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Guess, Options, Outcome
 from sim.model.slots import Slot
 from sim.solve.energy_balance import step_gained
 from sim.solve.loop_branch import solve_loops
 from sim.solve.solve_step import solve_step
-from solvers.jit import inlined
-from solvers.optional import optional
+from solvers.compiler import inlined, optional
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)

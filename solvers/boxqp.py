@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from solvers.compiler import inlined, kernel
 from solvers.dense import cholesky, cholesky_solve, dot
-from solvers.jit import inlined, kernel
 from solvers.status import Status
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from solvers.types import Integers, Matrix, Vector
 
 _SOLVED, _SINGULAR, _UNFINISHED = int(Status.SOLVED), int(Status.SINGULAR), int(Status.MAX_ITERATIONS)
 _MAX_ITERATIONS = 50

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from solvers.jit import kernel
-
-Vector = NDArray[np.float64]
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 _FAR = 1e30
 _LEAST = 1e-3  # a variable that fell below this share of what it was has left its cone

@@ -9,12 +9,9 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solvers.jit import kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.compiler import kernel
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from solvers.jit import kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.compiler import kernel
+from solvers.types import Matrix
 
 
 @kernel

@@ -9,14 +9,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from solvers.compiler import kernel
 from solvers.cones import onto_path
-from solvers.jit import kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
+from solvers.types import Matrix, Vector
 
 _SWEEPS, _SMALL = 20, 1e-2
 _STILL = 0.1  # of what ends the sweeps: a row that would move less stays, and moves no others

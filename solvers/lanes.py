@@ -21,7 +21,8 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Matrix, Vector
 
 __all__ = [
     "LANES",
@@ -44,8 +45,6 @@ __all__ = [
 
 LANES = 8
 SIDE = 3 * LANES  # columns of a panel at a time: while one product is under way, others begin
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Lanes = NDArray[np.float64]  # without compilation; (LANES,)
 Six = tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]  # rows of a wrench, or of a twist
 

@@ -8,14 +8,10 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import Lanes, load, put, six, store
+from solvers.types import Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Number = TypeVar("Number", float, Lanes)
 
 

@@ -16,15 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
-from solvers.clock import PAUSE, seconds
+from solvers.compiler import PAUSE, inlined, kernel, seconds
 from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
-from solvers.jit import inlined, kernel
 from solvers.status import Status
+from solvers.types import Integers, Matrix, Vector
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 _SOLVED, _NOT_FINITE = int(Status.SOLVED), int(Status.NOT_FINITE)
 _LOOK = 16  # knots between two looks at the clock

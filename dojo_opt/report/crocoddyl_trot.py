@@ -18,7 +18,8 @@ import numpy as np
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.feet import Feet
 from dojo_opt.problem import Problem
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
+from solvers.types import Matrix
 
 TOUCH = 1e-6  # [m] a foot this near to the ground at both ends of a knot stands in it
 BAUMGARTE = np.array([0.25, 1.0])  # of a standing foot: position per squared, velocity per knot time; none overshoots

@@ -23,7 +23,7 @@ from dojo_opt.options import Options
 from dojo_opt.problem import Problem
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.mujoco_warnings import quiet
-from sim.model.model import Matrix, Vector
+from solvers.types import Matrix, Vector
 
 FD_STEP = 1e-6  # one-sided
 STEP = 0.0125  # [s] longest time step: with 25 ms the trot diverges, with 10 and 5 ms iterations take longer

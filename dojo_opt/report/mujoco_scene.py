@@ -17,7 +17,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from sim.model.model import InputKind, Law, Model, Vector
+from sim.model.model import InputKind, Law, Model
+from solvers.types import Vector
 
 POINT_RADIUS = 1e-4  # [m] MuJoCo has no spheres of radius zero
 

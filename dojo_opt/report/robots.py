@@ -23,8 +23,8 @@ from dojo_opt.report.clock import interleave, ratio
 from dojo_opt.report.mujoco_warnings import quiet
 from dojo_opt.report.result import Report, Row
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import Vector
 from sim.simulator.simulator import Simulator
+from solvers.types import Vector
 
 STEPS, TIME_STEP = 1000, 0.01
 OVER_DOJO = 50.0  # bar: times faster than Dojo's figure

@@ -27,9 +27,9 @@ from dojo_opt.report.result import Report, Row
 from dojo_opt.report.robots import add_robots
 from dojo_opt.report.study import Progress
 from dojo_opt.rest import equilibrium
-from sim.model.model import Vector
 from sim.simulator.simulator import Simulator
-from solvers.parallel import threads
+from solvers.compiler import threads
+from solvers.types import Vector
 
 KNOTS = 50  # steps per call: long enough to hide the call, short enough to stay where the scene starts
 LINKS = (10, 20, 50, 100, 200)

@@ -19,8 +19,9 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 _INSIDE = 0.1  # least share of b^2 that b^2 - |beta|^2 has of a contact that sticks
 

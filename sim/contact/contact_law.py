@@ -21,11 +21,12 @@ from sim.contact.pyramid import (
 )
 from sim.contact.softening import soften
 from sim.model.data import Work
-from sim.model.model import Law, Model, Vector
+from sim.model.model import Law, Model
 from sim.model.options import LINEAR, SOFT, Goal
+from solvers.compiler import kernel
 from solvers.cones import onto_path, orthant_step, return_pair
-from solvers.jit import kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 _IMPACT = int(Law.IMPACT)
 _LINEAR = int(Law.LINEAR)

@@ -7,9 +7,10 @@ from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.optional import optional
+from solvers.compiler import optional
+from solvers.types import Matrix
 
 
 @optional(Slot.WORST_CONTACT, default=-1.0)

@@ -16,9 +16,10 @@ from __future__ import annotations
 
 from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import cross, rotate, transposed_times
+from solvers.types import Matrix
 
 
 @kernel

@@ -15,9 +15,10 @@ from __future__ import annotations
 
 from math import floor
 
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 
 @kernel

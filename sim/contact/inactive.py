@@ -36,7 +36,7 @@ from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Options
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import rotate
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from sim.dynamics.displacements import third_quaternion
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulses are evaluated again

@@ -17,7 +17,7 @@ from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.dynamics.displacements import third_quaternion
 from sim.model.data import Work
 from sim.model.model import Law, Model
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 from solvers.rotation import cross, rotate, transposed_times
 
 _LINEAR = int(Law.LINEAR)

@@ -10,7 +10,7 @@ from sim.contact.inactive_bounds import NEARER, bound_changes, keep_motion
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.optional import optional
+from solvers.compiler import optional
 from solvers.rotation import cross
 
 

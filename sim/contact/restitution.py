@@ -41,8 +41,7 @@ from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import AT_EVERY_POSE, AT_START
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, transposed_times
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none

@@ -19,9 +19,10 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.model.data import Work
-from sim.model.model import Law, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Law, Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 _LINEAR = int(Law.LINEAR)
 _PART = 3e-8

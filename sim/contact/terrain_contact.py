@@ -19,11 +19,11 @@ from math import sqrt
 
 from sim.contact.height_field import height_field
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, transposed_times
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -16,12 +16,12 @@ from sim.derivatives.loop_stiffness import loop_stiffness
 from sim.dynamics.loops.constraint_rows import is_loop
 from sim.dynamics.loops.gears import gear_derivatives
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.dense import dot
-from solvers.jit import kernel
-from solvers.optional import optional
 from solvers.rotation import Vec3, cross
+from solvers.types import Matrix, Vector
 
 
 @optional(Slot.ADD_COUPLING_COMPOSITES)

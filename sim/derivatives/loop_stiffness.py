@@ -5,9 +5,10 @@ from __future__ import annotations
 from sim.contact.pairs.wrench_columns import add_wrench_column, point_shift, unit_vector
 from sim.dynamics.loops.closure import child_point, loop_frame, relative_rotation
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate, times
+from solvers.types import Matrix
 
 
 @kernel

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from sim.dynamics.elimination import dot_six, numbers, times_row
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.lanes import LANES, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.rotation import cross
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -15,12 +15,12 @@ from sim.contact.pairs.pair_contact import pair_arm, pair_force
 from sim.contact.pairs.pair_stiffness import slip_rate
 from sim.derivatives.coupling_gradient import add_column
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.dense import dot
-from solvers.jit import kernel
-from solvers.optional import optional
 from solvers.rotation import Vec3, cross, join, transposed_times
+from solvers.types import Matrix, Vector
 
 
 @kernel

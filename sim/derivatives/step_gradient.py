@@ -19,13 +19,13 @@ from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling_panel
 from sim.dynamics.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
 from sim.model.data import Work
-from sim.model.model import InputKind, Matrix, Model, Vector
+from sim.model.model import InputKind, Model
 from sim.model.slots import Slot
 from sim.solve.inequalities import add_stiffness
-from solvers.jit import kernel
+from solvers.compiler import kernel, optional
 from solvers.lanes import LANES, load, spread, store
-from solvers.optional import optional
 from solvers.rotation import Vec3, left_jacobian, quat_exp, quat_matrix
+from solvers.types import Matrix, Vector
 
 _JOINT = int(InputKind.JOINT)
 

@@ -5,9 +5,9 @@ L_d = (2/h) s.J s psi(c)        of the rotation (c, s), c = cos(angle/2) > 0; se
 
 from __future__ import annotations
 
-from sim.model.model import Matrix
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import Mat3, Vec3, rotate
+from solvers.types import Matrix
 
 
 @kernel

@@ -5,9 +5,10 @@ from __future__ import annotations
 from sim.dynamics.displacements import third_quaternion
 from sim.dynamics.kinematics import axis_column, tree_poses
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_exp, quat_matrix, rotate, rows_of, times
+from solvers.types import Matrix, Vector
 
 _HANDED_ON = 16  # steps until poses are computed from coordinates
 

@@ -14,10 +14,10 @@ from sim.dynamics.joints.swing_coordinates import swing_component, swing_of
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate, transposed_times
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -11,9 +11,8 @@ from sim.dynamics.joints.rows import joint_rows
 from sim.dynamics.kinematics import velocity_columns
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import (
     Mat3,
     Vec3,
@@ -28,6 +27,7 @@ from solvers.rotation import (
     times,
     transposed_times,
 )
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -16,9 +16,10 @@ from typing import NamedTuple
 from sim.dynamics.joints.swing import swing_pose, swing_turn
 from sim.dynamics.kinematics import axis_column, displace
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import inlined, kernel
+from sim.model.model import Model
+from solvers.compiler import inlined, kernel
 from solvers.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
+from solvers.types import Matrix, Vector
 
 
 class Increment(NamedTuple):

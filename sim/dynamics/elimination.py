@@ -9,10 +9,11 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 from __future__ import annotations
 
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import inlined, kernel
+from sim.model.model import Model
+from solvers.compiler import inlined, kernel
 from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
 from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_lanes
+from solvers.types import Matrix, Vector
 
 Twist = tuple[float, float, float, float, float, float]
 

@@ -9,10 +9,9 @@ from __future__ import annotations
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
+from solvers.compiler import kernel, optional
 from solvers.lanes import LANES, dot_lanes, load, plus, plus_outer, put, six, store, zeros
 from solvers.lu import lu_solve_lanes
-from solvers.optional import optional
 
 
 @kernel

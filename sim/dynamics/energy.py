@@ -19,10 +19,10 @@ from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.momentum_balance import world_inertia
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import Vec3, cross, quat_exp, quat_mul
+from solvers.types import Matrix, Vector
 
 
 class Arrival(NamedTuple):

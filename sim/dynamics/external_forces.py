@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from sim.dynamics.elimination import add_children
 from sim.model.data import Work
-from sim.model.model import Cube, InputKind, Integers, Matrix, Model, Vector
+from sim.model.model import InputKind, Model
+from solvers.compiler import kernel
 from solvers.dense import copy, dot
-from solvers.jit import kernel
 from solvers.rotation import cross, rotate
+from solvers.types import Cube, Integers, Matrix, Vector
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)

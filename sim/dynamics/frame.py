@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sim.model.model import Matrix, Vector
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import rotate
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -10,9 +10,10 @@ from math import cos, sin
 
 from sim.dynamics.joints.swing import swing_pose
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -5,9 +5,10 @@ from __future__ import annotations
 from sim.dynamics.elimination import dot_six
 from sim.dynamics.energy import spatial_inertia
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.dense import clear
-from solvers.jit import kernel
+from solvers.types import Matrix, Vector
 
 
 @kernel

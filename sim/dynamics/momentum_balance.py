@@ -16,9 +16,10 @@ from sim.dynamics.carry_over import advance, follows_on
 from sim.dynamics.displacements import Increment, move_back, tree_moves
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Work
-from sim.model.model import InputKind, Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import InputKind, Model
+from solvers.compiler import kernel
 from solvers.rotation import Mat3, cross, rotate
+from solvers.types import Matrix, Vector
 
 _BODY = int(InputKind.BODY)
 _JOINT = int(InputKind.JOINT)

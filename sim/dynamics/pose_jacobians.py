@@ -10,10 +10,11 @@ from __future__ import annotations
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.momentum_balance import body_jacobian
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.lanes import load, store
 from solvers.rotation import cross, transposed_times
+from solvers.types import Matrix, Vector
 
 
 @kernel

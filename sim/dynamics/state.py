@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from sim.dynamics.kinematics import displace
 from sim.model.layout import model_view
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import quat_log, quat_mul
+from solvers.types import Matrix, Vector
 
 
 @kernel

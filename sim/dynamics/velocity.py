@@ -6,10 +6,10 @@ from sim.dynamics.energy import node_velocity
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import cross
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -19,13 +19,12 @@ from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.integrators.rollout import Linearized, linearize
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Cube, IntegerMatrix, Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.pace import DEADLINE
-from solvers.clock import seconds
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel, seconds
 from solvers.rotation import left_jacobian
 from solvers.status import Status
+from solvers.types import Cube, IntegerMatrix, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _TIME_STEP = int(Effect.TIME_STEP)

@@ -26,9 +26,10 @@ from sim.dynamics.mass import solve_mass
 from sim.dynamics.momentum_balance import world_inertia
 from sim.dynamics.velocity import joint_twists
 from sim.model.data import Work
-from sim.model.model import InputKind, Integers, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import InputKind, Model
+from solvers.compiler import kernel
 from solvers.rotation import cross, inverse_right_jacobian
+from solvers.types import Integers, Vector
 
 _JOINT = int(InputKind.JOINT)
 

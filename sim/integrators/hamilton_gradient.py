@@ -24,10 +24,11 @@ from sim.dynamics.external_forces import input_slopes, outer_slopes
 from sim.dynamics.joints.ball_spring import relative_to_rest
 from sim.integrators.hamilton import column_rate
 from sim.model.data import Work
-from sim.model.model import Integers, Matrix, Model, Vector
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 from solvers.rotation import cross
+from solvers.types import Integers, Matrix, Vector
 
 
 class Slopes(NamedTuple):

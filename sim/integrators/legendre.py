@@ -17,10 +17,10 @@ from sim.integrators.hamilton import momenta_of_velocity, place
 from sim.integrators.hamilton_gradient import Slopes, slopes_at
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Integers, Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import left_jacobian, quat_exp, quat_matrix
+from solvers.types import Integers, Matrix, Vector
 
 
 @kernel

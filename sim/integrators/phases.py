@@ -23,13 +23,13 @@ from sim.integrators.runge_kutta import Scheme, advance, begin
 from sim.mechanism.confined import IDLE
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Cube, Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
+from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.rotation import cross, quat_matrix, quat_turn
 from solvers.status import Status
+from solvers.types import Cube, Matrix, Vector
 
 NEAR = -1  # in place of a Status: something is near
 

@@ -13,14 +13,13 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import integrate_state, state_difference
 from sim.integrators.rollout import options_of
 from sim.model.layout import model_view, work_view
-from sim.model.model import Cube, Matrix, Vector
 from sim.model.options import Guess
 from sim.model.pace import is_due
 from sim.step import step
+from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector, dot
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.status import Status
+from solvers.types import Cube, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 

@@ -5,7 +5,7 @@
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
-Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
+Every function takes the tables of a Model and a Work (solvers/compiler); every loop stops at the first step that is
 not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py says how it goes on.
 """
 
@@ -19,16 +19,14 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Cube, Integers, Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.options import Guess, Options
 from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
-from solvers.clock import seconds
+from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
 from solvers.dense import clear, copy_vector
-from solvers.jit import kernel
-from solvers.parallel import parallel_kernel, prange
-from solvers.record import Table
 from solvers.status import Status
+from solvers.types import Cube, Integers, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)

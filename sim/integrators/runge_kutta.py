@@ -39,13 +39,13 @@ from sim.integrators.tangents import (
 )
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Integers, Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from sim.solve.energy_balance import LARGEST_GAIN
+from solvers.compiler import Table, kernel
 from solvers.dense import clear, copy_vector, dot
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.status import Status
+from solvers.types import Integers, Matrix, Vector
 
 _SOLVED = int(Status.SOLVED)
 _NOT_FINITE = int(Status.NOT_FINITE)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from sim.integrators.hamilton_gradient import Slopes, slopes_at, velocity_slopes
 from sim.model.data import Work
-from sim.model.model import Cube, Integers, Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import (
     cross,
     inverse_right_jacobian,
@@ -20,6 +20,7 @@ from solvers.rotation import (
     quat_matrix,
     so3_coefficients,
 )
+from solvers.types import Cube, Integers, Matrix, Vector
 
 
 class Tangents(NamedTuple):

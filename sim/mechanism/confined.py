@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from sim.mechanism.parts import Contact
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.model import Model
+from solvers.types import Integers
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 IDLE, SUNK = 1, 2
 _DEEP = 1e-8  # [m], the usual tolerance of a step

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.parts import Joint
-
-Integers = NDArray[np.int64]
+from solvers.types import Integers
 
 _RATE = "v "  # before the name of a degree of freedom: its velocity
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.model.model import IntegerMatrix, Integers, Matrix, Vector
+from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
 class Work(NamedTuple):

@@ -1,6 +1,6 @@
 """Model: what kernels read, as a NamedTuple of arrays; data.py has what they write.
 
-Compiled code takes each as one pointer (solvers/record.py); layout.py holds the shapes and allocates them.
+Compiled code takes each as one pointer (solvers/compiler); layout.py holds the shapes and allocates them.
 
 Glossary, one meaning each, everywhere in `sim`:
 
@@ -17,14 +17,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
-IntegerMatrix = NDArray[np.int64]
-Cube = NDArray[np.float64]  # (n, rows, columns)
+from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
 class Law(IntEnum):

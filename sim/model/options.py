@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from sim.model.model import Vector
 from solvers.status import Status
+from solvers.types import Vector
 
 
 class Options(NamedTuple):

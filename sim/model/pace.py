@@ -15,13 +15,12 @@ from collections.abc import Iterable, Iterator
 from time import perf_counter
 
 from sim.model.data import Work
-from sim.model.model import Vector
-from solvers.clock import PAUSE, seconds
-from solvers.jit import kernel
+from solvers.compiler import PAUSE, kernel, seconds
+from solvers.types import Vector
 
 __all__ = ["DEADLINE", "is_due", "pieces", "rows", "start_pace"]
 
-DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by solvers/clock.py
+DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by solvers/compiler
 _LOOK = 64.0  # work between two looks at the clock, which cost as much as a tenth of the smallest step
 _ROWS = 64  # of the first piece
 _ONE = (None,)

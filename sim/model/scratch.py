@@ -8,8 +8,8 @@ import threading
 import numpy as np
 
 from sim.model.layout import Sizes, allocate_work, table
-from sim.model.model import Vector
-from solvers.record import Table
+from solvers.compiler import Table
+from solvers.types import Vector
 
 _CORES = os.cpu_count() or 1
 _CHUNKS = 4  # per core: evens out items that take longer

@@ -24,15 +24,16 @@ from sim.integrators.policy import Path, Policy, closed_loop
 from sim.integrators.rollout import Motion
 from sim.model.data import Work
 from sim.model.layout import sizes_of, table, work_view
-from sim.model.model import Cube, Integers, Model, Vector
+from sim.model.model import Model
 from sim.model.pace import pieces, rows
 from sim.model.scratch import Scratch
 from sim.simulator.link import link_gradient, link_nodes, link_poses, link_step
 from sim.simulator.results import Interrupted, SimulationError
 from sim.simulator.settings import Settings
 from sim.solve import start_velocity
-from solvers.record import Table
+from solvers.compiler import Table
 from solvers.status import MESSAGES, Status
+from solvers.types import Cube, Integers, Vector
 
 Floats = NDArray[np.float64]
 

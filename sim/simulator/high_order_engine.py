@@ -14,13 +14,14 @@ from sim.integrators.rollout import Linearized, Motion
 from sim.integrators.tableau import stable, tableau
 from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import Cube, InputKind, Integers, Model, Vector
+from sim.model.model import InputKind, Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, follow, interrupted
 from sim.simulator.link import link_smooth
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.status import Status
+from solvers.types import Cube, Integers, Vector
 
 
 def free_roots(model: Model) -> Integers:

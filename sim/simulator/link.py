@@ -1,4 +1,4 @@
-"""The optional kernels that a mechanism uses (solvers/optional.py): linked before the first call that needs them.
+"""The optional kernels that a mechanism uses (solvers/compiler): linked before the first call that needs them.
 
 Addresses are those of this process, so they are no part of a mechanism that is copied into another.
 """
@@ -63,7 +63,7 @@ from sim.solve.interior_point import interior_point
 from sim.solve.loop_branch import solve_loops
 from sim.solve.newton import newton
 from sim.step import step
-from solvers.optional import link
+from solvers.compiler import link
 
 _LOOPS = (
     factor_coupling,

@@ -12,9 +12,9 @@ from sim.derivatives.parameters.selection import select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import Vector
 from sim.simulator.engine import Engine, Rolled
 from sim.simulator.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
+from solvers.types import Vector
 
 Floats = NDArray[np.float64]
 _VARIABLES = ("state", "input")

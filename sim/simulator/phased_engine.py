@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sim.integrators import legendre, phases, rollout
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.policy import Path, Policy
-from sim.model.model import Cube, Integers, Model, Vector
+from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.high_order_engine import HighOrderEngine
@@ -27,6 +27,7 @@ from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
 from solvers.status import Status
+from solvers.types import Cube, Integers, Vector
 
 _PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is far again are thrown away
 

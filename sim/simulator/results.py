@@ -18,9 +18,9 @@ from sim.integrators.policy import Path
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from solvers.status import MESSAGES, Status
+from solvers.types import Integers
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 STATUSES = tuple(Status)  # by number: twice as fast as Status(number)

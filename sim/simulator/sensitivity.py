@@ -12,11 +12,11 @@ from sim.derivatives.parameters.parameters import Plan
 from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import Vector
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Engine, Rolled
 from sim.simulator.link import link_heights, link_parameters
 from solvers.status import Status
+from solvers.types import Vector
 
 Floats = NDArray[np.float64]
 _TWISTS = 12  # rows of scratch for twists at three configurations

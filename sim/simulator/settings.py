@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD
-from sim.model.model import Vector
+from solvers.types import Vector
 
 __all__ = ["Settings", "default_kappa", "free_parts"]
 

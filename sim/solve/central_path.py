@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Guess, Options
 from sim.solve.inequalities import (
     keep_inequalities,
@@ -18,7 +18,8 @@ from sim.solve.merit import residuals
 from sim.solve.prediction import predict, predictable
 from sim.solve.step_length import largest_turn
 from sim.solve.trial_velocity import NOWHERE, place
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
+from solvers.types import Vector
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before

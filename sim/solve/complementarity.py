@@ -10,8 +10,8 @@ from sim.contact.contact_law import (
 )
 from sim.model.data import Work
 from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.cones import orthant_step
-from solvers.jit import kernel
 
 
 @kernel

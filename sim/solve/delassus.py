@@ -14,9 +14,10 @@ from __future__ import annotations
 from sim.contact.ground_contact import add_contact_wrench
 from sim.dynamics.elimination import dot_six
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.lu import lu_solve
+from solvers.types import Vector
 
 
 @kernel

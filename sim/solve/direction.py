@@ -5,12 +5,13 @@ from __future__ import annotations
 from sim.dynamics.elimination import factor, solve
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import LINEAR, PLAIN, Goal
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.matrix import free_matrix
-from solvers.jit import inlined
+from solvers.compiler import inlined
+from solvers.types import Vector
 
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite

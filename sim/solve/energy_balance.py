@@ -43,12 +43,13 @@ from sim.dynamics.loops.loop_work import loop_slack
 from sim.dynamics.mass import eliminate_mass
 from sim.dynamics.momentum_balance import world_inertia
 from sim.model.data import Work
-from sim.model.model import InputKind, Model, Vector
+from sim.model.model import InputKind, Model
 from sim.model.options import Options
 from sim.solve.residual import residual_scale
+from solvers.compiler import kernel
 from solvers.dense import clear
-from solvers.jit import kernel
 from solvers.rotation import cross, rotate
+from solvers.types import Vector
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)

@@ -45,11 +45,11 @@ from sim.dynamics.joints.limits import (
 from sim.dynamics.loops.closure import keep_loops, move_loops
 from sim.dynamics.pose_jacobians import add_slip_jacobian
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.options import SOFT, Goal
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
+from solvers.types import Matrix
 
 _KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
 _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it

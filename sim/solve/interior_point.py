@@ -30,7 +30,7 @@ from sim.contact.pairs.inactive_pairs import begin_pairs
 from sim.contact.pairs.pair_energy import pairs_gained
 from sim.contact.restitution import find_impacts, impacts_gained
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import (
     ASTRAY,
     AT_EVERY_POSE,
@@ -52,9 +52,9 @@ from sim.solve.energy_balance import step_gained
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.solve.step_length import search
-from solvers.jit import inlined, kernel
-from solvers.optional import optional
+from solvers.compiler import inlined, kernel, optional
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)

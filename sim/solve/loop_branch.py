@@ -15,13 +15,13 @@ from sim.dynamics.loops.branch_motion import (
     stay_regular,
 )
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Guess, Options, Outcome
 from sim.model.slots import Slot
 from sim.solve.solve_step import solve_step
-from solvers.jit import inlined
-from solvers.optional import optional
+from solvers.compiler import inlined, optional
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _LEADS = 2  # times that directions of loops are found anew

@@ -7,8 +7,9 @@ from sim.dynamics.joints.terms import joint_blocks
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.momentum_balance import momentum_balance_jacobian
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 
 @kernel

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 from sim.dynamics.loops.closure import apply_loops
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 _NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps
 

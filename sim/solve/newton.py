@@ -8,14 +8,14 @@ from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.dynamics.momentum_balance import momentum_balance
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import FAILED, Guess, Options, Outcome
 from sim.model.slots import Slot
 from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
-from solvers.jit import inlined, kernel
-from solvers.optional import optional
+from solvers.compiler import inlined, kernel, optional
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)

@@ -14,7 +14,7 @@ from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
 from sim.model.data import Work
-from sim.model.model import Law, Model, Vector
+from sim.model.model import Law, Model
 from sim.model.options import Options
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
@@ -22,9 +22,10 @@ from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.residual import residual_scale
 from sim.solve.trial_velocity import NOWHERE, place
+from solvers.compiler import kernel
 from solvers.gauss_seidel import gauss_seidel
-from solvers.jit import kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 _LINEAR = int(Law.LINEAR)
 _NONLINEAR = int(Law.NONLINEAR)

@@ -6,9 +6,10 @@ from sim.dynamics.elimination import project, subtree_sums
 from sim.dynamics.joints.terms import joint_impulses
 from sim.dynamics.loops.gears import apply_gears
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import cross
+from solvers.types import Vector
 
 
 @kernel

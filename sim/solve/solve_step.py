@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Guess, Options, Outcome
 from sim.solve.interior_point import interior_point
 from sim.solve.newton import newton
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 
 @kernel

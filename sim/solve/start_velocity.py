@@ -9,11 +9,11 @@ from sim.dynamics.momentum_balance import momentum_balance_jacobian, turns_below
 from sim.dynamics.velocity import joint_twists
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.solve.residual import rounding
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _MAX_ITERATIONS = int(Status.MAX_ITERATIONS)

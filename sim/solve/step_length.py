@@ -5,11 +5,12 @@ from __future__ import annotations
 from sim.dynamics.displacements import turn_bodies
 from sim.dynamics.momentum_balance import momentum_balance
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Options
 from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, return_inequalities
 from sim.solve.merit import Merit, judge, residuals
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
+from solvers.types import Vector
 
 _WHOLE = 0.9  # a step to the boundary below this share of the Newton step is taken whole
 _TURN = 0.7  # [rad] a body may turn per iteration: gaps are linear in less

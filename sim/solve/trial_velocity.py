@@ -6,9 +6,10 @@ from sim.contact.pairs.active_features import choose_pairs
 from sim.dynamics.displacements import turn_bodies
 from sim.dynamics.momentum_balance import momentum_balance
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.solve.inequalities import inequality_kinematics
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 NOWHERE = (1e300, 1e300)  # residuals where nothing could be placed
 

@@ -14,9 +14,8 @@ from sim.dynamics.kinematics import tree_poses
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.model.layout import allocate_work, model_view, sizes_of, table, work_view
-from sim.model.model import Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
+from solvers.types import Vector
 
 # nbody, nq, nv, ncontact, nlimit, nu
 SIZES = {

@@ -8,7 +8,7 @@ from sim.dynamics.elimination import solve
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.model.layout import model_view, work_view
 from sim.model.slots import Slot
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 
 @local_kernel

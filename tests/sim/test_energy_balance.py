@@ -10,7 +10,7 @@ import dojo_opt as dojo
 from sim.model.layout import model_view, work_view
 from sim.simulator.link import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 
 @local_kernel

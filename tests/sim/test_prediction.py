@@ -9,7 +9,7 @@ from sim.dynamics.elimination import solve, subtree_sums
 from sim.model.layout import model_view, work_view
 from sim.simulator.link import link_step
 from sim.solve.delassus import delassus
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 FEET = 4
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from dojo_opt.report.engines.drake import write
 from dojo_opt.report.engines.drake_scene import load, scalar_joints
 from dojo_opt.report.gradients.differences import Reference, extrapolated
-from sim.model.model import InputKind, Model, Vector
+from sim.model.model import InputKind, Model
+from solvers.types import Vector
 
 Matrix = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from sim.contact.collision.box import column, to_b
 from sim.contact.collision.rim import line_minimum
 from sim.contact.collision.rim_rim import opposite, point_of, rim_minimum
 from sim.contact.collision.witness import along, dot
-from sim.model.model import Matrix, Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Matrix, Vector
 
 _APART = 1e-9  # [m] between points that say a direction
 

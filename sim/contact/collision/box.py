@@ -14,9 +14,9 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 
 @inner_kernel

@@ -19,9 +19,9 @@ from sim.contact.collision.edge_axes import (
     side,
 )
 from sim.contact.collision.witness import TIE
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 
 @inner_kernel

@@ -36,9 +36,9 @@ from sim.contact.collision.box_elements import (
 from sim.contact.collision.clip import BORDER, PAST, clip, edge_normal, on_edges, side_edge
 from sim.contact.collision.edge_axes import Arrangement, deepest, side_of
 from sim.contact.collision.witness import TIE, absent, axis, dot
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 
 @inner_kernel

@@ -15,9 +15,9 @@ from __future__ import annotations
 from sim.contact.collision.box import column, corner, to_a, to_b, vertex_on_box, vertex_under_box
 from sim.contact.collision.clip import common_normal, edge_normal, side_edge
 from sim.contact.collision.witness import FACE, NOWHERE, along, axis, edges, vertex_a, vertex_b
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 VERTEX_FACE, CROSSING, CORNER_FACE, EDGES, VERTEX_BOX, BOX_VERTEX = 1, 2, 3, 4, 5, 6
 Facing = tuple[int, float, int, float]  # i, top, j, bottom: face `top` e_i of b, face `bottom` e_j of a

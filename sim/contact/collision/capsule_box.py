@@ -43,9 +43,9 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 # kinds of elements, beside the CROSSING of the segment and a side of the face
 END_FACE, EDGES, END_BOX, SEGMENT_CORNER = 1, 3, 5, 6

@@ -11,7 +11,7 @@ lines cross at a small angle, the normal that they share turns fast.
 from __future__ import annotations
 
 from sim.contact.collision.witness import along, axis, dot
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
 
 BORDER = 1e-4  # a vertex this far outside of a face still belongs to it (relative)

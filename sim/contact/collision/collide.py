@@ -14,9 +14,9 @@ from sim.contact.collision.halfspace import box_halfspace, capsule_halfspace, cy
 from sim.contact.collision.segment import choose_points, put_points
 from sim.contact.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.contact.collision.witness import ABSENT, absent
-from sim.model.model import Matrix, Vector
 from sim.model.shape_kinds import SWAPPED, Pair
-from solvers.jit import inner_kernel, kernel
+from solvers.compiler import inner_kernel, kernel
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -22,9 +22,9 @@ from sim.contact.collision.rim import (
 )
 from sim.contact.collision.rim_rim import point_of, rim_minimum, rim_rim
 from sim.contact.collision.witness import Z, along, dot, edges
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 _CROSSING = 1e-2  # sine of the angle from which on two lines cross
 AXES, AXIS_RIM, RIM_AXIS, RIMS, POINT = 1, 2, 3, 4, 5

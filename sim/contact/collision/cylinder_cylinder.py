@@ -30,10 +30,10 @@ from sim.contact.collision.rim import (
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
-from sim.model.model import Integers, Vector
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Integers, Vector
 
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
 

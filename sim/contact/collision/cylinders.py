@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from sim.contact.collision import cylinder_cylinder, polytope_cylinder
 from sim.contact.collision.exchange import exchange
-from sim.model.model import Integers, Matrix, Vector
 from sim.model.shape_kinds import SWAPPED, Pair
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Integers, Matrix, Vector
 
 
 @kernel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.contact.collision.witness import TIE
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 
 # what `separation` of a pair returns: face, edge or -1, separation, side of the axis of the face (1, -1), of the edge

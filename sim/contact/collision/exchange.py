@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from sim.contact.collision.box import column, to_a
 from sim.contact.collision.witness import axis, dot
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 
 @inner_kernel

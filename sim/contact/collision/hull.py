@@ -12,9 +12,9 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.collision.witness import NOWHERE, TIE, dot
-from sim.model.model import Matrix
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Matrix
 
 _NONE = -1
 

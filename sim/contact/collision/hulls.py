@@ -32,9 +32,9 @@ from sim.contact.collision.witness import (
     vertex_a,
     vertex_b,
 )
-from sim.model.model import Matrix, Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Matrix, Vector
 
 _MANY = 4096
 _CROSSING = 1e-2  # sine of the angle from which on two edges cross

@@ -29,10 +29,10 @@ from sim.contact.collision.rim import (
     rim_below,
 )
 from sim.contact.collision.witness import TIE, absent, dot
-from sim.model.model import Integers, Matrix, Vector
 from sim.model.shape_kinds import CROSSINGS, RIM_POINTS
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Integers, Matrix, Vector
 
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 

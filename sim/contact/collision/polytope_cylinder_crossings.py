@@ -21,9 +21,9 @@ from sim.contact.collision.rim import (
     sector_of,
 )
 from sim.contact.collision.witness import Z, along, dot, edges, vertex_b
-from sim.model.model import Integers, Matrix, Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Integers, Matrix, Vector
 
 LEANING = 0.05  # part of a unit normal by which it may lie outside of the cone of its elements
 PASSING = 1e-6  # parts of the length by which closest points may be past the ends of edges and sides

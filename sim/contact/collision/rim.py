@@ -11,9 +11,9 @@ from math import cos, pi, sin, sqrt
 
 from sim.contact.collision.box import to_a
 from sim.contact.collision.witness import along, axis, dot, put
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 SECTORS = 256  # angles on a rim from which the closest points are looked for
 SAMPLES = 16

@@ -11,9 +11,9 @@ from math import cos, pi, sin, sqrt
 from sim.contact.collision.rim import NOTHING, SAMPLES, Frame, across, combined, put_column
 from sim.contact.collision.witness import Z as UP
 from sim.contact.collision.witness import along, axis, direction, dot, put
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 _STEPS = 30
 _CONVERGED = 1e-15  # [rad]

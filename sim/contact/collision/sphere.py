@@ -5,8 +5,8 @@ from __future__ import annotations
 from sim.contact.collision.box import vertex_on_box
 from sim.contact.collision.cylinder import nearest, vertex_on_cylinder
 from sim.contact.collision.witness import LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
+from solvers.types import Vector
 
 
 @inner_kernel

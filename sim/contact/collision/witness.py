@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
 TIE = 1e-9  # a point this far beyond the end of an element still belongs to it (relative)

@@ -39,8 +39,7 @@ from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import ASTRAY, AT_EVERY_POSE, BESIDE_KEPT, OVERLAPPING, PLACED
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less

@@ -16,8 +16,7 @@ from sim.model.model import Model
 from sim.model.options import BESIDE_KEPT
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.model.slots import Slot
-from solvers.jit import inner_kernel
-from solvers.optional import optional
+from solvers.compiler import inner_kernel, optional
 
 
 @inner_kernel

@@ -32,8 +32,7 @@ from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Options
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 
 COUPLED = 1e-2  # largest sum of e over the far collisions of a body
 

@@ -21,12 +21,12 @@ from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.options import AT_EVERY_POSE
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, transposed_times
+from solvers.types import Matrix
 
 POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
 _TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole

@@ -22,12 +22,12 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Options
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 _SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
 _LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (active_features.py)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 
 @kernel

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from sim.dynamics.frame import place_frame
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED
-from solvers.jit import kernel
+from solvers.compiler import kernel
+from solvers.types import Matrix
 
 
 @kernel

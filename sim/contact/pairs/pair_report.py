@@ -5,9 +5,10 @@ from __future__ import annotations
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.pair_contact import is_absent
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.optional import optional
+from solvers.compiler import optional
+from solvers.types import Matrix
 
 
 @optional(Slot.REPORT_PAIRS)

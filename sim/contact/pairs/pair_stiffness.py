@@ -15,12 +15,12 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.options import Goal
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
+from solvers.types import Matrix, Vector
 
 
 @kernel

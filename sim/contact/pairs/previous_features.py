@@ -12,10 +12,11 @@ from sim.contact.collision.kept import elsewhere
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
-from solvers.jit import inner_kernel, kernel
+from solvers.compiler import inner_kernel, kernel
 from solvers.rotation import Vec3
+from solvers.types import Matrix, Vector
 
 NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses
 

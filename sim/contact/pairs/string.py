@@ -18,8 +18,7 @@ from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate
 
 _STRING = int(Pair.STRING)

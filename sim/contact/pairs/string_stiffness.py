@@ -7,9 +7,10 @@ from sim.contact.pairs.pair_contact import pair_force
 from sim.contact.pairs.string import end_before, string_arm, string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, point_shift
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.optional import optional
+from solvers.compiler import optional
+from solvers.types import Matrix
 
 
 @optional(Slot.ADD_STRING_STIFFNESS)

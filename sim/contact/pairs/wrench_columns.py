@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sim.model.data import Work
-from sim.model.model import Matrix, Vector
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross
+from solvers.types import Matrix, Vector
 
 
 @kernel

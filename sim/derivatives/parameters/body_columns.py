@@ -12,9 +12,10 @@ from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.directions import At
 from sim.dynamics.joints.ball_spring import spring_turns
 from sim.model.data import Work
-from sim.model.model import InputKind, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import InputKind, Model
+from solvers.compiler import kernel
 from solvers.rotation import Quat, Vec3, cross, left_jacobian, rotate
+from solvers.types import Vector
 
 _WORLD = int(InputKind.WORLD)
 _JOINT = int(InputKind.JOINT)

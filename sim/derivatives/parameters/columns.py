@@ -34,8 +34,9 @@ from sim.derivatives.parameters.surface import add_surface_radius
 from sim.dynamics.displacements import other_quaternions
 from sim.dynamics.elimination_panel import column_count
 from sim.model.data import Work
-from sim.model.model import IntegerMatrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import IntegerMatrix, Vector
 
 _MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
 _PARENT_POINT, _AXIS = int(Effect.PARENT_POINT), int(Effect.AXIS)

@@ -13,9 +13,10 @@ from sim.contact.pairs.wrench_columns import unit_vector
 from sim.contact.terrain_contact import centre
 from sim.derivatives.parameters.body_columns import add_wrench, moment
 from sim.model.data import Work
-from sim.model.model import Law, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Law, Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
+from solvers.types import Vector
 
 _NONLINEAR, _LINEAR = int(Law.NONLINEAR), int(Law.LINEAR)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from sim.model.model import Matrix, Vector
+from solvers.types import Matrix, Vector
 
 
 class Effect(IntEnum):

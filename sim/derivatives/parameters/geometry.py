@@ -17,9 +17,10 @@ from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
+from solvers.types import Matrix, Vector
 
 _PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)
 _ORIENTATION = int(Effect.ORIENTATION)

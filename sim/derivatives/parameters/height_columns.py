@@ -23,12 +23,11 @@ from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
-from solvers.record import Table
+from solvers.compiler import Table, kernel, optional
 from solvers.rotation import Vec3
+from solvers.types import Matrix, Vector
 
 
 @kernel

@@ -12,7 +12,7 @@ from sim.dynamics.loops.closure import child_point, loop_frame
 from sim.dynamics.loops.gears import gear_row
 from sim.model.data import Work
 from sim.model.model import Model
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import cross, rotate, times
 
 _LOOP_PARENT, _LOOP_CHILD = int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)

@@ -10,9 +10,10 @@ from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_near, turning
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.data import Work
-from sim.model.model import Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
+from solvers.types import Vector
 
 
 @kernel

@@ -17,10 +17,10 @@ from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import IntegerMatrix, Matrix, Model, Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
 from solvers.rotation import left_jacobian
+from solvers.types import IntegerMatrix, Matrix, Vector
 
 _TIME_STEP = int(Effect.TIME_STEP)
 

@@ -28,7 +28,7 @@ from sim.derivatives.parameters.tree_parameters import (
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import IntegerMatrix, Vector
+from solvers.types import IntegerMatrix, Vector
 
 __all__ = ["KINDS", "Parameter", "Parameters", "Plan", "all_parameters"]
 

@@ -16,10 +16,11 @@ from sim.derivatives.parameters.directions import SIDE, Size
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import Vec3
+from solvers.types import Vector
 
 _BALL, _ROD, _SIDE_X, _SIDE_Z = int(Size.BALL), int(Size.ROD), int(Size.SIDE_X), int(Size.SIDE_Z)
 _RIM, _LENGTH, _SCALE, _STRING = int(Size.RIM), int(Size.LENGTH), int(Size.SCALE), int(Size.STRING)

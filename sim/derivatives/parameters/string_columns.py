@@ -9,7 +9,7 @@ from sim.derivatives.parameters.contact_columns import add_pair, impulse_change
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.optional import optional
+from solvers.compiler import optional
 from solvers.rotation import Vec3
 
 

@@ -11,10 +11,10 @@ from sim.contact.height_field import field_values, height_field
 from sim.contact.terrain_contact import centre, frame_turn
 from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_near
 from sim.model.data import Work
-from sim.model.model import Matrix, Model
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
+from solvers.types import Matrix
 
 
 @kernel

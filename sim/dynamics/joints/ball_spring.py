@@ -6,11 +6,11 @@ With s the vector part of the rotation from rest, V_d = (h/2) k |(s(2) + s(3))/2
 from __future__ import annotations
 
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Mat3, Quat, cross, left_jacobian, quat_exp, quat_matrix, quat_mul
+from solvers.types import Vector
 
 
 @kernel

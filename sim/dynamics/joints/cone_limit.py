@@ -19,8 +19,7 @@ from math import cos, sin
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
 
 

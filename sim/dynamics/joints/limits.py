@@ -14,9 +14,8 @@ from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Goal
 from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, return_pair
-from solvers.jit import kernel
-from solvers.optional import optional
 
 
 @kernel

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from sim.dynamics.coordinates import joint_frame, translation_axis
-from sim.model.model import Matrix, Model
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.rotation import (
     Quat,
     Vec3,
@@ -16,6 +16,7 @@ from solvers.rotation import (
     rotate,
     times,
 )
+from solvers.types import Matrix
 
 
 @kernel

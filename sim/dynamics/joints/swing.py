@@ -15,10 +15,9 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import (
     Quat,
     Vec3,
@@ -30,6 +29,7 @@ from solvers.rotation import (
     so3_coefficients,
     transposed_times,
 )
+from solvers.types import Vector
 
 _STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _SMALL = 0.1  # below this square of the half angle, its series are exact to rounding

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi, sqrt
 
 from sim.model.model import Model
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.rotation import Quat, Vec3, quat_log
 
 

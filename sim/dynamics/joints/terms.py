@@ -11,8 +11,9 @@ from __future__ import annotations
 from sim.dynamics.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
 from sim.dynamics.joints.swing import swing_curvature
 from sim.model.data import Work
-from sim.model.model import InputKind, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import InputKind, Model
+from solvers.compiler import kernel
+from solvers.types import Vector
 
 _JOINT = int(InputKind.JOINT)
 

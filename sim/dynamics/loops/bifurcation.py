@@ -15,8 +15,9 @@ from sim.dynamics.displacements import Increment, tree_moves, turn_bodies
 from sim.dynamics.loops.closure import loop_rows
 from sim.dynamics.loops.constraint_rows import add_along_path
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
-from solvers.jit import kernel
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import Matrix, Vector
 
 _MEETING = 0.02  # |w| / |dw|
 _ROUNDING = 1e-10  # share of the largest w

@@ -20,11 +20,11 @@ from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops, start_loops
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.status import Status
+from solvers.types import Vector
 
 _SOLVED = int(Status.SOLVED)
 _CLOSER = 0.5  # share of a least pivot

@@ -17,11 +17,11 @@ from __future__ import annotations
 from sim.dynamics.frame import place_frame
 from sim.dynamics.loops.constraint_rows import is_loop
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, join, rotate, times
+from solvers.types import Matrix, Vector
 
 
 @kernel

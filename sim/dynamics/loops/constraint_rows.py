@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from sim.dynamics.loops.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
+from solvers.types import Matrix, Vector
 
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
 

@@ -22,11 +22,11 @@ from __future__ import annotations
 from sim.dynamics.elimination import solve
 from sim.dynamics.loops.constraint_rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.full_lu import full_lu_factor, full_lu_solve
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.types import Matrix, Vector
 
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
 

@@ -8,10 +8,10 @@ They come after the rows of pairs and loops. Their directions are constant, so t
 from __future__ import annotations
 
 from sim.model.data import Work
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
+from solvers.types import Matrix, Vector
 
 
 @kernel

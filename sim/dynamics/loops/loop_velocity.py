@@ -11,10 +11,10 @@ from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops
 from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
+from solvers.types import Vector
 
 _WEAK = 1e-3  # a pivot of G M^-1 G^T above this is that of a configuration where no branches meet
 

@@ -6,12 +6,12 @@ from sim.dynamics.energy import momentum_velocity
 from sim.dynamics.loops.closure import loop_rows
 from sim.dynamics.loops.constraint_rows import is_loop
 from sim.model.data import Work
-from sim.model.model import Model, Vector
+from sim.model.model import Model
 from sim.model.options import Options
 from sim.model.slots import Slot
-from solvers.jit import kernel
-from solvers.optional import optional
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
+from solvers.types import Vector
 
 _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
 

@@ -7,7 +7,7 @@ one, is compiled once instead of once in each.
 
 The types of its arguments and of its result are read from the annotations, because a caller is compiled before it:
 
-    int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/record.py), NamedTuples
+    int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/compiler), NamedTuples
 
     @optional(Slot.FACTOR_COUPLING, default=True)  # Slot: an IntEnum of the package that uses them
     def factor_coupling(model: Model, work: Work) -> bool: ...
@@ -33,8 +33,8 @@ from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from solvers.jit import entry
-from solvers.record import RECORDS, load_word
+from solvers.compiler.kernels import entry
+from solvers.compiler.records import RECORDS, load_word
 
 __all__ = ["OptionalKernel", "link", "optional"]
 
