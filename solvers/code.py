@@ -71,12 +71,16 @@ class InnerLibrary(JITCodeLibrary):
 
 
 class EntryLibrary(JITCodeLibrary):
-    """Code of an entry, with all that it calls."""
+    """Code of an entry, with all that it calls.
+
+    Its copies of kernels are private, not internal. LLVM drops arguments of either, but its JIT linker knows internal
+    functions by name too, and takes one for the copy of the same kernel in any function that Numba itself compiles.
+    """
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
-                function.linkage = "internal"
+                function.linkage = "private"
         super()._optimize_final_module()
 
     def _get_module_for_linking(self) -> Any:
