@@ -206,7 +206,7 @@ def _models(args: argparse.Namespace) -> int:
 
 
 def _warmup(args: argparse.Namespace) -> int:
-    from solvers.jit import cache_folder, compiled_signatures
+    from solvers.compiler import cache_folder, compiled_signatures
 
     wall, cpu = time.perf_counter(), time.process_time()
     plan = dojo.ilqr(dojo.problems.hop())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.rotation import inverse_right_jacobian, quat_exp, quat_log, quat_mul
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

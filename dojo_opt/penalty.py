@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.manifold import add_rotation_block
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

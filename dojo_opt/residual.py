@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dojo_opt.captured import fingerprint
 from dojo_opt.manifold import displace
 from sim.pace import rows
-from solvers.jit import CompilationError, users_kernel, users_loop
+from solvers.compiler import CompilationError, users_kernel, users_loop
 
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]

@@ -7,7 +7,7 @@ from sim.model import Matrix, Model, Vector
 from sim.moves import third_quaternion
 from sim.rotation import Vec3, cross, quat_exp, quat_matrix, rotate, rows_of, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _HANDED_ON = 16  # steps until poses are computed from coordinates
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from sim.model import Matrix
 from sim.rotation import Mat3, Vec3, rotate
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from sim import late
 from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Law, Model
-from solvers.late import LateKernel
+from solvers.compiler.late import LateKernel
 
 _LOOPS = (
     late.factor_coupling,

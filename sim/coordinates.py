@@ -16,8 +16,7 @@ from sim.model import Matrix, Model, Vector
 from sim.moves import move_back
 from sim.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate, transposed_times
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 @kernel

@@ -26,8 +26,7 @@ from sim.rotation import (
     transposed_times,
 )
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 @kernel

@@ -18,7 +18,7 @@ from sim.model import InputKind, Matrix, Model, Vector
 from sim.moves import Increment, move_back, tree_moves
 from sim.rotation import Mat3, cross, rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _BODY = int(InputKind.BODY)
 _JOINT = int(InputKind.JOINT)

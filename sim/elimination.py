@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
 from solvers.lu import lu_factor, lu_sign, lu_solve, lu_solve_lanes
 

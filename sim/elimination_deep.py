@@ -9,7 +9,7 @@ from __future__ import annotations
 from sim import late
 from sim.model import Model
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import LANES, dot_lanes, load, plus, plus_outer, put, six, store, zeros
 from solvers.lu import lu_solve_lanes
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from sim.late import solve_deep_panel
 from sim.model import Model
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import LANES, SIDE, Lanes, dot_lanes, keep, load, six, spread, store
 from solvers.lu import lu_solve_lanes
 

@@ -21,8 +21,7 @@ from sim.layout import model_view, work_view
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, quat_exp, quat_mul
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 class Arrival(NamedTuple):

@@ -46,8 +46,8 @@ from sim.options import Options
 from sim.rotation import cross, rotate
 from sim.solve.residual import residual_scale
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import clear
-from solvers.jit import kernel
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.model import Matrix, Vector
 from sim.rotation import rotate
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -28,7 +28,7 @@ from sim.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composit
 from sim.residual_gradient import residual_derivatives
 from sim.rotation import Vec3, left_jacobian, quat_exp, quat_matrix
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import LANES, load, spread, store
 
 _JOINT = int(InputKind.JOINT)

@@ -12,7 +12,7 @@ from sim.late import swing_pose
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -6,7 +6,7 @@ when a call of one is compiled.
 
 from __future__ import annotations
 
-from solvers.late import LateTable
+from solvers.compiler.late import LateTable
 
 _late = LateTable()
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sim import late
 from sim.model import Model
 from sim.work import Work
+from solvers.compiler import Field, record, table
 from solvers.lanes import LANES, SIDE, whole
-from solvers.record import Field, record, table
 
 __all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
            "allocate_work", "model_view", "sizes_of", "table", "work_view"]  # fmt: skip

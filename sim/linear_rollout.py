@@ -8,8 +8,7 @@ from sim.model import Vector
 from sim.options import Guess
 from sim.pace import is_due
 from sim.rollout import ACCURACY, Linearized, options_of
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

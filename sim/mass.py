@@ -6,8 +6,8 @@ from sim.elimination import dot_six
 from sim.energy import spatial_inertia
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import clear
-from solvers.jit import kernel
 
 
 @kernel

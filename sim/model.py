@@ -1,6 +1,6 @@
 """Model: what kernels read, as a NamedTuple of arrays; work.py has what they write.
 
-Compiled code takes each as one pointer (solvers/record.py); layout.py holds the shapes and allocates them.
+Compiled code takes each as one pointer (solvers/compiler); layout.py holds the shapes and allocates them.
 
 Glossary, one meaning each, everywhere in `sim`:
 

@@ -18,7 +18,7 @@ from sim.late import swing_pose, swing_turn
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 
 
 class Increment(NamedTuple):

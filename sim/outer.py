@@ -6,8 +6,8 @@ from sim.elimination import add_children
 from sim.model import InputKind, Integers, Matrix, Model, Vector
 from sim.rotation import cross, rotate
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 
 _JOINT = int(InputKind.JOINT)
 _BODY = int(InputKind.BODY)

@@ -16,12 +16,11 @@ from time import perf_counter
 
 from sim.model import Vector
 from sim.work import Work
-from solvers.clock import PAUSE, seconds
-from solvers.jit import kernel
+from solvers.compiler import PAUSE, kernel, seconds
 
 __all__ = ["DEADLINE", "is_due", "pieces", "rows", "start_pace"]
 
-DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by solvers/clock.py
+DEADLINE = 4  # where the settings of a kernel have the moment to go back to Python [s], by its clock
 _LOOK = 64.0  # work between two looks at the clock, which cost as much as a tenth of the smallest step
 _ROWS = 64  # of the first piece
 _ONE = (None,)

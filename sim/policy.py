@@ -16,9 +16,8 @@ from sim.options import Guess
 from sim.pace import is_due
 from sim.rollout import Cube, options_of
 from sim.state import integrate_state, state_difference
+from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector, dot
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

@@ -12,7 +12,7 @@ from sim.dynamics import body_jacobian
 from sim.model import Matrix, Model, Vector
 from sim.rotation import cross, transposed_times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import load, store
 
 

@@ -6,7 +6,7 @@ from sim.elimination import dot_six, numbers, times_row
 from sim.model import Matrix, Model, Vector
 from sim.rotation import cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import LANES, Lanes, dot_lanes, keep, load, six, spread, store
 
 

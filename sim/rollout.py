@@ -5,7 +5,7 @@
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
-Every function takes the tables of a Model and a Work (solvers/record.py); every loop stops at the first step that is
+Every function takes the tables of a Model and a Work (solvers/compiler); every loop stops at the first step that is
 not SOLVED, and after the first one that ends behind the deadline: sim/pace.py says how it goes on.
 """
 
@@ -19,11 +19,8 @@ from sim.model import Integers, Matrix, Vector
 from sim.options import Guess, Options
 from sim.pace import DEADLINE, is_due, start_pace
 from sim.work import Work
-from solvers.clock import seconds
+from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
 from solvers.dense import copy_vector
-from solvers.jit import kernel
-from solvers.parallel import parallel_kernel, prange
-from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 
 from sim.model import Matrix, Vector
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]

@@ -9,7 +9,7 @@ import numpy as np
 
 from sim.layout import Sizes, allocate_work, table
 from sim.model import Vector
-from solvers.record import Table
+from solvers.compiler import Table
 
 _CORES = os.cpu_count() or 1
 _CHUNKS = 4  # per core: evens out items that take longer

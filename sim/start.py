@@ -11,8 +11,7 @@ from sim.model import Model, Vector
 from sim.solve.residual import rounding
 from sim.velocity import joint_twists
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

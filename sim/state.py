@@ -6,8 +6,7 @@ from sim.kinematics import displace
 from sim.layout import model_view
 from sim.model import Matrix, Model, Vector
 from sim.rotation import quat_log, quat_mul
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 @kernel

@@ -15,7 +15,7 @@ from sim.pace import rows
 from sim.results import SimulationError
 from sim.scratch import Scratch
 from sim.settings import Settings
-from solvers.record import Table
+from solvers.compiler import Table
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]

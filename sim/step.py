@@ -20,7 +20,7 @@ from sim.late import (
 from sim.model import Model, Vector
 from sim.options import Guess, Options, Outcome
 from sim.work import Work
-from solvers.jit import inlined
+from solvers.compiler import inlined
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiler import inlined, kernel
 from solvers.dense import cholesky, cholesky_solve, dot
-from solvers.jit import inlined, kernel
 from solvers.status import Status
 
 Vector = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 Vector = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

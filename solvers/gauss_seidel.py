@@ -12,8 +12,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiler import kernel
 from solvers.cones import onto_path
-from solvers.jit import kernel
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

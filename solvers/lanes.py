@@ -21,7 +21,7 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 __all__ = [
     "LANES",

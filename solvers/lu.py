@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lanes import Lanes, load, put, six, store
 
 Vector = NDArray[np.float64]

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.boxqp import box_qp
-from solvers.clock import PAUSE, seconds
+from solvers.compiler import PAUSE, inlined, kernel, seconds
 from solvers.dense import add_mul_tn, axpy, cholesky_solve, dot
-from solvers.jit import inlined, kernel
 from solvers.status import Status
 
 Vector = NDArray[np.float64]

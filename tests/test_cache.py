@@ -28,7 +28,7 @@ def copy(tmp_path: Path) -> Path:
 
 
 def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
-    program = "from solvers.jit import cache_folder; print(cache_folder().name)"
+    program = "from solvers.compiler import cache_folder; print(cache_folder().name)"
 
     def digest() -> str:
         return python(program, home=copy, NUMBA_CACHE_DIR=str(copy / "cache"))
@@ -48,10 +48,10 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
 
 def test_an_edited_callee_reaches_its_caller(copy: Path) -> None:
     callee, caller = copy / "solvers" / "callee.py", copy / "solvers" / "caller.py"
-    body = "from solvers.jit import kernel\n\n@kernel\ndef one(x):\n    return x + {}\n"
+    body = "from solvers.compiler import kernel\n\n@kernel\ndef one(x):\n    return x + {}\n"
     callee.write_text(body.format("1.0"))
     caller.write_text(
-        "from solvers.callee import one\nfrom solvers.jit import kernel\n\n"
+        "from solvers.callee import one\nfrom solvers.compiler import kernel\n\n"
         "@kernel\ndef two(x):\n    return 2.0 * one(x)\n"
     )
     program = "from solvers.caller import two; print(two(0.0))"
@@ -63,7 +63,7 @@ def test_an_edited_callee_reaches_its_caller(copy: Path) -> None:
 
 def test_the_cache_can_be_switched_off(tmp_path: Path) -> None:
     program = (
-        "from solvers import jit, cones, status; print(jit.cache_folder())\n"
+        "from solvers import compiler, cones, status; print(compiler.cache_folder())\n"
         "kernel = jit.kernel(lambda x: x + 1.0); print(kernel(1.0))"
     )
     out = python(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_CACHE="0").split()
@@ -74,7 +74,7 @@ def test_the_cache_can_be_switched_off(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
-    program = "from solvers import jit; print(jit.cache_folder())"
+    program = "from solvers import compiler; print(compiler.cache_folder())"
     assert python(program, NUMBA_CACHE_DIR=str(blocked / "cache")).strip() == "None"
 
 
@@ -97,7 +97,7 @@ class Filled:
 
     def __init__(self, home: Path) -> None:
         self.home, self.base = home, home / "cache"
-        text = "from solvers.jit import kernel\n\n@kernel\ndef {}(x):\n    return x + {}\n\n"
+        text = "from solvers.compiler import kernel\n\n@kernel\ndef {}(x):\n    return x + {}\n\n"
         (home / "own.py").write_text(text.format("one", "1.0") + text.format("two", "2.0"))
         assert self.run() == ["2.0", "0"]
         self.digest = next((self.base / "dojo_opt").iterdir())
@@ -250,7 +250,7 @@ def test_a_link_to_the_folder_is_followed(filled: Filled) -> None:
 @pytest.mark.parametrize("given", ["", "here", "./here"])
 def test_no_folder_depends_on_where_a_process_starts(tmp_path: Path, given: str) -> None:
     home = tmp_path / "home"
-    program = "from solvers.jit import cache_folder; print(cache_folder())"
+    program = "from solvers.compiler import cache_folder; print(cache_folder())"
     folder = python(program, cwd=tmp_path, NUMBA_CACHE_DIR="", XDG_CACHE_HOME=given, HOME=str(home)).strip()
     assert folder.startswith(str(home / ".cache" / "dojo_opt"))
     assert python(program, cwd=tmp_path, NUMBA_CACHE_DIR="", XDG_CACHE_HOME=given, HOME="here").strip() == "None"
@@ -292,7 +292,7 @@ def test_two_processes_may_write_at_once(filled: Filled) -> None:
 def test_a_pendulum_compiles_no_contact_code() -> None:
     program = """
 import json, numpy as np, dojo_opt as dojo
-from solvers.jit import compiled_signatures
+from solvers.compiler import compiled_signatures
 sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
 x = sim.neutral()
 x[0] += 0.5
@@ -360,7 +360,7 @@ NOUNS = (  # what users write and mechanisms ask their parts for
 def test_what_few_scenes_have_is_neither_compiled_nor_imported(program: str, foreign: tuple[str, ...]) -> None:
     text = f"""
 import json, sys, numpy as np, dojo_opt as dojo
-from solvers.jit import compiled_signatures
+from solvers.compiler import compiled_signatures
 {program}
 print(json.dumps([list(compiled_signatures()), list(sys.modules)]))
 """
@@ -375,7 +375,7 @@ print(json.dumps([list(compiled_signatures()), list(sys.modules)]))
 def test_kernels_have_one_signature_each() -> None:
     program = """
 import json, numpy as np, dojo_opt as dojo
-from solvers.jit import compiled_signatures
+from solvers.compiler import compiled_signatures
 dojo.ilqr(dojo.problems.hop())
 sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
 sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))

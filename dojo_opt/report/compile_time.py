@@ -27,7 +27,7 @@ first = time.perf_counter() - wall, time.process_time() - cpu
 wall, cpu = time.perf_counter(), time.process_time()
 again = dojo.ilqr(dojo.problems.hop())
 second = time.perf_counter() - wall, time.process_time() - cpu
-from solvers.jit import compiled_signatures
+from solvers.compiler import compiled_signatures
 kernels = compiled_signatures()
 print(json.dumps({"import": imported, "first": first, "again": second, "success": bool(plan.success),
                   "kernels": len(kernels), "signatures": sum(kernels.values()),

@@ -32,7 +32,7 @@ from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.contacts.left_out import reach
 from sim.mechanism import Mechanism
-from solvers.parallel import threads
+from solvers.compiler import threads
 
 ABSENT = 1.05  # of the time of a model that never had the feature: what two runs of the same model differ by
 SHARE = 0.03  # of a near contact

@@ -34,7 +34,7 @@ path = sim.rollout(scene.state, us)
 sim.closed_loop(scene.state, us)
 sim.linearize_trajectory(path.x, us)
 seconds = time.process_time() - start
-from solvers.jit import compiled_signatures
+from solvers.compiler import compiled_signatures
 print(json.dumps({"seconds": seconds, "success": path.success, "kernels": sorted(compiled_signatures()),
                   "modules": [name for name in sys.argv[2:] if name in sys.modules]}))
 """

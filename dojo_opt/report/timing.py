@@ -29,7 +29,7 @@ from dojo_opt.report.study import Progress
 from dojo_opt.rest import equilibrium
 from sim.model import Vector
 from sim.simulator import Simulator
-from solvers.parallel import threads
+from solvers.compiler import threads
 
 KNOTS = 50  # steps per call: long enough to hide the call, short enough to stay where the scene starts
 LINKS = (10, 20, 50, 100, 200)

@@ -18,7 +18,7 @@ from sim.collision.rim_rim import opposite, point_of, rim_minimum
 from sim.collision.witness import along, dot
 from sim.model import Matrix, Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _APART = 1e-9  # [m] between points that say a direction
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.collision.witness import TIE
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 # what `separation` of a pair returns: face, edge or -1, separation, side of the axis of the face (1, -1), of the edge
 Arrangement = tuple[int, int, float, float, float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.collision.witness import FACE, LINE, NOWHERE, TIE, axis, bend_line, bend_point, direction, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

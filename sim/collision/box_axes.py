@@ -12,7 +12,7 @@ from sim.collision.axes import OPEN, PARALLEL, SWINGS, Arrangement, edge_must_ex
 from sim.collision.witness import TIE
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

@@ -38,7 +38,7 @@ from sim.collision.clip import BORDER, PAST, clip, edge_normal, on_edges, side_e
 from sim.collision.witness import TIE, absent, axis, dot
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

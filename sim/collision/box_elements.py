@@ -17,7 +17,7 @@ from sim.collision.clip import common_normal, edge_normal, side_edge
 from sim.collision.witness import FACE, NOWHERE, along, axis, edges, vertex_a, vertex_b
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 VERTEX_FACE, CROSSING, CORNER_FACE, EDGES, VERTEX_BOX, BOX_VERTEX = 1, 2, 3, 4, 5, 6
 Facing = tuple[int, float, int, float]  # i, top, j, bottom: face `top` e_i of b, face `bottom` e_j of a

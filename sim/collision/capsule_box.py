@@ -45,7 +45,7 @@ from sim.collision.witness import (
 )
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 # kinds of elements, beside the CROSSING of the segment and a side of the face
 END_FACE, EDGES, END_BOX, SEGMENT_CORNER = 1, 3, 5, 6

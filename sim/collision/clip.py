@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from sim.collision.witness import along, axis, dot
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 BORDER = 1e-4  # a vertex this far outside of a face still belongs to it (relative)
 _ALONG = 1e-2  # sine of the angle below which an edge is parallel to a side

@@ -16,7 +16,7 @@ from sim.collision.segment import choose_points, put_points
 from sim.collision.sphere import sphere_box, sphere_capsule, sphere_cylinder, sphere_sphere, string
 from sim.collision.witness import ABSENT, absent
 from sim.model import Matrix, Vector
-from solvers.jit import inner_kernel, kernel
+from solvers.compiler import inner_kernel, kernel
 
 
 @kernel

@@ -7,7 +7,7 @@ from math import sqrt
 from sim.collision.witness import FACE, LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 # elements of a cylinder; those on the side of -z are one more than those on +z
 TOP, BOTTOM, SIDE, RIM_TOP, RIM_BOTTOM = 1, 2, 3, 4, 5

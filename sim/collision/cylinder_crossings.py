@@ -24,7 +24,7 @@ from sim.collision.rim_rim import point_of, rim_minimum, rim_rim
 from sim.collision.witness import Z, along, dot, edges
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _CROSSING = 1e-2  # sine of the angle from which on two lines cross
 AXES, AXIS_RIM, RIM_AXIS, RIMS, POINT = 1, 2, 3, 4, 5

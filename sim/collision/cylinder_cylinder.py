@@ -33,7 +33,7 @@ from sim.collision.rim import (
 from sim.collision.witness import TIE, absent, dot
 from sim.model import Integers, Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _PARTS = 17  # places where two cylinders may cross: 1 of the axes, 2 on every rim, 2 of every two rims
 

@@ -10,7 +10,7 @@ from sim.collision import cylinder_cylinder, polytope_cylinder
 from sim.collision.exchange import exchange
 from sim.collision.kinds import SWAPPED, Pair
 from sim.model import Integers, Matrix, Vector
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -6,7 +6,7 @@ from sim.collision.box import column, to_a
 from sim.collision.witness import axis, dot
 from sim.model import Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

@@ -8,7 +8,7 @@ from sim.collision.box import corner, to_b
 from sim.collision.witness import FACE, NOWHERE, Z, absent, along, axis, moment, put, put_rows, vertex_a
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _LEVEL = 1e-4  # sine of the tilt below which the lowest point of a rim leaves the rim for its centre
 _STEEP = 0.5  # cosine of the tilt beyond which the fixed points of the rims are left out

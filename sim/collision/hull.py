@@ -14,7 +14,7 @@ from math import sqrt
 from sim.collision.witness import NOWHERE, TIE, dot
 from sim.model import Matrix
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _NONE = -1
 

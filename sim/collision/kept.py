@@ -5,7 +5,7 @@ The number of a point that has taken over others says which: KEPT + feature 2^24
 
 from __future__ import annotations
 
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 KEPT = 1 << 40
 _CODES = 1 << 24

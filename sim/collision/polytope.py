@@ -34,7 +34,7 @@ from sim.collision.witness import (
 )
 from sim.model import Matrix, Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _MANY = 4096
 _CROSSING = 1e-2  # sine of the angle from which on two edges cross

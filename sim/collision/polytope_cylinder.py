@@ -32,7 +32,7 @@ from sim.collision.rim import (
 from sim.collision.witness import TIE, absent, dot
 from sim.model import Integers, Matrix, Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 

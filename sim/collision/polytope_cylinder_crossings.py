@@ -23,7 +23,7 @@ from sim.collision.rim import (
 from sim.collision.witness import Z, along, dot, edges, vertex_b
 from sim.model import Integers, Matrix, Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 LEANING = 0.05  # part of a unit normal by which it may lie outside of the cone of its elements
 PASSING = 1e-6  # parts of the length by which closest points may be past the ends of edges and sides

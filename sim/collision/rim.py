@@ -13,7 +13,7 @@ from sim.collision.box import to_a
 from sim.collision.witness import along, axis, dot, put
 from sim.model import Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 SECTORS = 256  # angles on a rim from which the closest points are looked for
 SAMPLES = 16

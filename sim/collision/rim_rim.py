@@ -13,7 +13,7 @@ from sim.collision.witness import Z as UP
 from sim.collision.witness import along, axis, direction, dot, put
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 _STEPS = 30
 _CONVERGED = 1e-15  # [rad]

@@ -29,7 +29,7 @@ from sim.collision.witness import (
 )
 from sim.model import Vector
 from sim.rotation import Vec3
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 Vec2 = tuple[float, float]
 

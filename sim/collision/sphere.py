@@ -6,7 +6,7 @@ from sim.collision.box import vertex_on_box
 from sim.collision.cylinder import nearest, vertex_on_cylinder
 from sim.collision.witness import LINE, NOWHERE, TIE, Z, bend_line, bend_point, direction, vertex_a
 from sim.model import Vector
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

@@ -17,7 +17,7 @@ from math import sqrt
 
 from sim.model import Vector
 from sim.rotation import Vec3, cross
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 ABSENT = 1e9  # distance of a contact point that does not exist in this configuration [m]
 TIE = 1e-9  # a point this far beyond the end of an element still belongs to it (relative)

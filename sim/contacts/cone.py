@@ -20,7 +20,7 @@ from math import sqrt
 
 from sim.model import Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _INSIDE = 0.1  # least share of b^2 that b^2 - |beta|^2 has of a contact that sticks
 

@@ -18,7 +18,7 @@ from sim.late import place_on_terrain, turn_on_terrain
 from sim.model import Matrix, Model
 from sim.rotation import cross, rotate, transposed_times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

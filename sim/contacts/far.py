@@ -36,7 +36,7 @@ from sim.model import Model
 from sim.options import Options
 from sim.rotation import rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.model import Model, Vector
 from sim.moves import third_quaternion
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 ANGLE = 2.25  # an angle up to pi is at most so many times the distance of its quaternions
 NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulses are evaluated again

@@ -18,7 +18,7 @@ from sim.model import Law, Model
 from sim.moves import third_quaternion
 from sim.rotation import cross, rotate, transposed_times
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 
 _LINEAR = int(Law.LINEAR)
 

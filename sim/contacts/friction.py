@@ -25,8 +25,8 @@ from sim.late import (
 from sim.model import Law, Model
 from sim.options import LINEAR, SOFT, Goal
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.cones import onto_path, orthant_step, return_pair
-from solvers.jit import kernel
 
 _IMPACT = int(Law.IMPACT)
 _LINEAR = int(Law.LINEAR)

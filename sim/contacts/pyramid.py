@@ -12,8 +12,8 @@ from sim import late
 from sim.model import Model
 from sim.options import Goal
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.cones import orthant_step, return_pair
-from solvers.jit import kernel
 
 
 @kernel

@@ -9,7 +9,7 @@ from sim.contacts.friction import contact_error, contact_impulse, slip_violation
 from sim.late import report_pairs
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @late.worst_contact.defined(otherwise=-1.0)

@@ -43,7 +43,7 @@ from sim.options import AT_EVERY_POSE, AT_START
 from sim.pairs.contact import gap_normal, is_absent, pair_arm, pair_force
 from sim.rotation import Vec3, cross, transposed_times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _NOISE = 1e-6  # of the work of all impulses: what counts as none
 _FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are

@@ -18,8 +18,8 @@ from sim.pairs.contact import pair_arm, pair_force
 from sim.pairs.stiffness import slip_rate
 from sim.rotation import Vec3, cross, join, transposed_times
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 
 
 @kernel

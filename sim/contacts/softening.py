@@ -21,7 +21,7 @@ from math import sqrt
 from sim.model import Law, Model, Vector
 from sim.rotation import Vec3, cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _LINEAR = int(Law.LINEAR)
 _PART = 3e-8

@@ -10,7 +10,7 @@ from __future__ import annotations
 from sim import late
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

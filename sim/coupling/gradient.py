@@ -18,8 +18,8 @@ from sim.pairs.contact import is_absent, pair_force
 from sim.pairs.stiffness import add_earlier_slip, centre_shift
 from sim.rotation import Vec3, cross
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 
 
 @late.add_coupling_composites.defined()

@@ -16,7 +16,7 @@ from sim.coupling.rows import add_along_path
 from sim.model import Matrix, Model, Vector
 from sim.moves import Increment, tree_moves, turn_bodies
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _MEETING = 0.02  # |w| / |dw|
 _ROUNDING = 1e-10  # share of the largest w

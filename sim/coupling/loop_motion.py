@@ -22,7 +22,7 @@ from sim.energy import factor_mass_matrix
 from sim.late import close_velocity, start_loops
 from sim.model import Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

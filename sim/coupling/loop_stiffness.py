@@ -7,7 +7,7 @@ from sim.model import Matrix, Model
 from sim.pairs.stiffness import add_wrench_column, point_shift, unit_vector
 from sim.rotation import Vec3, cross, rotate, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -14,7 +14,7 @@ from sim.coupling.system import body_twists
 from sim.late import factor_coupling, solve_coupling
 from sim.model import Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _WEAK = 1e-3  # a pivot of G M^-1 G^T above this is that of a configuration where no branches meet
 

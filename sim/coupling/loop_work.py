@@ -10,7 +10,7 @@ from sim.model import Model, Vector
 from sim.options import Options
 from sim.rotation import Vec3, cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _SHARE = 0.03  # of the kinetic energies before and after: forces of loops that give more in a step belong to no motion
 

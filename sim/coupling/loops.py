@@ -20,7 +20,7 @@ from sim.frame import place_frame
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, join, rotate, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from sim.coupling.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 
 _ROUNDING = 1e-14  # stiffness below this share of the largest is rounding
 

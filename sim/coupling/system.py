@@ -24,8 +24,8 @@ from sim.coupling.rows import add_columns, enlist, is_loop, response_size, row_r
 from sim.elimination import solve
 from sim.model import Matrix, Model, Vector
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.full_lu import full_lu_factor, full_lu_solve
-from solvers.jit import kernel
 
 _DEPENDENT = 1e-10  # a pivot below this belongs to a loop constraint that depends on others
 

@@ -28,7 +28,7 @@ from sim.outer import outer_wrenches
 from sim.rotation import cross, inverse_right_jacobian
 from sim.velocity import joint_twists
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _JOINT = int(InputKind.JOINT)
 

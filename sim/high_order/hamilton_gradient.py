@@ -26,8 +26,8 @@ from sim.model import Integers, Matrix, Model, Vector
 from sim.outer import input_slopes, outer_slopes
 from sim.rotation import cross
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.dense import dot
-from solvers.jit import kernel
 
 
 class Slopes(NamedTuple):

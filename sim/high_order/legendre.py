@@ -19,8 +19,7 @@ from sim.pose_jacobians import add_skew, columns_to_origin, pose2_to_origin, row
 from sim.residual_gradient import residual_derivatives
 from sim.rotation import left_jacobian, quat_exp, quat_matrix
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 @kernel

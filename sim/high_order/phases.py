@@ -26,9 +26,8 @@ from sim.pace import is_due, start_pace
 from sim.rollout import Cube
 from sim.rotation import cross, quat_matrix, quat_turn
 from sim.work import Work
+from solvers.compiler import Table, kernel
 from solvers.dense import copy, copy_vector
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.status import Status
 
 NEAR = -1  # in place of a Status: something is near

@@ -34,9 +34,8 @@ from sim.policy import Path, Policy
 from sim.rollout import Linearized
 from sim.state import integrate_state, state_difference
 from sim.work import Work
+from solvers.compiler import Table, kernel
 from solvers.dense import copy_vector, dot
-from solvers.jit import kernel
-from solvers.record import Table
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

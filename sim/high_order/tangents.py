@@ -20,7 +20,7 @@ from sim.rotation import (
     so3_coefficients,
 )
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 class Tangents(NamedTuple):

@@ -20,7 +20,7 @@ from sim import late
 from sim.model import Model
 from sim.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -14,8 +14,8 @@ from sim.late import cone_block, cone_derivative, cone_gap
 from sim.model import Model
 from sim.options import Goal
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.cones import onto_path, return_pair
-from solvers.jit import kernel
 
 
 @kernel

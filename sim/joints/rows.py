@@ -15,7 +15,7 @@ from sim.rotation import (
     rotate,
     times,
 )
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -28,7 +28,7 @@ from sim.rotation import (
     transposed_times,
 )
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _STILL = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _SMALL = 0.1  # below this square of the half angle, its series are exact to rounding

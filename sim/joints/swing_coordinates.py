@@ -6,7 +6,7 @@ from math import pi, sqrt
 
 from sim.model import Model
 from sim.rotation import Quat, Vec3, quat_log
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

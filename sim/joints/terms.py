@@ -11,7 +11,7 @@ from __future__ import annotations
 from sim.late import add_ball_spring_derivatives, add_spring_block, spring_impulse, swing_curvature
 from sim.model import InputKind, Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _JOINT = int(InputKind.JOINT)
 

@@ -40,7 +40,7 @@ from sim.pairs.memory import (
 )
 from sim.pairs.pose import place_shapes
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _OVERLAP = 1e-4  # part of the smallest size by which shapes may overlap at the end of a step
 _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and where other attempts found no less

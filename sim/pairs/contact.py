@@ -25,7 +25,7 @@ from sim.pairs.cylinders import on_cylinder
 from sim.pairs.pose import place_shapes
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
 _TO_POLE = 1.0 / (1.0 + POLE[2])  # x turned the shortest way from z to the pole

@@ -16,7 +16,7 @@ from sim.model import Model
 from sim.options import BESIDE_KEPT
 from sim.pairs.memory import keep, last_point, left_behind
 from sim.work import Work
-from solvers.jit import inner_kernel
+from solvers.compiler import inner_kernel
 
 
 @inner_kernel

@@ -32,7 +32,7 @@ from sim.pairs.choice import choose_shapes, open_pairs
 from sim.pairs.contact import add_pair_wrench, is_absent, point_kinematics
 from sim.pairs.pose import place_shapes
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 COUPLED = 1e-2  # largest sum of e over the far collisions of a body
 

@@ -12,7 +12,7 @@ from sim.model import Model, Vector
 from sim.pairs.contact import POLE, gap_normal, point_velocity, shape_b
 from sim.rotation import Vec3, cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -15,7 +15,7 @@ from sim.collision.witness import dot
 from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3
 from sim.work import Work
-from solvers.jit import inner_kernel, kernel
+from solvers.compiler import inner_kernel, kernel
 
 NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses
 

@@ -6,7 +6,7 @@ from sim.collision.kinds import SWAPPED
 from sim.frame import place_frame
 from sim.model import Matrix, Model
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -17,7 +17,7 @@ from sim.pairs.far import add_far_pairs
 from sim.pairs.jacobian import pair_jacobian
 from sim.rotation import Vec3, cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

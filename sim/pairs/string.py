@@ -22,7 +22,7 @@ from sim.pairs.contact import pair_force
 from sim.pairs.stiffness import add_wrench_column, point_shift
 from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _STRING = int(Pair.STRING)
 _TAUT = 1e-3  # of the length: less slack than this

@@ -26,7 +26,7 @@ from sim.pairs.contact import is_absent, pair_arm, pair_force
 from sim.pairs.memory import least_size, overlap_before, rounding_of_rims
 from sim.rotation import Vec3, cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
 _LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (choice.py)

@@ -21,9 +21,7 @@ from sim.parameters.effects import At, Effect
 from sim.rollout import Cube, Linearized, linearize
 from sim.rotation import left_jacobian
 from sim.work import Work
-from solvers.clock import seconds
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel, seconds
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

@@ -14,7 +14,7 @@ from sim.pairs.stiffness import unit_vector
 from sim.parameters.effects import At
 from sim.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _WORLD = int(InputKind.WORLD)
 _JOINT = int(InputKind.JOINT)

@@ -35,7 +35,7 @@ from sim.parameters.loops import add_gear_offset, add_gear_ratio, add_loop_geome
 from sim.parameters.pairs import add_pairs_mass, add_shapes_shift
 from sim.parameters.sizes import add_shapes_size
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
 _PARENT_POINT, _AXIS = int(Effect.PARENT_POINT), int(Effect.AXIS)

@@ -15,7 +15,7 @@ from sim.parameters.bodies import add_wrench, moment
 from sim.rotation import Vec3, cross, rotate
 from sim.terrain.contact import centre
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _NONLINEAR, _LINEAR = int(Law.NONLINEAR), int(Law.LINEAR)
 

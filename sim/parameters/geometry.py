@@ -19,7 +19,7 @@ from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import At, Effect
 from sim.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)
 _ORIENTATION = int(Effect.ORIENTATION)

@@ -19,8 +19,7 @@ from sim.parameters.columns import fill_columns
 from sim.parameters.effects import At, Effect
 from sim.rotation import left_jacobian
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 _TIME_STEP = int(Effect.TIME_STEP)
 

@@ -13,7 +13,7 @@ from sim.parameters.bodies import add_wrench
 from sim.parameters.effects import Effect
 from sim.rotation import cross, rotate, times
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _LOOP_PARENT, _LOOP_CHILD = int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
 

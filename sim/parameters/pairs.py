@@ -11,7 +11,7 @@ from sim.pairs.stiffness import unit_vector
 from sim.parameters.contacts import add_pair, floor_change, impulse_change, is_near, turning
 from sim.rotation import Vec3, cross, rotate
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -18,7 +18,7 @@ from sim.parameters.effects import SIDE, Size
 from sim.parameters.pairs import add_moved_shape, is_felt, pair_floor, row
 from sim.rotation import Vec3
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _BALL, _ROD, _SIDE_X, _SIDE_Z = int(Size.BALL), int(Size.ROD), int(Size.SIDE_X), int(Size.SIDE_Z)
 _RIM, _LENGTH, _SCALE, _STRING = int(Size.RIM), int(Size.LENGTH), int(Size.SCALE), int(Size.STRING)

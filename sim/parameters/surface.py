@@ -13,7 +13,7 @@ from sim.parameters.contacts import add_impulse, add_turn, floor_change, impulse
 from sim.terrain.contact import centre, frame_turn
 from sim.terrain.height_field import field_values, height_field
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -26,8 +26,7 @@ from sim.rotation import Vec3
 from sim.terrain.contact import centre
 from sim.terrain.height_field import cell, height_field, weight
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 
 @kernel

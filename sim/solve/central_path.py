@@ -18,7 +18,7 @@ from sim.solve.merit import residuals
 from sim.solve.placing import NOWHERE, place
 from sim.solve.prediction import predict, predictable
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 
 _AT_REST = 0.1  # the residual at kappa, over that of the usual start, of a motion that may start at kappa
 _RESUMED = 3e-4  # [N s m] least kappa of a start near the impulses of the step before

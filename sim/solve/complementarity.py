@@ -10,8 +10,8 @@ from sim.contacts.friction import (
 )
 from sim.model import Model
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.cones import orthant_step
-from solvers.jit import kernel
 
 
 @kernel

@@ -15,7 +15,7 @@ from sim.contacts.contact import add_contact_wrench
 from sim.elimination import dot_six
 from sim.model import Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 from solvers.lu import lu_solve
 
 

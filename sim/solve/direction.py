@@ -10,7 +10,7 @@ from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.matrix import free_matrix
 from sim.work import Work
-from solvers.jit import inlined
+from solvers.compiler import inlined
 
 _SHORT = 0.1  # a step below this share of the Newton step is short
 _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite

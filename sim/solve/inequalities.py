@@ -51,7 +51,7 @@ from sim.model import Matrix, Model
 from sim.options import SOFT, Goal
 from sim.pose_jacobians import add_slip_jacobian
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _KAPPA_START = 1e-2  # [N s m]; from 1e-3 landings on jammed legs fail at kappa below 1e-7
 _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit where no solution depends on it

@@ -49,7 +49,7 @@ from sim.solve.line_search import search
 from sim.solve.merit import Merit, follow, is_near, judge, residuals
 from sim.solve.residual import absorb_residual, residual_scale, rounding
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

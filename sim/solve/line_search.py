@@ -9,7 +9,7 @@ from sim.options import Options
 from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, return_inequalities
 from sim.solve.merit import Merit, judge, residuals
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 
 _WHOLE = 0.9  # a step to the boundary below this share of the Newton step is taken whole
 _TURN = 0.7  # [rad] a body may turn per iteration: gaps are linear in less

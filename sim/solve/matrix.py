@@ -8,7 +8,7 @@ from sim.joints.terms import joint_blocks
 from sim.kinematics import velocity_columns
 from sim.model import Model, Vector
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

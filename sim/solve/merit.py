@@ -10,7 +10,7 @@ from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 _NEAR = 100.0  # of kappa: violations that Newton's method takes away in a few steps
 

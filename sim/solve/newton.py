@@ -12,7 +12,7 @@ from sim.options import FAILED, Guess, Options, Outcome
 from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
 from sim.work import Work
-from solvers.jit import inlined, kernel
+from solvers.compiler import inlined, kernel
 from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)

@@ -8,7 +8,7 @@ from sim.model import Model, Vector
 from sim.moves import turn_bodies
 from sim.solve.inequalities import inequality_kinematics
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 NOWHERE = (1e300, 1e300)  # residuals where nothing could be placed
 

@@ -23,8 +23,8 @@ from sim.solve.merit import residuals
 from sim.solve.placing import NOWHERE, place
 from sim.solve.residual import residual_scale
 from sim.work import Work
+from solvers.compiler import kernel
 from solvers.gauss_seidel import gauss_seidel
-from solvers.jit import kernel
 
 _LINEAR = int(Law.LINEAR)
 _NONLINEAR = int(Law.NONLINEAR)

@@ -8,7 +8,7 @@ from sim.late import apply_gears
 from sim.model import Model, Vector
 from sim.rotation import cross
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -22,7 +22,7 @@ from sim.model import Matrix, Model, Vector
 from sim.rotation import Vec3, cross, rotate, transposed_times
 from sim.terrain.height_field import height_field
 from sim.work import Work
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

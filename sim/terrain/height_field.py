@@ -17,7 +17,7 @@ from math import floor
 
 from sim.model import Model, Vector
 from sim.rotation import Vec3
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

@@ -14,7 +14,7 @@ from interrupts import heard
 from programs import HOME
 
 import dojo_opt as dojo
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 from solvers.status import Status
 
 TROT = dojo.problems.trot(cycles=30)

@@ -15,8 +15,7 @@ from sim.kinematics import tree_poses
 from sim.layout import allocate_work, model_view, sizes_of, table, work_view
 from sim.mechanism import Mechanism
 from sim.model import Vector
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 # nbody, nq, nv, ncontact, nlimit, nu
 SIZES = {

@@ -9,7 +9,7 @@ from standing_hopper import HOPPER, standing_problem
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import Settings, milliseconds
 from dojo_opt.options import Options
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 from solvers.status import Status
 
 

@@ -8,7 +8,7 @@ from sim import late
 from sim.elimination import solve
 from sim.elimination_panel import column_count, solve_panel
 from sim.layout import model_view, work_view
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 
 @local_kernel

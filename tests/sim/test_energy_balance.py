@@ -10,7 +10,7 @@ import dojo_opt as dojo
 from sim.bind import bind_step
 from sim.energy_balance import arriving_energy, constraint_work, work_at_node
 from sim.layout import model_view, work_view
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 
 @local_kernel

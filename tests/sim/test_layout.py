@@ -24,8 +24,7 @@ from sim.layout import (
 )
 from sim.model import Model
 from sim.work import Work
-from solvers.jit import kernel
-from solvers.record import Table
+from solvers.compiler import Table, kernel
 
 ALL = Sizes(nbody=3, nq=8, nv=7, ncontact=2, nlimit=4, nu=5)
 BARE = Sizes(nbody=1, nq=1, nv=1, ncontact=0, nlimit=0, nu=0)

@@ -9,7 +9,7 @@ from sim.contacts.contact import add_contact_wrench, contact_rate
 from sim.elimination import solve, subtree_sums
 from sim.layout import model_view, work_view
 from sim.solve.delassus import delassus
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 
 FEET = 4
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solvers.jit import local_kernel
+from solvers.compiler import local_kernel
 from solvers.lanes import LANES, dot_lanes, keep, load, minus_outer, plus, plus_outer, put, six, spread, store, whole
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.jit import local_kernel, users_loop
+from solvers.compiler import local_kernel, users_loop
 
 LINES = (f"    total += np.sin(k * a[{i}] + total) * np.cos(a[{i + 1}])" for i in range(40))
 TEXT = "\n".join(("def weight(a, k):", "    total = k", *LINES, "    return total"))  # too long to be inlined

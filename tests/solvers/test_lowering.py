@@ -1,11 +1,11 @@
-"""Arrays and numbers in kernels mean what they mean in Python: solvers/lowering.py writes their instructions itself."""
+"""Arrays and numbers in kernels mean what they mean in Python: the compiler writes some of their instructions itself."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from solvers.jit import kernel
+from solvers.compiler import kernel
 
 
 @kernel

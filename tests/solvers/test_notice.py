@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from solvers import notice
+from solvers.compiler import notice
 
 
 class Terminal(io.StringIO):

@@ -15,7 +15,7 @@ from dojo_opt.report.engines import Engine
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
 from sim.mechanism import Mechanism
-from solvers.parallel import threads
+from solvers.compiler import threads
 
 _PEER = "MuJoCo RK4"  # the one to beat
 _MOMENTUM = 1e-12

@@ -17,7 +17,7 @@ from dojo_opt.report.gradients.tables import motion_table, resting_table, smooth
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 from sim.mechanism import Mechanism
-from solvers.parallel import threads
+from solvers.compiler import threads
 
 KAPPAS = (1e-6, 1e-8, 1e-10)  # of whole motions
 JUDGED = 1e-8  # the one that is held against the bars

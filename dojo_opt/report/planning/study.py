@@ -12,7 +12,7 @@ from dojo_opt.report.planning.figure import draw
 from dojo_opt.report.planning.measure import HARD, REFINE, Outcome, ours, peer
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
-from solvers.parallel import threads
+from solvers.compiler import threads
 
 # largest iterations and cost of the reference problems, and time of an iteration [ms]
 BARS: dict[str, tuple[int, float | None, float | None]] = {

@@ -21,8 +21,8 @@ from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from solvers.lowering import KernelLowering
-from solvers.notice import compiling
+from solvers.compiler.lowering import KernelLowering
+from solvers.compiler.notice import compiling
 
 __all__ = ["EntryCompiler", "InnerCompiler"]
 

@@ -7,7 +7,7 @@ instead of once in each.
 
 What a late kernel takes and returns is read from its annotations, because a caller is compiled before it:
 
-    int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/record.py), NamedTuples
+    int, float, bool, None, Vector, Matrix, Integers, tuples of these, records (solvers/compiler), NamedTuples
 
     factor_coupling = _late("sim.coupling.system:factor_coupling")  # sim/late.py: for callers
 
@@ -34,8 +34,8 @@ from numba.core import cgutils
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
-from solvers.jit import entry
-from solvers.record import RECORDS, load_word
+from solvers.compiler.kernels import entry
+from solvers.compiler.records import RECORDS, load_word
 
 __all__ = ["LateKernel", "LateTable"]
 

@@ -1,6 +1,4 @@
-"""`@kernel`: Numba, its flags, and compiled code on disk, of cache.py. (Numba is imported here, in cache.py, code.py,
-lowering.py, arithmetic.py, lanes.py, late.py, record.py, clock.py and parallel.py only.)
-"""
+"""`@kernel` and its kin: functions that Numba compiles with the flags of this house, and keeps on disk."""
 
 from __future__ import annotations
 
@@ -17,8 +15,8 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
-from solvers.cache import STORE, KernelCache, cache_folder
-from solvers.code import EntryCompiler, InnerCompiler
+from solvers.compiler.cache import STORE, KernelCache, cache_folder
+from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler
 
 __all__ = [
     "FLAGS",

@@ -26,7 +26,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, overload, register_model
 from numpy.typing import NDArray
 
-from solvers.arrays import WORD, ArrayWords
+from solvers.compiler.array_words import WORD, ArrayWords
 
 Table = NDArray[np.int64]
 R = TypeVar("R")

@@ -22,9 +22,9 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
-from solvers.arithmetic import ARITHMETIC
-from solvers.arrays import DATA, SHAPE, STRIDES, WORD, ArrayWords
-from solvers.record import RecordType, field_words
+from solvers.compiler.arithmetic import ARITHMETIC
+from solvers.compiler.array_words import DATA, SHAPE, STRIDES, WORD, ArrayWords
+from solvers.compiler.records import RecordType, field_words
 
 __all__ = ["KernelLowering"]
 

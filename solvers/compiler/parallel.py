@@ -19,7 +19,7 @@ import numba
 from numba import prange
 from numba.np.ufunc import parallel as layer
 
-from solvers.jit import FLAGS, cached, registered
+from solvers.compiler.kernels import FLAGS, cached, registered
 
 __all__ = ["parallel_kernel", "prange", "threads"]
 

@@ -40,16 +40,15 @@ __all__ = ["STORE", "KernelCache", "cache_folder"]
 _KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
 _CHECK = hashlib.blake2b().digest_size  # bytes of a file before what it holds
+_KERNELS = re.compile(rb"from solvers\.compiler import (\([^)]*|.*)(kernel|inlined)")  # in a file that may hold some
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def _sources() -> list[Path]:
     """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
-    root = Path(__file__).resolve().parent.parent
+    root = Path(__file__).resolve().parents[2]
     files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
-    files += [
-        f for f in root.glob("dojo_opt/**/*.py") if re.search(rb"from solvers\.jit import .*kernel", f.read_bytes())
-    ]
+    files += [f for f in root.glob("dojo_opt/**/*.py") if _KERNELS.search(f.read_bytes())]
     return sorted(files)
 
 

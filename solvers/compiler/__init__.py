@@ -1,0 +1,52 @@
+"""The compiler: Numba, its private parts and the cache on disk, behind the names below.
+
+kernel, inner_kernel    a function without the Python runtime; the second is called from kernels only
+inlined                 a kernel whose text becomes part of its callers
+local_kernel            a kernel that a function makes, not kept on disk
+entry                   a kernel for given types, called by its address
+parallel_kernel         a loop over the threads, with `prange`; `threads` sets their number
+users_kernel            a function of the user; users_loop is a loop around one
+record, Field, Table    NamedTuples of arrays that kernels take as one pointer
+seconds, PAUSE          the clock of kernels
+cache_folder            the folder of the compiled code
+compiled_signatures     the kernels compiled or loaded so far
+CompilationError        Numba's error for code it cannot compile
+"""
+
+from solvers.compiler.cache import cache_folder
+from solvers.compiler.clock import PAUSE, seconds
+from solvers.compiler.kernels import (
+    CompilationError,
+    compiled_signatures,
+    entry,
+    inlined,
+    inner_kernel,
+    kernel,
+    local_kernel,
+    users_kernel,
+    users_loop,
+)
+from solvers.compiler.parallel import parallel_kernel, prange, threads
+from solvers.compiler.records import Field, Table, record, table
+
+__all__ = [
+    "PAUSE",
+    "CompilationError",
+    "Field",
+    "Table",
+    "cache_folder",
+    "compiled_signatures",
+    "entry",
+    "inlined",
+    "inner_kernel",
+    "kernel",
+    "local_kernel",
+    "parallel_kernel",
+    "prange",
+    "record",
+    "seconds",
+    "table",
+    "threads",
+    "users_kernel",
+    "users_loop",
+]
