@@ -1,4 +1,9 @@
-"""Operators of two numbers of one type, as LLVM's instructions."""
+"""Operators of two numbers of one type in kernels: their types, and LLVM's instructions.
+
+Numba asks NumPy's and half a dozen other libraries' rules for the type of every `+`, and looks through as many
+implementations. Kernels do not ask. Nothing is registered with Numba: other functions of the process are compiled as
+ever.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,12 @@ from collections.abc import Callable
 from typing import Any
 
 from numba import types
+from numba.core.typing import Context
+from numba.core.typing.templates import signature
 
-__all__ = ["ARITHMETIC"]
+__all__ = ["ARITHMETIC", "KernelTyping"]
+
+_COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
 
 
 def _arithmetic() -> dict[Any, Callable[..., Any]]:
@@ -19,8 +28,7 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
             table[op, types.float64] = lambda b, x, y, f=f"f{name}": getattr(b, f)(x, y)
             table[op, types.int64] = lambda b, x, y, f=name: getattr(b, f)(x, y, flags=["nsw"])
     table[operator.truediv, types.float64] = lambda b, x, y: b.fdiv(x, y)
-    for op, sign in zip((operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne),
-                        ("<", "<=", ">", ">=", "==", "!="), strict=True):  # fmt: skip
+    for op, sign in zip(_COMPARED, ("<", "<=", ">", ">=", "==", "!="), strict=True):
         real = "fcmp_unordered" if sign == "!=" else "fcmp_ordered"  # NaN differs from everything
         table[op, types.float64] = lambda b, x, y, f=real, s=sign: getattr(b, f)(s, x, y)
         table[op, types.int64] = lambda b, x, y, s=sign: b.icmp_signed(s, x, y)
@@ -28,3 +36,32 @@ def _arithmetic() -> dict[Any, Callable[..., Any]]:
 
 
 ARITHMETIC = _arithmetic()
+
+
+class KernelTyping(Context):
+    """Numba's typing context, with a short cut to the types of these operators.
+
+    It shares all that the other knows, and equals it: implementations of functions are kept by context.
+    """
+
+    __slots__ = ("_shared",)  # not in the shared dictionary
+
+    def __init__(self, context: Any) -> None:
+        self._shared = context
+        self.__dict__ = context.__dict__
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Context) and self.__dict__ is other.__dict__
+
+    def __hash__(self) -> int:
+        return hash(self._shared)
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        """The signature of a call."""
+        if isinstance(func, types.Function) and len(args) == 2 and not kws:
+            left, right = map(types.unliteral, args)
+            op = func.typing_key
+            if left is right and (op, left) in ARITHMETIC:
+                func._impl_keys.setdefault((left, left), op)  # where lowering looks for calls of operator.add(x, y)
+                return signature(types.boolean if op in _COMPARED else left, left, left)
+        return super().resolve_function_type(func, args, kws)

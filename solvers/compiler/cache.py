@@ -23,6 +23,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -35,9 +36,13 @@ from numba.core.caching import FunctionCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from solvers.compiler.pipeline import FAST
+
 __all__ = ["STORE", "KernelCache", "cache_folder"]
 
-_KEEP = 4  # digests kept on disk: the newest few, so that switching between two versions stays warm
+_KEEP = 4  # digests kept on disk however old they are, so that switching between two versions stays warm
+_IN_USE = 14 * 24 * 3600.0  # [s] since its last use for which a folder is kept
+_DIGEST = re.compile("[0-9a-f]{16}")
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
 _CHECK = hashlib.blake2b().digest_size  # bytes of a file before what it holds
 _KERNELS = re.compile(rb"from solvers\.compiler import (\([^)]*|.*)(kernel|inlined)")  # in a file that may hold some
@@ -54,7 +59,7 @@ def _sources() -> list[Path]:
 
 def _digest() -> str:
     """Digest of all kernel sources and of the flags that Numba's own cache key leaves out."""
-    digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK}".encode())
+    digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK} {FAST}".encode())
     for path in _sources():
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()[:16]
@@ -107,6 +112,16 @@ def _opened(base: Path, forbidden: int) -> tuple[Path | None, str]:
     return folder, ""
 
 
+def _prune(root: Path) -> None:
+    """Drop digests below `root` that are neither among the newest few nor used within the last weeks."""
+    with suppress(OSError):  # of a folder that another process drops
+        folders = [d for d in root.iterdir() if d.is_dir() and _DIGEST.fullmatch(d.name)]
+        ages = sorted((time.time() - d.stat().st_mtime, d) for d in folders)
+        for age, folder in ages[_KEEP:]:
+            if age > _IN_USE:
+                shutil.rmtree(folder, ignore_errors=True)
+
+
 def _found() -> tuple[Path | None, str]:
     """(folder of the compiled code; why there is none, empty where nobody wants one)."""
     if os.environ.get("DOJO_OPT_CACHE", "1") == "0":
@@ -129,17 +144,10 @@ class Store:
     def __init__(self) -> None:
         self.folder, self.why_not = _found()
         self.wanted, self._told = self.folder is not None or bool(self.why_not), False
+        self._written = False
         if self.folder is not None:
             with suppress(OSError):  # one that is filled, and read-only
-                os.utime(self.folder)
-                self._prune(self.folder.parent)
-
-    @staticmethod
-    def _prune(root: Path) -> None:
-        """Drop all but the newest few digests below `root`."""
-        old = sorted((d for d in root.iterdir() if d.is_dir() and len(d.name) == 16), key=lambda d: d.stat().st_mtime)
-        for folder in old[:-_KEEP]:
-            shutil.rmtree(folder, ignore_errors=True)
+                os.utime(self.folder)  # says when it was used last
 
     def read(self, name: str) -> bytes:
         """What was written under this name; OSError or ValueError when that cannot be had."""
@@ -163,6 +171,9 @@ class Store:
             return
         try:
             self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # another version may have pruned it
+            if not self._written and not any(self.folder.iterdir()):  # the first file of a new digest
+                _prune(self.folder.parent)
+            self._written = True
             handle, draft = tempfile.mkstemp(dir=self.folder)
             try:
                 with open(handle, "wb") as file:

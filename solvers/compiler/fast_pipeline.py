@@ -1,6 +1,6 @@
-"""How kernels become machine code: each entry once, with all that it calls; nothing else at all.
+"""The fast pipeline: how kernels become machine code, each entry once, with all that it calls; nothing else at all.
 
-Numba 0.68 optimises every function together with all that it calls, translates it to machine code, and does both again
+Numba optimises every function together with all that it calls, translates it to machine code, and does both again
 for each of its callers. Here a kernel that kernels call is kept as it was written, and what is optimised and translated
 are entries: functions called from Python or by their address. Inside an entry everything but itself is private, so that
 the optimiser may drop arguments nobody reads and copies nobody calls.
@@ -9,18 +9,17 @@ the optimiser may drop arguments nobody reads and copies nobody calls.
 from __future__ import annotations
 
 import gc
-import operator
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import typed_passes, types, untyped_passes
+from numba.core import typed_passes, untyped_passes
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
+from solvers.compiler.arithmetic import KernelTyping
 from solvers.compiler.lowering import KernelLowering
 from solvers.compiler.notice import compiling
 
@@ -91,33 +90,6 @@ class EntryLibrary(JITCodeLibrary):
         return _shell(self, code, tuple(f.name for f in external))
 
 
-_NUMBERS = (types.float64, types.int64)
-_SAME = (operator.add, operator.sub, operator.mul, operator.iadd, operator.isub, operator.imul)
-_COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
-
-
-def _number_of(name: Any, results: dict[types.Type, types.Type]) -> None:
-    """Say what an operator makes of two numbers of one type, as Numba does after asking NumPy and half a dozen others:
-    5 of 100 s of a cold start.
-    """
-
-    class Plain(AbstractTemplate):
-        key = name
-        metadata = {"target": "cpu"}  # the more special are asked first
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            alike = len(args) == 2 and args[0] is args[1] and args[0] in results
-            return signature(results[args[0]], *args) if alike else None
-
-    infer_global(name)(Plain)
-
-
-for _operator in _SAME:
-    _number_of(_operator, {kind: kind for kind in _NUMBERS})
-for _operator in _COMPARED:
-    _number_of(_operator, dict.fromkeys(_NUMBERS, types.boolean))
-_number_of(operator.truediv, {types.float64: types.float64})
-
 _IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
@@ -142,11 +114,15 @@ def _seldom_collected() -> Iterator[None]:
     through them again and again was an eighth of a cold start.
     """
     before = gc.get_threshold()
+    if not gc.isenabled() or not 0 < before[0] < _SELDOM[0]:
+        yield
+        return
     gc.set_threshold(*_SELDOM)
     try:
         yield
     finally:
-        gc.set_threshold(*before)
+        if gc.get_threshold() == _SELDOM:  # nobody else has set another one meanwhile
+            gc.set_threshold(*before)
 
 
 class _Compiler(Compiler):
@@ -169,6 +145,7 @@ class _Compiler(Compiler):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""
+        self.state.typingctx = KernelTyping(self.state.typingctx)
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library

@@ -16,7 +16,7 @@ from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import STORE, KernelCache, cache_folder
-from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler
 
 __all__ = [
     "FLAGS",

@@ -2,11 +2,11 @@
 
 For one entry of a matrix Numba 0.68 writes 45 instructions, most of which copy its seven words about, and looks through
 every implementation of every operator for each `+`: reading, cleaning and optimising that was a third of a cold start.
-Here the same takes four to ten, which the optimiser turns into the same code. Everything else is left to Numba, and so
-is every index when bounds are checked.
+Here the same takes four to ten, which the optimiser turns into the same code. Everything else is left to Numba.
 
-An index counts from the end where it is written as a number, a[-1]. Any other is not negative: to ask, at every access,
-whether it is took a tenth of the time of a step.
+An index counts from the end where it is written as a number, a[-1]. Any other must not be negative: to ask, at every
+access, whether it is took a tenth of the time of a step. Where bounds are checked (NUMBA_BOUNDSCHECK=1), a negative
+index is an IndexError like one beyond the end: the checks find what would read other memory without them.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ class _Lower(Lower):
         kind = self.typeof(name)
         if not isinstance(kind, types.Array) or kind.layout != "C" or kind.dtype not in _NUMBERS or not kind.aligned:
             return None
-        indices = None if self.context.enable_boundscheck else self._indices(index)
+        indices = self._indices(index)
         if indices is None or len(indices) > kind.ndim:
             return None
         b = self.builder
@@ -200,6 +200,8 @@ class _Lower(Lower):
         for k in range(kind.ndim):
             i = indices[k] if k < len(indices) else WORD(0)
             known = isinstance(i, Constant) and i.constant >= 0
+            if self.context.enable_boundscheck and k < len(indices):
+                self._check(i, name, k)
             zero = [isinstance(n, Constant) and n.constant == 0 for n in (offset, i)]
             size = self._word(name, SHAPE, k) if not (known and zero[0]) else None
             if isinstance(i, Constant) and not known:
@@ -210,6 +212,16 @@ class _Lower(Lower):
                 offset = b.mul(offset, size, flags=["nsw", "nuw"])
                 offset = offset if zero[1] else b.add(offset, i, flags=["nsw", "nuw"])
         return b.gep(self._word(name, DATA), [offset], inbounds=True), list(range(len(indices), kind.ndim))
+
+    def _check(self, index: Any, name: str, k: int) -> None:
+        """Look at the bounds of dimension k; a number that is written as a negative one counts from the end."""
+        size = self._word(name, SHAPE, k)
+        place = self.builder.add(index, size) if isinstance(index, Constant) and index.constant < 0 else index
+        outside = self.builder.icmp_unsigned(">=", place, size)  # negative numbers are large ones, too
+        with cgutils.if_unlikely(self.builder, outside):
+            array = "an array" if name.startswith("$") else name.split(".")[0]
+            said = f"kernel {self.func_ir.func_id.func_qualname}: index outside {array}, axis {k}, or negative"
+            self.call_conv.return_user_exc(self.builder, IndexError, (said,), self.loc, self.func_ir.func_id.func_name)
 
     def _read(self, resty: Any, name: str, index: Any) -> Any:
         """array[index], an entry or a row."""

@@ -1,0 +1,49 @@
+"""Which pipeline compiles kernels: the fast one, where it knows this Numba, or Numba's own.
+
+The fast pipeline (fast_pipeline.py) builds on private parts of Numba. The results are the same; on Numba's own pipeline
+a step takes about 1.3 times as long, and a cold start twice.
+
+    DOJO_OPT_PLAIN_NUMBA=1    Numba's own
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+import numba
+from numba.core.compiler import Compiler
+
+from solvers.compiler.notice import compiling
+
+__all__ = ["FAST", "EntryCompiler", "InnerCompiler"]
+
+_KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline was tested with
+
+
+class PlainCompiler(Compiler):
+    """Numba's own pipeline."""
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile one function."""
+        with compiling():
+            return super().compile_extra(func)
+
+
+def _compilers() -> tuple[bool, type[Compiler], type[Compiler]]:
+    """(whether they are fast, the compiler of entries, that of kernels which kernels call)."""
+    if os.environ.get("DOJO_OPT_PLAIN_NUMBA", "0") in ("", "0"):
+        if any(numba.__version__.startswith(f"{known}.") for known in _KNOWN):
+            from solvers.compiler.fast_pipeline import EntryCompiler, InnerCompiler
+
+            return True, EntryCompiler, InnerCompiler
+        print(
+            f"dojo_opt: Numba {numba.__version__} is not one of {', '.join(_KNOWN)}, which the fast compiler knows: "
+            "kernels are compiled by Numba alone, and steps take about 1.3 times as long",
+            file=sys.stderr,
+        )
+    return False, PlainCompiler, PlainCompiler
+
+
+FAST, EntryCompiler, InnerCompiler = _compilers()

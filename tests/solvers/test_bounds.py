@@ -1,0 +1,84 @@
+"""Bounds checks: NUMBA_BOUNDSCHECK=1 finds what kernels would read or write beyond an array, before its begin too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from programs import python
+
+import dojo_opt as dojo
+
+PROGRAM = """
+import numpy as np
+from solvers.compiler import kernel
+
+@kernel
+def _entry(a, i):
+    return a[i]
+
+@kernel
+def _row(A, i, j):
+    row = A[i]
+    return row[j]
+
+@kernel
+def _pair(A, i, j):
+    return A[i, j]
+
+@kernel
+def _write(a, i):
+    a[i] = 1.0
+    return 0.0
+
+@kernel
+def _caller(a, i):
+    return _entry(a, i)
+
+@kernel
+def _last(A):
+    return A[-1, -2] + A[-1][-1]
+
+A = np.arange(12.0).reshape(3, 4)
+part = A.ravel()[4:8]
+for call in (
+    lambda: _entry(part, -1), lambda: _entry(part, 4), lambda: _row(A, -1, 0), lambda: _row(A, 0, -1),
+    lambda: _pair(A, 0, 4), lambda: _pair(A, 0, -1), lambda: _pair(A, -3, 0), lambda: _pair(A, 3, 0),
+    lambda: _write(part, -1), lambda: _caller(part, -1),
+):
+    try:
+        print("read", call())
+    except IndexError as error:
+        print(error)
+print(_last(A), _entry(part, 3), _row(A, 2, 3), _pair(A, 2, 3))
+"""
+
+
+def test_a_negative_index_that_is_not_written_as_a_number_is_refused():
+    *errors, last = python(PROGRAM, NUMBA_BOUNDSCHECK="1", DOJO_OPT_PLAIN_NUMBA="0").splitlines()
+    names = "_entry _entry _row _row _pair _pair _pair _pair _write _entry".split()
+    assert [error.split(":")[0] for error in errors] == [f"kernel {name}" for name in names]
+    assert "index outside A, axis 1, or negative" in errors[4] and "axis 0" in errors[6]
+    assert last == "21.0 7.0 11.0 11.0"
+
+
+@pytest.mark.parametrize("boundscheck", [True, False])
+def test_a_users_function_counts_negative_indices_from_the_end(boundscheck):
+    """As Numba does, with checks and without; -1 is no literal here."""
+
+    @dojo.kernel(boundscheck=boundscheck)
+    def last(x, u, out):
+        i = u.shape[0] - 2
+        out[i] = 10.0 * x[i] + x[i - 1]
+
+    x, out = np.arange(8.0), np.zeros(3)
+    last(x[2:6], np.zeros(1), out[1:])
+    assert list(out) == [0.0, 0.0, 54.0]
+
+
+def test_a_users_function_is_refused_an_index_before_the_begin():
+    @dojo.kernel
+    def before(x, u, out):
+        out[0] = x[-1 - x.shape[0]]
+
+    with pytest.raises(IndexError):
+        before(np.arange(8.0)[4:], np.zeros(1), np.zeros(1))

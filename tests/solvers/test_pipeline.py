@@ -1,0 +1,120 @@
+"""The two pipelines of the compiler, and what other users of Numba in the process see of them: nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import python
+
+SIMULATION = """
+import json, numpy as np, dojo_opt as dojo
+from solvers.compiler.pipeline import FAST
+sim = dojo.Simulator(dojo.models.pendulum(), 0.02)
+x = sim.neutral() + 0.3
+A, B = sim.linearize(x, np.ones(sim.nu))
+print(json.dumps([FAST, *sim.rollout(x, np.ones((20, sim.nu))).x.ravel(), *A.ravel(), *B.ravel()]))
+"""
+
+
+def test_numbas_own_pipeline_gives_the_same_digits():
+    fast, *numbers = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="0"))
+    plain, *others = json.loads(python(SIMULATION, DOJO_OPT_PLAIN_NUMBA="1"))
+    assert (fast, plain) == (True, False)
+    np.testing.assert_allclose(numbers, others, rtol=1e-12, atol=1e-13)
+
+
+UNKNOWN = """
+import contextlib, io, numba
+numba.__version__ = "0.99.0"
+with contextlib.redirect_stderr(io.StringIO()) as said:
+    from solvers.compiler.pipeline import FAST
+    import solvers.compiler
+print(FAST, said.getvalue().count("\\n"), said.getvalue())
+"""
+
+
+def test_an_unknown_numba_is_used_as_it_is_and_said_so_in_one_line():
+    first, *rest = python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="0").split()
+    assert (first, rest[0]) == ("False", "1") and "0.99.0" in rest
+    assert python(UNKNOWN, DOJO_OPT_PLAIN_NUMBA="1").split() == ["False", "0"]
+
+
+def test_the_cache_keeps_the_pipelines_apart(tmp_path: Path):
+    program = "from solvers.compiler import cache_folder; print(cache_folder().name)"
+    names = [python(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_PLAIN_NUMBA=plain) for plain in "01"]
+    assert names[0] != names[1]
+
+
+GUEST = """
+{first}
+import gc, json, operator
+import numba, numpy as np
+
+@numba.njit
+def guest(a, i, n, x):
+    a[i] += n
+    return a[i], a[-1], n + n, n - 1, n / n, x * n, x / x, n < x, n == n, x != x, (n, x) == (n, x), n ** 2, n // 2
+
+@numba.njit
+def direct(n, x):
+    return operator.add(n, n), operator.mul(x, x), operator.lt(x, x), operator.iadd(n, x)
+
+arguments = np.arange(8.0)[4:], -1, 3, 0.5
+found = [repr(guest(*arguments)), repr(direct(3, 0.5))]
+found += [str(f.nopython_signatures) for f in (guest, direct)]
+context = numba.core.registry.cpu_target.typing_context
+plus = context.resolve_value_type(operator.add)
+signature = plus.get_call_type(context, (numba.float64, numba.float64), {{}})
+found += [str(signature), str(context.resolve_function_type(plus, (numba.int64, numba.float64), {{}}))]
+found += [str(gc.get_threshold()), str(gc.isenabled())]
+ours = [t.__module__ for t in plus.templates if t.__module__.split(".")[0] in ("dojo_opt", "sim", "solvers")]
+print(json.dumps(found + [m for m in ours if m != "solvers.lanes"]))
+"""
+COMPILE = """
+from solvers.compiler import local_kernel
+import numpy as np
+def product(a, i, n):
+    a[i] += n * n + 1.5 * n
+    return a[i] / 2.0
+product = local_kernel(product)
+product(np.zeros(3), 1, 2)
+"""
+
+
+@pytest.mark.parametrize("first", ["import dojo_opt, sim.rollout", "import dojo_opt, sim.rollout" + COMPILE])
+def test_numba_compiles_others_functions_as_it_does_without_us(first: str):
+    """Lanes add cases of their own to `+`; nothing else is registered with an operator."""
+    assert python(GUEST.format(first=first)) == python(GUEST.format(first=""))
+
+
+PRUNED = """
+import os, time
+from pathlib import Path
+root = Path(os.environ["NUMBA_CACHE_DIR"]) / "dojo_opt"
+ages = {}  # [days]
+for k, days in enumerate((1, 2, 13, 15, 16, 30, 400)):
+    folder = root / f"{k:016x}"
+    folder.mkdir(parents=True, mode=0o700)
+    (folder / "kernel.nbc").write_bytes(b"")
+    os.utime(folder, (time.time() - 86400 * days,) * 2)
+(root / "notes").mkdir()
+os.utime(root / "notes", (0, 0))
+from solvers.compiler import cache_folder, kernel
+from solvers import cones
+print(len(list(root.iterdir())))
+from solvers.dense import dot
+import numpy as np
+dot(np.ones(2), np.ones(2))
+print(*sorted(d.name.lstrip("0") for d in root.iterdir() if d != cache_folder()))
+"""
+
+
+def test_folders_are_dropped_when_a_new_one_is_filled_and_only_after_weeks(tmp_path: Path):
+    os.chmod(tmp_path, 0o700)
+    imported, left = python(PRUNED, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_CACHE="1").splitlines()
+    assert imported == "9"  # seven, the notes, and the new one
+    assert left.split() == ["1", "2", "notes"]
