@@ -38,6 +38,7 @@ class _Lower(Lower):
         """Before anything is lowered."""
         super().init()
         self._items: dict[Any, list[Any]] = {}  # of tuples, by their values
+        self._refusals: dict[str, Any] = {}  # blocks that end the kernel, by their messages
 
     def _find_singly_assigned_variable(self) -> None:
         """Variables that need no place in memory: assigned once, where all that use them come by after that."""
@@ -218,10 +219,20 @@ class _Lower(Lower):
         size = self._word(name, SHAPE, k)
         place = self.builder.add(index, size) if isinstance(index, Constant) and index.constant < 0 else index
         outside = self.builder.icmp_unsigned(">=", place, size)  # negative numbers are large ones, too
-        with cgutils.if_unlikely(self.builder, outside):
-            array = "an array" if name.startswith("$") else name.split(".")[0]
-            said = f"kernel {self.func_ir.func_id.func_qualname}: index outside {array}, axis {k}, or negative"
-            self.call_conv.return_user_exc(self.builder, IndexError, (said,), self.loc, self.func_ir.func_id.func_name)
+        array = "an array" if name.startswith("$") else name.split(".")[0]
+        refusal = self._refusal(f"index outside {array}, axis {k}, or negative")
+        inside = self.builder.append_basic_block("inside")
+        self.builder.cbranch(outside, refusal, inside).set_weights([1, 99])
+        self.builder.position_at_end(inside)
+
+    def _refusal(self, why: str) -> Any:
+        """The block that raises IndexError: one for all looks with one message, for code grows by each."""
+        if why not in self._refusals:
+            self._refusals[why] = block = self.builder.append_basic_block("outside")
+            said = f"kernel {self.func_ir.func_id.func_qualname}: {why}"
+            with self.builder.goto_block(block):
+                self.call_conv.return_user_exc(self.builder, IndexError, (said,))
+        return self._refusals[why]
 
     def _read(self, resty: Any, name: str, index: Any) -> Any:
         """array[index], an entry or a row."""
