@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.mpc.tick import milliseconds
+from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES, run_reports, write_page
-from dojo_opt.show import add_show, show
+from dojo_opt.viewer.show import add_show, show
 from sim.mechanism.checks import nearest
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
@@ -196,7 +196,8 @@ def _models(args: argparse.Namespace) -> int:
         for entry in entries:
             dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
-        print(json.dumps([asdict(entry) for entry in entries]))
+        rows = [asdict(entry) for entry in entries]
+        print(json.dumps([{name: row[name] for name in row if name != "builder"} for row in rows]))
         return 0
     print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  what")
     for e in entries:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.bridges.cotangents import Cotangents
-from dojo_opt.parameter_space import ParameterSpace
+from dojo_opt.identification.parameter_space import ParameterSpace
 from sim.mechanism import checks
 from sim.simulator.results import SimulationError
 from sim.simulator.simulator import Simulator
@@ -30,7 +30,7 @@ def _threads(process: int) -> ThreadPoolExecutor:
 
 
 class Functions(NamedTuple):
-    """What a bridge returns: step(x, u, theta=None) -> x (nx,), rollout(x0, us, theta=None) -> xs (T + 1, nx)."""
+    """The functions of a bridge: step(x, u, theta=None) -> x (nx,), rollout(x0, us, theta=None) -> xs (T + 1, nx)."""
 
     step: Callable[..., Any]
     rollout: Callable[..., Any]

@@ -1,12 +1,12 @@
-"""Ground: how far contacts are from it, and its height learnt from what stands on it."""
+"""Ground: the distances of the contacts from it, and its height learnt from the contacts that stand."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.cross import cross
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.planning.manifold import cross
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -70,7 +70,7 @@ class Ground:
         return tuple(name for name, gap in zip(self.names, gaps, strict=True) if gap < _TOUCHING)
 
     def learn(self, policy: Policy, time: float, x: Vector, before: tuple[float, Vector]) -> None:
-        """Take the heights of what stands at x, measured at `time`; before: an earlier time and its state."""
+        """Take the heights of the contacts that stand at x, measured at `time`; before: an earlier sample."""
         then, x0 = before
         if time <= then:
             return

@@ -1,4 +1,4 @@
-"""What all plots do to their axes at the end, and the units on them."""
+"""Axes: the finish that all plots share, and the units on their labels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
-from dojo_opt.motion import Motion, motion
+from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 

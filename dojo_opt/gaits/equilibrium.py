@@ -1,0 +1,154 @@
+"""Equilibrium: a state in which a robot stands still, and the joint torques that hold it there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.gaits.feet import Feet
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["equilibrium", "input_map", "potential_gradient"]
+
+_STEP = 1e-5
+_EVEN = 1e-6  # weight of the sharing of the load against its balance
+_RANK = 1e-7  # singular values below are the noise of differences: balls under one rigid foot do not move one by one
+_ROUNDS = 20
+_NEAR = 0.01  # [m] contacts may carry that are not further from the ground than the nearest by more than this
+
+
+def potential_gradient(sim: Simulator, x: ArrayLike) -> Array:
+    """dV/dq (..., nv) of gravity and springs at the coordinates of x (..., nx), by central differences [N, N m]."""
+    rest = np.array(x, dtype=float)
+    rest[..., sim.nq :] = 0.0
+    steps = np.zeros((2 * sim.nv, sim.ndx))
+    steps[: sim.nv, : sim.nv] = _STEP * np.eye(sim.nv)
+    steps[sim.nv :] = -steps[: sim.nv]
+    moved = sim.integrate(rest[..., None, :], steps)
+    V = np.asarray(sim.energy(moved)) - np.asarray(sim.kinetic_energy(moved))
+    return np.asarray((V[..., : sim.nv] - V[..., sim.nv :]) / (2.0 * _STEP))
+
+
+def input_map(sim: Simulator) -> Array:
+    """(nv, nu) generalised forces per unit of every input on a joint; those on bodies, such as pushes, have none."""
+    out = np.zeros((sim.nv, sim.nu))
+    for k, part in enumerate(sim.mechanism.inputs or ()):
+        if part.joint is None:
+            continue
+        out[sim.mechanism.v_slice(part.joint).start + part.dof, k] = 1.0
+    return out
+
+
+def least_pushes(pushes: Array, load: Array, even: float) -> Array:
+    """(k,) factors f >= 0 of the rows of `pushes` (k, n) with least |pushes^T f - load|^2 + even^2 |f|^2."""
+    from scipy.optimize import nnls  # .3 s, which only legged robots at rest or on a gait need
+
+    rows = np.concatenate([pushes.T, even * np.eye(len(pushes))])
+    return np.asarray(nnls(rows, np.concatenate([load, np.zeros(len(pushes))]))[0])
+
+
+def stop_torques(sim: Simulator, x: Array) -> Array:
+    """(nv,) mean torque of the joint stops at rest, kappa / (h distance) away from each [N, N m]."""
+    out = np.zeros(sim.nv)
+    for joint in sim.mechanism.joints:
+        if joint.nrot == 3:
+            continue
+        q, at = x[sim.mechanism.q_slice(joint.name)], sim.mechanism.v_slice(joint.name)
+        lo, hi = np.array(list(joint.limits or ()), dtype=np.float64).reshape(-1, 2).T
+        out[at] = sim.kappa / sim.time_step * (1.0 / (q - lo) - 1.0 / (hi - q))
+    return out
+
+
+def _under(feet: Feet, state: Array) -> tuple[Array, Array, Array]:
+    """d(gaps)/dq (k, nv), generalised forces (k, nv) of unit vertical forces, and the normals' share of those (k,)."""
+    normal = feet.normals(state)
+    gaps = np.einsum("kc,kcv->kv", normal, feet.jacobian(state))
+    return gaps, feet.touching(state).jacobian(state)[:, 2], normal[:, 2]
+
+
+def _check_friction(name: str, feet: Feet, share: Array, force: Array) -> None:
+    """Refuse vertical forces outside the friction cones."""
+    for contact, cosine, loaded in zip(feet.contacts, share, force > 0.0, strict=True):
+        limit = 0.0 if contact.law == "impact" else contact.friction
+        slope = float(np.sqrt(max(0.0, 1.0 - cosine**2)) / max(cosine, 1e-12))
+        if loaded and slope > limit + 1e-12:
+            raise ValueError(
+                f"equilibrium({name}): {contact.name!r} stands on ground of slope {slope:.3g} with friction {limit:g}, "
+                "and would slide"
+            )
+
+
+def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """The state moved until the forces kappa / (h gap) of all contacts balance the free degrees of freedom; the forces.
+
+    Newton's method with the smallest motion. Four balls under a rigid foot cannot float at four given heights, so the
+    forces that share a load most evenly are nearly, and not quite, those of a state.
+    """
+    for _ in range(_ROUNDS):
+        gap, (down, up, share) = feet.gaps(state), _under(feet, state)
+        force = sim.kappa / (sim.time_step * share * np.maximum(gap, 1e-12))
+        left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
+        if np.abs(left[free]).max(initial=0.0) < 1e-9 * np.abs(left).max() or gap.min() <= 0.0:
+            break
+        slope = (up[:, free].T * (force / gap)) @ down
+        move = np.zeros(sim.ndx)
+        move[: sim.nv] = np.linalg.lstsq(slope, -left[free], rcond=_RANK)[0]
+        change = np.abs(down @ move[: sim.nv] / gap).max()
+        state = sim.integrate(state, move * min(1.0, 0.5 / max(change, 1e-300)))
+    return state, sim.kappa / (sim.time_step * _under(feet, state)[2] * np.maximum(feet.gaps(state), 1e-12))
+
+
+def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
+    """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
+
+    The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows;
+    the joints carry what gravity and springs leave; inputs that act on bodies are zero. On the central path a contact
+    with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
+    carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that shall carry have to be
+    within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by
+    `dojo_opt.gaits.feet.Feet.place`.
+
+    ValueError when no such forces exist: the centre of mass is not above the feet, a joint without input would have to
+    carry something, the ground is steeper than friction holds, or the smoothing is so large that contacts far above the
+    ground carry the weight.
+
+    Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
+    """
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")
+    mech = sim.mechanism
+    feet, B = Feet(sim, mech.contact_names), input_map(sim)
+    state = np.array(sim.neutral() if x is None else checks.array("equilibrium(x)", x, (sim.nx,)))
+    state[sim.nq :] = 0.0
+    free = np.asarray(~B.any(axis=1))
+    weight = float(np.abs(potential_gradient(sim, state)).max())
+    for _ in range(iterations):
+        down, up, share = _under(feet, state)
+        gap = feet.gaps(state)
+        touching = gap < gap.min() + _NEAR
+        afar = np.where(touching, 0.0, sim.kappa / (sim.time_step * share * np.maximum(gap, _NEAR)))
+        load = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ afar
+        force = least_pushes(up[:, free] * touching[:, None], load[free], _EVEN)
+        loaded = force > 1e-3 * weight
+        wanted = sim.kappa / (sim.time_step * (share * force)[loaded])
+        error = wanted - gap[loaded]
+        if np.abs(error).max(initial=0.0) < 1e-6 * wanted.min(initial=1.0):
+            break
+        move = np.zeros(sim.ndx)
+        move[: sim.nv] = np.linalg.lstsq(down[loaded], error, rcond=_RANK)[0]
+        state = sim.integrate(state, move)
+    state, force = _pressed(sim, feet, state, free)
+    _, up, share = _under(feet, state)
+    left = potential_gradient(sim, state) - stop_torques(sim, state) - up.T @ force
+    u = np.asarray(np.linalg.lstsq(B, left, rcond=None)[0], dtype=np.float64)
+    if np.abs(left[free]).max() > 1e-3 * weight:
+        k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
+        raise ValueError(
+            f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
+            f"weight: {left[k]:.3g} N or N m is left at {sim.mechanism.dof_names[k]!r}"
+        )
+    _check_friction(mech.name, feet, share, np.where(force > 1e-3 * weight, force, 0.0))
+    return state, u

@@ -1,0 +1,139 @@
+"""Feet: the balls by which a robot stands on the ground, where they are, and the joint angles that put them there."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.planning.manifold import cross
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["Feet"]
+
+_STEP = 1e-6  # of the differences: positions are smooth in the angles, so its square is the error
+_ITERATIONS = 50
+_CLOSE = 1e-10  # [m] a foot this near to its target is there
+_DAMPING = 1e-8  # keeps a stretched leg solvable
+
+
+class Feet:
+    """Contacts of the bodies at the ends of the tree, or those that are named, as points that move with the state.
+
+    The first joint of the mechanism is its base; the others are its legs.
+    """
+
+    def __init__(self, sim: Simulator, names: Sequence[str] | None = None) -> None:
+        mech = sim.mechanism
+        inner = {joint.parent for joint in mech.joints}
+        if names is None:
+            names = [c.name for c in mech.contacts if c.body not in inner]
+        if not names:
+            raise ValueError(f"Feet({mech.name!r}): no body at the end of the tree has a contact; give names=...")
+        for name in names:
+            checks.one_of("Feet(names=...)", name, mech.contact_names)
+        self.sim = sim
+        self.names = tuple(names)
+        self.contacts = [mech.contacts[mech.contact_names.index(name)] for name in names]
+        self.base = mech.joints[0].nv
+        self._body = np.array([mech.body_names.index(c.body) for c in self.contacts])
+        self._point = np.array([np.asarray(c.point) for c in self.contacts])
+        self.radius = np.array([c.radius for c in self.contacts])
+        self.normal = np.array([np.asarray(c.normal) for c in self.contacts])
+        self.height = np.array([c.height for c in self.contacts])
+
+    def positions(self, x: ArrayLike) -> Array:
+        """Centres (..., k, 3) of the balls at the states x (..., nx), world axes [m]."""
+        z = self.sim.maximal(x)[..., self._body, :]
+        w, v = z[..., 6:7], z[..., 7:10]
+        side = cross(v, self._point)
+        return np.asarray(z[..., :3] + self._point + 2.0 * (w * side + cross(v, side)))
+
+    def gaps(self, x: ArrayLike) -> Array:
+        """Distances (..., k) of the balls from the ground [m]."""
+        at = self.positions(x)
+        return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
+
+    def put_down(self, x: Array) -> Array:
+        """The state x (nx,) of a robot on a floating base, moved up or down until its lowest ball touches."""
+        out = x.copy()
+        for _ in range(_ITERATIONS):
+            least = float((self.gaps(out) / self.normals(out)[:, 2]).min())
+            out[2] -= least
+            if abs(least) < _CLOSE:
+                break
+        return out
+
+    def normals(self, x: Array) -> Array:
+        """Outward normals (k, 3) of the ground at the balls, at one state x (nx,)."""
+        return np.stack([c.normal_at(p) for c, p in zip(self.contacts, self.positions(x), strict=True)])
+
+    def touching(self, x: Array) -> Feet:
+        """The same with the points of the balls nearest to the ground at x (nx,), instead of their centres."""
+        z = self.sim.maximal(x)[self._body]
+        w, v, arm = z[:, 6:7], -z[:, 7:10], -self.radius[:, None] * self.normals(x)
+        side = cross(v, arm)
+        other = copy.copy(self)
+        other._point = self._point + arm + 2.0 * (w * side + cross(v, side))
+        return other
+
+    def jacobian(self, x: ArrayLike) -> Array:
+        """d(positions)/d(dq), (..., k, 3, nv), by central differences."""
+        sim = self.sim
+        steps = np.zeros((2 * sim.nv, sim.ndx))
+        steps[: sim.nv, : sim.nv] = _STEP * np.eye(sim.nv)
+        steps[sim.nv :] = -steps[: sim.nv]
+        moved = self.positions(sim.integrate(np.asarray(x, dtype=float)[..., None, :], steps))
+        slope = (moved[..., : sim.nv, :, :] - moved[..., sim.nv :, :, :]) / (2.0 * _STEP)
+        return np.moveaxis(slope, -3, -1)
+
+    def place(self, x: ArrayLike, targets: ArrayLike) -> Array:
+        """States (n, nx) with the base of x (n, nx) and the feet at `targets` (n, k, 3): inverse kinematics.
+
+        Damped Gauss-Newton from the joint angles of x, so a knee stays bent to its side; all states at once. ValueError
+        when a target is out of reach, or only reached beyond the stops of a joint.
+        """
+        sim, nb = self.sim, self.base
+        x = np.array(np.broadcast_to(x, (len(np.asarray(targets)), sim.nx)), dtype=float)
+        goal = checks.array("Feet.place(targets)", targets, (len(x), len(self.names), 3))
+        for _ in range(_ITERATIONS):
+            error = (goal - self.positions(x)).reshape(len(x), -1)
+            if np.abs(error).max() <= _CLOSE:
+                break
+            J = self.jacobian(x)[..., nb:].reshape(len(x), error.shape[1], -1)
+            H = np.einsum("nij,nik->njk", J, J) + _DAMPING * np.eye(J.shape[2])
+            step = np.linalg.solve(H, np.einsum("nij,ni->nj", J, error)[..., None])[..., 0]
+            step *= np.minimum(1.0, 0.5 / np.abs(step).max(axis=1, keepdims=True).clip(1e-12))  # half a radian at most
+            x = sim.integrate(x, np.concatenate([np.zeros((len(x), nb)), step, np.zeros((len(x), sim.nv))], axis=1))
+        miss = np.linalg.norm(goal - self.positions(x), axis=-1)
+        if miss.max() > 1e-6:
+            t, k = (int(i) for i in np.unravel_index(miss.argmax(), miss.shape))
+            raise ValueError(
+                f"Feet.place(targets): {self.names[k]!r} comes no nearer than {miss[t, k]:.3g} m to its target "
+                f"{goal[t, k]} in row {t}"
+            )
+        self._check_stops(x)
+        return x
+
+    def _check_stops(self, x: Array) -> None:
+        """Refuse angles beyond the limits of a joint."""
+        for joint in self.sim.mechanism.joints[1:]:
+            q = x[:, self.sim.mechanism.q_slice(joint.name)]
+            for dof, (lo, hi) in enumerate(_limits(joint)):
+                worst = float(np.maximum(lo - q[:, dof], q[:, dof] - hi).max())
+                if worst > 0.0:
+                    raise ValueError(
+                        f"Feet.place(targets): joint {joint.name!r} would have to go {worst:.3g} rad beyond its limits "
+                        f"[{lo:g}, {hi:g}]"
+                    )
+
+
+def _limits(joint: Any) -> list[tuple[float, float]]:
+    """(lo, hi) of the scalar coordinates of a joint."""
+    return [] if joint.nrot == 3 else list(joint.limits)

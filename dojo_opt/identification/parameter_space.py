@@ -1,0 +1,213 @@
+"""ParameterSpace: named parameters of a simulator as one vector, within their physical bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.identification import inertia_coordinates
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
+
+Floats = NDArray[np.float64]
+Chart = Callable[[Floats], tuple[Floats, Floats]]  # coordinates -> values of parameters, and their derivative
+
+_VECTORS = ("orientation", "axis", "contact_normal")  # whose derivatives are those from where they have come to
+_NOT_NEGATIVE = ("spring", "damper", "armature", "contact_radius")
+_POSITIVE = ("mass", "time_step", "size_a", "size_b", "friction")  # a contact without friction is another law
+_LEAST = 1e-6  # of the value: where positive parameters end
+
+
+class _ParameterGroup(NamedTuple):
+    """Coordinates that are seen in a few blocks of derivatives."""
+
+    names: tuple[str, ...]  # of blocks
+    columns: slice  # coordinates
+    chart: Chart
+
+
+class ParameterSpace:
+    """A fit moves in theta (n,), and makes simulators of it:
+
+        space = dojo.ParameterSpace(sim, ("friction:*", "damper"), bodies=("trunk",))
+        def errors(theta): ... space.simulator(theta).rollout(x, us).x ...
+        def slopes(theta): ... space.chain(theta, space.simulator(theta).linearize(x, u, wrt=space.wrt)) ...
+        scipy.optimize.least_squares(errors, space.values, slopes, bounds=(space.low, space.high))
+
+    names    parameters, as in `Simulator.parameters`; they are their own coordinates
+    bodies   whose mass, centre of mass and inertia are fitted together, in ten coordinates of which every value is a
+             body (inertia_coordinates.py); `inertia` among the names instead may leave what bodies can have, and then
+             `simulator` raises a ValueError
+    bounds   {name or body coordinate: (low, high)}, within those that mechanisms have: masses, sizes, friction > 0,
+             springs, dampers, armatures, radii >= 0, restitution from 0 to 1
+
+    labels, values, low, high: of theta; values are those of `sim`.  ValueError: names that are not there, or twice.
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        names: Sequence[str] = (),
+        bodies: Sequence[str] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        call = "ParameterSpace"
+        self._sim = sim
+        self._groups: list[_ParameterGroup] = []
+        self._rows: dict[str, tuple[float, float, float]] = {}  # value, low, high
+        found = sim.parameters(tuple(names))
+        checks.distinct(f"{call}(names)", found.names)
+        for name, entries in groupby(zip(found.names, found.values, strict=True), key=lambda entry: _unit(entry[0])):
+            self._add(f"{call}(names)", name, *map(list, zip(*entries, strict=True)))
+        for body in bodies:
+            self._add_body(f"{call}(bodies=...)", body)
+        if not self._groups:
+            raise ValueError(f"{call}: expected names, or bodies=..., got none")
+        asked = sim.parameters(tuple(name for group in self._groups for name in group.names)).names
+        checks.distinct(f"{call}(names, bodies=...)", asked)
+        for common in (name for name in asked if ":*" in name):
+            clash = [name for name in asked if _kind(name) == _kind(common) and ":*" not in name]
+            if clash:
+                raise ValueError(f"{call}(names, bodies=...): {common!r} is of all parts, and so of {clash[0]!r}")
+        self.labels = tuple(self._rows)
+        self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
+        self._narrow(f"{call}(bounds=...)", bounds or {})
+
+    def __repr__(self) -> str:
+        return f"ParameterSpace({self._sim.mechanism.name}, {len(self.labels)} values: {', '.join(self.labels)})"
+
+    @property
+    def wrt(self) -> tuple[str, ...]:
+        """The parameters whose derivatives `chain` needs."""
+        return tuple(name for group in self._groups for name in group.names)
+
+    def simulator(self, theta: ArrayLike) -> Simulator:
+        """The simulator with these parameters; everything else is that of the first one."""
+        at = checks.array("ParameterSpace.simulator(theta)", theta, self.values.shape)
+        values: dict[str, Floats] = {}
+        for group in self._groups:
+            numbers, first = group.chart(at[group.columns])[0], 0
+            for name in group.names:
+                last = first + len(self._sim.parameters((name,)).values)
+                values[name], first = numbers[first:last], last
+        changed: Simulator = self._sim.with_parameters(values)
+        return changed
+
+    def chain(self, theta: ArrayLike, blocks: Mapping[str, ArrayLike]) -> Floats:
+        """(..., n) derivatives by theta, from those by `wrt`: the blocks (..., n_k) of a simulator at theta.
+
+        blocks: derivatives by `wrt`, as `linearize`, `vjp`, or the `parameters` of `linearize_rollout` return them.
+        """
+        call = "ParameterSpace.chain"
+        at = checks.array(f"{call}(theta)", theta, self.values.shape)
+        for name in self.wrt:
+            checks.one_of(f"{call}(blocks)", name, blocks)
+        parts = []
+        for group in self._groups:
+            block = np.concatenate([np.asarray(blocks[name]) for name in group.names], axis=-1)
+            parts.append(block @ group.chart(at[group.columns])[1])
+        return np.concatenate(parts, axis=-1)
+
+    def _append(self, names: Sequence[str], chart: Chart, rows: Mapping[str, tuple[float, float, float]]) -> None:
+        """Coordinates (value, low, high) by their labels."""
+        first = len(self._rows)
+        checks.distinct("ParameterSpace", (*self._rows, *rows))
+        self._rows.update(rows)
+        self._groups.append(_ParameterGroup(tuple(names), slice(first, first + len(rows)), chart))
+
+    def _add(self, call: str, name: str, entries: list[str], values: list[float]) -> None:
+        """A parameter, or the three of a direction or a rotation."""
+        kind = _kind(name)
+        chart = _CHARTS.get("scale" if name.endswith("[scale]") else kind, _plain)
+        if kind in _VECTORS and (len(entries) != 3 or ":*" in name):
+            raise ValueError(f"{call}: {kind} is a vector, give it whole and part by part; got {', '.join(entries)}")
+        if name.endswith("[scale]") and ":*" in name:
+            raise ValueError(f"{call}: give scales part by part; got {name}")
+        rows = {entry: (value, *self._limits(entry, kind, value)) for entry, value in zip(entries, values, strict=True)}
+        self._append([name], chart, rows)
+
+    def _limits(self, name: str, kind: str, value: float) -> tuple[float, float]:
+        """What mechanisms can have; of `kind:*`, which moves all parts by as much, what the last of them can have."""
+        if ":*" not in name:
+            return _limits(kind, value)
+        found = self._sim.parameters((kind,))
+        component = name.partition("[")[2]
+        same = [x for n, x in zip(found.names, found.values, strict=True) if n.partition("[")[2] == component]
+        return value + _limits(kind, min(same))[0] - min(same), value + _limits(kind, max(same))[1] - max(same)
+
+    def _add_body(self, call: str, body: str) -> None:
+        """The ten coordinates of the mass, centre and inertia of a body."""
+        names = (f"mass:{body}", f"com:{body}", f"inertia:{body}")
+        values = self._sim.parameters(names).values  # mass, centre (3), inertia (6)
+        start = inertia_coordinates.coordinates(f"{call}: body {body!r}", float(values[0]), values[4:])
+        labels = [f"{body}.{label}" for label in inertia_coordinates.LABELS]
+        free = {label: (float(x), -np.inf, np.inf) for label, x in zip(labels, start, strict=True)}
+        self._append(names, inertia_coordinates.body_of, free)
+
+    def _narrow(self, call: str, bounds: Mapping[str, tuple[float, float]]) -> None:
+        """Bounds of single coordinates."""
+        for label, pair in bounds.items():
+            k = self.labels.index(checks.one_of(call, label, self.labels))
+            low, high = max(float(pair[0]), self.low[k]), min(float(pair[1]), self.high[k])
+            if not low <= self.values[k] <= high or not low < high:
+                raise ValueError(f"{call}: {label!r} is {self.values[k]:g}, outside of {low:g} to {high:g}")
+            self.low[k], self.high[k] = low, high
+
+
+def _kind(name: str) -> str:
+    return name.partition(":")[0].partition("[")[0]
+
+
+def _unit(name: str) -> str:
+    """What is one coordinate, or one group of them: a vector whole, other parameters by themselves."""
+    return name.partition("[")[0] if name.startswith(_VECTORS) else name
+
+
+def _limits(kind: str, value: float) -> tuple[float, float]:
+    """What mechanisms can have."""
+    if kind in _POSITIVE:
+        return _LEAST * abs(value), np.inf
+    if kind == "restitution":
+        return 0.0, 1.0
+    if kind == "cone":
+        return _LEAST, np.pi
+    return (0.0 if kind in _NOT_NEGATIVE else -np.inf), np.inf
+
+
+def _plain(theta: Floats) -> tuple[Floats, Floats]:
+    return theta, np.eye(len(theta))
+
+
+def _direction(theta: Floats) -> tuple[Floats, Floats]:
+    """Derivatives are by a vector of length one."""
+    return theta, np.eye(3) / np.linalg.norm(theta)
+
+
+def _scale(theta: Floats) -> tuple[Floats, Floats]:
+    """Derivatives are by a further factor."""
+    return theta, np.array([[1.0 / theta[0]]])
+
+
+def _rotation(theta: Floats) -> tuple[Floats, Floats]:
+    """Derivatives are by a further rotation:
+
+    exp(r + dr) = exp(r) exp(J dr),   J = 1 - (1 - cos a)/a^2 [r] + (a - sin a)/a^3 [r]^2,   a = |r|
+    """
+    a = float(np.linalg.norm(theta))
+    x, y, z = theta
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if a < 1e-4:
+        return theta, np.eye(3) - 0.5 * K + K @ K / 6.0
+    return theta, np.eye(3) - (1.0 - np.cos(a)) / a**2 * K + (a - np.sin(a)) / a**3 * K @ K
+
+
+_CHARTS: dict[str, Chart] = {
+    "orientation": _rotation,
+    "axis": _direction,
+    "contact_normal": _direction,
+    "scale": _scale,
+}

@@ -1,0 +1,76 @@
+"""Settings of `MPC`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dojo_opt.planning.options import Options, Stage
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+
+# penalties that grew with every tick would never stop; a second line search would take its time
+OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
+GUESSES = ("states", "feedback", "open loop")
+
+__all__ = ["GUESSES", "OPTIONS", "MPCSettings"]
+
+
+@dataclass(frozen=True)
+class MPCSettings:
+    """Settings of `MPC`.
+
+    Attributes:
+        period: time between plans [s] (default None: one knot).
+        kappa: smoothing of the contacts in rollouts [N s m] (default 1e-4).
+        kappa_grad: smoothing of the contacts in derivatives [N s m] (default None: that of the rollouts, which saves
+            a linearisation per tick).
+        guess: first trajectory of a tick: "states" keeps the shifted states, "feedback" rolls out from the measured
+            state under the gains, "open loop" without them (default "states").
+        gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
+        delay: time from a measurement to the input that it causes [s]; plans start that much later (default 0).
+        time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
+        mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
+            see `dojo_opt.mpc.measurement`.
+        friction: coefficient of friction that plans count on (default None: that of the model). Less than the ground
+            has is safer.
+        learn_ground: whether to take the height of the ground from the contacts that stand (default False).
+        options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
+            kappa_grad.
+        log: how many of the last ticks `MPC.log` keeps, about 1 kB each; None keeps all (default 10,000).
+    """
+
+    period: float | None = None
+    kappa: float = 1e-4
+    kappa_grad: float | None = None
+    guess: str = "states"
+    gain_scale: float = 1.0
+    delay: float = 0.0
+    time_limit: float = float("inf")
+    mean_velocity: bool = True
+    friction: float | None = None
+    learn_ground: bool = False
+    options: Options | None = None
+    log: int | None = 10_000
+
+    def __post_init__(self) -> None:
+        if self.guess not in GUESSES:
+            raise ValueError(f"MPC(guess=...): expected one of {GUESSES}, got {self.guess!r}")
+        if self.options is not None and not isinstance(self.options, Options):
+            raise TypeError(f"MPC(options=...): expected Options, got {self.options!r}")
+        for name, above in (("kappa", 0.0), ("time_limit", 0.0), ("period", 0.0), ("kappa_grad", 0.0)):
+            value = getattr(self, name)
+            if value is not None and not value > above:
+                raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
+        for name in ("gain_scale", "delay"):
+            checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
+        if self.log is not None:
+            whole_number("MPC(log=...)", self.log)
+        if self.friction is not None:
+            checks.number("MPC(friction=...)", self.friction, at_least=0.0)
+
+    def planner(self, iterations: int) -> Options:
+        """Options of the planner for the iterations of one tick."""
+        base = self.options or OPTIONS
+        stage = Stage(self.kappa, self.kappa_grad or self.kappa, base.tolerance, iterations)
+        settings = {name: getattr(base, name) for name in base.__dataclass_fields__}
+        return Options(**(settings | {"stages": (stage,), "time_limit": self.time_limit}))

@@ -1,0 +1,121 @@
+"""Objective: all terms of a problem, their quadratic model along a trajectory, the multipliers of its constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.planning.names import component_name
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.term import Term
+
+Matrix = NDArray[np.float64]
+
+_LEAST = 1e-3  # share of the largest unit: least unit of a component
+
+
+class Objective:
+    """cost + augmented Lagrangian (the merit), with gradient g (T + 1, ndx + nu) and Gauss-Newton Hessian H."""
+
+    def __init__(self, problem: Problem, options: Options) -> None:
+        size = problem.sim.ndx + problem.sim.nu
+        self._sim = problem.sim
+        self.violation = problem.violation
+        self.costs = problem.costs
+        self.constraints = problem.constraints
+        self.g = np.zeros((problem.horizon + 1, size))
+        self.H = np.zeros((problem.horizon + 1, size, size))
+        self._options = options
+        self._last: list[Matrix] = []
+
+    def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
+        """Start with zero multipliers and the first penalty, or with those of an earlier plan of the same problem.
+
+        Constraints that this problem has more than that one, after the others, start anew; those it has less are left
+        out: a refined problem has more of them than the one that it comes from.
+        """
+        shapes = [term.slope.shape for term in self.constraints]
+        for given in (multipliers, penalties):
+            common = min(len(given), len(shapes))
+            if [a.shape for a in given[:common]] != shapes[:common]:
+                raise ValueError(
+                    f"ilqr(warm_start=...): expected multipliers of shapes {shapes}, got {[a.shape for a in given]}"
+                )
+        for i, term in enumerate(self.constraints):
+            first = self._options.penalty * self._unit(term)
+            term.slope[:] = multipliers[i] if i < len(multipliers) else 0.0
+            term.weight[:] = 0.5 * (penalties[i] if i < len(penalties) else first) * term.mask
+        self._last = []
+
+    def _unit(self, term: Term) -> Any:
+        """Unit of a constraint's penalties: the curvature 2 w of costs: a multiple of a problem is solved alike.
+
+        Of a component of x or u, that of its own weight; without one, and of anything else, the largest.
+        """
+        largest = max((2.0 * float(cost.weight.max(initial=0.0)) for cost in self.costs), default=0.0)
+        largest = largest if largest > 0.0 else 1.0
+        if term.columns is None:
+            return largest
+        own = np.zeros(self.g.shape[1])
+        for cost in self.costs:
+            if cost.columns is not None:
+                np.maximum.at(own, cost.columns, 2.0 * cost.weight.max(axis=0))
+        own = own[term.columns]
+        return np.where(own > 0.0, np.maximum(own, _LEAST * largest), largest)
+
+    def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
+        """(cost, merit) at (xs, us)."""
+        cost = 0.0
+        for term in self.costs:
+            cost += term.value(xs, us)
+        merit = cost
+        for term in self.constraints:
+            merit += term.value(xs, us)
+        return cost, merit
+
+    def expand(self, xs: Matrix, us: Matrix) -> None:
+        """Fill g and H at (xs, us)."""
+        self.g.fill(0.0)
+        self.H.fill(0.0)
+        for term in (*self.costs, *self.constraints):
+            term.expand(xs, us, self.g, self.H)
+
+    def worst(self, xs: Matrix, us: Matrix) -> tuple[float, str]:
+        """Largest violation of a constraint, and which entry of which it is."""
+        found = 0.0, ""
+        for term in self.constraints:
+            term.update(xs, us)
+            size = term.violation()
+            if size.size and size.max() > found[0]:
+                row, entry = divmod(int(size.argmax()), size.shape[1])
+                what = f"entry {entry}" if term.columns is None else component_name(self._sim, term.columns[entry])
+                found = float(size.max()), f"{term.name} of {what} at knot {term.knots[row]}"
+        return found
+
+    def mismatch(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint, or of the complementarity of an inequality and its multiplier."""
+        worst = 0.0
+        for term in self.constraints:
+            term.update(xs, us)
+            worst = max(worst, float(term.mismatch().max(initial=0.0)))
+        return worst
+
+    def update_multipliers(self, xs: Matrix, us: Matrix) -> None:
+        """l <- l + rho r (kept >= 0 for inequalities); rho grows where the violation fell too little."""
+        options = self._options
+        now = []
+        for i, term in enumerate(self.constraints):
+            term.update(xs, us)
+            violation = term.mismatch()
+            term.slope += 2.0 * term.weight * term.residual
+            if term.one_sided:
+                np.maximum(term.slope, 0.0, out=term.slope)
+            now.append(violation)
+            if self._last:
+                slow = (violation > options.sufficient * self._last[i]) & (violation > 0.1 * options.violation)
+                term.weight[slow] = np.minimum(term.weight[slow] * options.penalty_growth, 0.5 * options.penalty_max)
+        self._last = now

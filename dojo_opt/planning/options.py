@@ -1,0 +1,151 @@
+"""Settings of `ilqr`, and the stages of its continuation."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.mechanism import checks
+
+__all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
+
+
+class Stage(NamedTuple):
+    """One stage of the continuation: its smoothing, and when the next one begins.
+
+    Attributes:
+        kappa_eval: smoothing of the contacts in rollouts [N s m].
+        kappa_grad: smoothing of the contacts in derivatives [N s m].
+        decrease: the stage ends when an iteration promises or brings less than this share of the merit (default 0.03).
+        iterations: the stage ends after this many iterations (default 100).
+    """
+
+    kappa_eval: float
+    kappa_grad: float
+    decrease: float = 3e-2
+    iterations: int = 100
+
+
+# Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
+# Derivatives are those of the rollouts throughout: a smoother kappa_grad costs a linearisation more per iteration.
+CONTINUATION = (
+    Stage(3e-2, 3e-2),
+    Stage(3e-3, 3e-3),
+    Stage(1e-4, 1e-4),
+    Stage(1e-6, 1e-6),
+)
+PLANNED = CONTINUATION[-1].kappa_eval  # [N s m] of plans: a simulator of it reproduces their motion
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of `ilqr`. The last stage is repeated, with multiplier updates, until the constraints hold.
+
+    The merit is the cost plus the augmented Lagrangian of the constraints.
+
+    Attributes:
+        stages: the continuation, from smooth to hard contact: `Stage`s, or pairs (kappa_eval, kappa_grad) [N s m]
+            (default 3e-2, 3e-3, 1e-4, 1e-6).
+        reopen: at a change of kappa, "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps
+            (default "feedback").
+        follow: share of the merit; a rollout at the next kappa that raises the merit by more has lost the trajectory
+            (default 1).
+        bisections: how often a step of kappa is halved, on a logarithmic scale, when its rollout loses the trajectory
+            (default 3).
+        tolerance: share of the merit; the last stage ends when an iteration brings less (default 1e-3).
+        max_iterations: limit of all iterations, rejected ones included (default 300).
+        max_updates: multiplier updates before the constraints count as infeasible (default 20).
+        violation: largest violation of a constraint in a plan that counts as solved [unit of the residual]
+            (default 1e-3).
+        gap: largest gap, an entry of f(x_t, u_t) (-) x_t+1, of a trajectory that counts as consistent [m, rad, m/s,
+            rad/s] (default 1e-8).
+        penalty: first penalty of the constraints [curvature of the costs] (default 100: a goal is worth its effort).
+        penalty_growth: factor of a penalty that grows (default 10).
+        penalty_max: limit of the penalties [1 / square of the residual's unit] (default 1e8).
+        sufficient: the penalty of an entry grows unless its violation fell below this share of the one before
+            (default 0.25).
+        regularization: first regularisation of the backward pass [mean control weight] (default 0).
+        regularization_max: limit of the regularisation [mean control weight] (default 1e6).
+        value_regularization: multiple of the regularisation that is added to the Hessian V_xx of the value (default 0).
+        armijo: share of the predicted decrease that a step must achieve (default 0.01).
+        ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
+        halvings: how often the line search halves the step size (default 6).
+        rejections: failed line searches in a row before gaps are closed by a rollout, or derivatives sharpened
+            (default 2).
+        shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single
+            shooting only (default 1).
+        time_limit: limit of the wall time, looked at before each iteration [s] (default inf).
+        callback: function of the record of each iteration; it may raise StopIteration to end the solve (default None).
+        verbose: whether to print one line per iteration (default False).
+        stream: file for these lines (default None: the standard output).
+    """
+
+    stages: tuple[Stage, ...] = CONTINUATION
+    reopen: str = "feedback"
+    follow: float = 1.0
+    bisections: int = 3
+    tolerance: float = 1e-3
+    max_iterations: int = 300
+    max_updates: int = 20
+    violation: float = 1e-3
+    gap: float = 1e-8
+    penalty: float = 100.0
+    penalty_growth: float = 10.0
+    penalty_max: float = 1e8
+    sufficient: float = 0.25
+    regularization: float = 0.0
+    regularization_max: float = 1e6
+    value_regularization: float = 0.0
+    armijo: float = 1e-2
+    ascent: float = 2.0
+    halvings: int = 6
+    rejections: int = 2
+    shooting: float = 1.0
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
+    verbose: bool = False
+    stream: Any = None
+
+    def __post_init__(self) -> None:
+        if self.reopen not in ("feedback", "gaps"):
+            raise ValueError(f'ilqr(reopen=...): expected "feedback" or "gaps", got {self.reopen!r}')
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(field.default, int | float) and not isinstance(field.default, bool):
+                self._check_number(field.name, value, whole=isinstance(field.default, int))
+        if self.callback is not None and not callable(self.callback):
+            raise TypeError(f"ilqr(callback=...): expected a function of a record, got {self.callback!r}")
+        stages = self._stages()
+        object.__setattr__(self, "stages", (*stages[:-1], stages[-1]._replace(decrease=self.tolerance)))
+        for stage in self.stages:
+            kappas = [checks.number("ilqr(stages=...): kappa", k) for k in (stage.kappa_eval, stage.kappa_grad)]
+            if not min(kappas) > 0.0:
+                raise ValueError(f"ilqr(stages=...): expected positive kappa, got {stage}")
+
+    def _stages(self) -> tuple[Stage, ...]:
+        """The stages as such; a user may give plain tuples."""
+        try:
+            stages = tuple(Stage(*stage) for stage in self.stages)
+        except TypeError:
+            wanted = "pairs (kappa_eval, kappa_grad) or Stages"
+            raise TypeError(f"ilqr(stages=...): expected {wanted}, got {self.stages!r}") from None
+        if len(stages) == 0:
+            raise ValueError("ilqr(stages=...): expected at least one stage")
+        return stages
+
+    @staticmethod
+    def _check_number(name: str, value: Any, *, whole: bool) -> None:
+        """Refuse anything but numbers >= 0, and fractions for counts; infinity is allowed."""
+        kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+        if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
+            what = "a whole number" if whole else "a number"
+            raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {value!r}")
+
+    def say(self, line: str) -> None:
+        """Print a line where the table goes, if `verbose`."""
+        if self.verbose:
+            print(line, file=self.stream or sys.stdout)

@@ -1,0 +1,186 @@
+"""Plan: the result of `ilqr`, and the history of its iterations."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.planning.options import Options
+from sim.mechanism.brief import brief_table
+from sim.mechanism.checks import whole_number
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+__all__ = ["History", "Plan"]
+
+COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha", "gap", "viol", "ms")
+HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
+
+
+RECORDED = (
+    *("iteration", "cost", "merit", "gradient", "kappa_eval", "kappa_grad"),
+    *("mu", "alpha", "gap", "violation", "milliseconds"),
+)
+
+
+def table_line(record: dict[str, Any]) -> str:
+    """One aligned line of the table of iterations, below its note; alpha is "-" when the line search failed."""
+    r = record
+    note = f"     {r['note']}\n" if "note" in r else ""
+    alpha = f"{r['alpha']:8.2g}" if r["alpha"] > 0.0 else f"{'-':>8}"
+    return (
+        f"{note}{r['iteration']:4d} {r['cost']:11.5g} {r['merit']:11.5g} {r['gradient']:8.1e} {r['kappa_eval']:7.0e} "
+        f"{r['kappa_grad']:7.0e} {r['mu']:7.0e} {alpha} {r['gap']:7.0e} {r['violation']:7.0e} {r['milliseconds']:6.2f}"
+    )
+
+
+@dataclass(repr=False)
+class Plan:
+    """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
+
+    u(x) = u_t + K_t (x (-) x_t)
+
+    Of a problem whose start is free and whose end is the start again (`Periodic`), K is periodic, too: see `repeated`.
+    """
+
+    success: bool
+    status: Status
+    message: str
+    nit: int  # iterations, those whose line search failed included
+    fun: float  # cost, without the terms of the constraints
+    x: Matrix  # (T + 1, nx)
+    u: Matrix  # (T, nu) [N, N m]
+    K: Stack  # (T, nu, ndx)
+    k: Matrix  # (T, nu) the step the last backward pass still proposed
+    violation: float  # of the constraints, largest
+    gap: float  # of the dynamics, largest
+    seconds: float  # that the solve took
+    time_step: float  # [s]
+    substeps: int  # simulation steps per knot
+    stride: Matrix | None = None  # (ndx,) displacement over one period of a periodic motion; K is periodic, too
+    history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
+    multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
+    penalties: list[Matrix] = field(default_factory=list)
+    problem: Any = None  # the Problem; not saved
+
+    def __repr__(self) -> str:
+        return (
+            f"Plan({self.status.name}, {self.nit} iterations, cost {self.fun:.6g}, x {self.x.shape}, u {self.u.shape})"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [[r[name] for name in RECORDED] for r in self.history]
+        return brief_table(self.closing_line(), COLUMNS, rows)
+
+    @property
+    def time(self) -> Matrix:
+        """(T + 1,) times of the knots [s]."""
+        return np.arange(float(len(self.x))) * (self.time_step * self.substeps)
+
+    def repeated(self, count: int) -> Plan:
+        """The motion of a periodic plan `count` times in a row, with the gains that go with it.
+
+        fun is that of all cycles; multipliers, penalties and history stay behind. ValueError for a plan that does not
+        repeat itself, or that was loaded from a file and knows no simulator.
+        """
+        n = whole_number("Plan.repeated(count)", count)
+        if self.stride is None or self.problem is None:
+            why = "its end is not its start (Periodic)" if self.stride is None else "it has no problem"
+            raise ValueError(f"Plan.repeated: this plan cannot be repeated, {why}")
+        cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * self.stride) for i in range(n)]
+        u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
+        x, fun = np.concatenate(cycles), n * self.fun
+        return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
+
+    def summary(self) -> str:
+        """The table of iterations and a closing line."""
+        lines = [HEADER, *(table_line(r) for r in self.history)]
+        return "\n".join([*lines, self.closing_line()])
+
+    def closing_line(self) -> str:
+        """One line: how it ended."""
+        return (
+            f"{self.status.name}: {self.message} {self.nit} iterations, cost {self.fun:.6g}, violation "
+            f"{self.violation:.1e}, gap {self.gap:.1e}, {1e3 * self.seconds:.1f} ms"
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write all fields to an .npz file."""
+        arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
+        arrays |= {} if self.stride is None else {"stride": self.stride}
+        arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
+        arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
+        scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
+        meta = {name: getattr(self, name) for name in scalars} | {"status": int(self.status), "success": self.success}
+        np.savez(path, meta=json.dumps(meta), **arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Plan:
+        """Read a file that `save` wrote."""
+        with np.load(path) as data:
+            meta = json.loads(str(data["meta"]))
+            meta["status"] = Status(meta["status"])
+            count = sum(name.startswith("multiplier_") for name in data.files)
+            multipliers = [data[f"multiplier_{i}"] for i in range(count)]
+            penalties = [data[f"penalty_{i}"] for i in range(count)]
+            arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data.files}
+            return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties)
+
+
+class History:
+    """The record of all iterations of a solve, its printed table, and its budget."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self.reset()
+
+    def reset(self, began: float | None = None) -> None:
+        """Forget the last solve and start the clock; began: `time.perf_counter()` when it was started elsewhere."""
+        self._tick = time.perf_counter()
+        self.began = self._tick if began is None else began
+        self.records: list[dict[str, Any]] = []
+        self._note = ""
+        self._headed = False
+
+    def budget(self) -> Status:
+        """SOLVED while there is some left."""
+        if len(self.records) >= self._options.max_iterations:
+            return Status.MAX_ITERATIONS
+        if time.perf_counter() - self.began >= self._options.time_limit:
+            return Status.TIME_LIMIT
+        return Status.SOLVED
+
+    def note(self, text: str) -> None:
+        """Put a line of text into the table, before the next iteration."""
+        self._note = text
+        self._say(f"     {text}")
+
+    def _say(self, line: str) -> None:
+        """Print a line of the table, the first one below the header."""
+        if not self._headed:
+            self._options.say(HEADER)
+        self._headed = True
+        self._options.say(line)
+
+    def add(self, **record: Any) -> bool:
+        """Record an iteration, print it, call back; True when the callback wants to stop."""
+        tock = time.perf_counter()
+        record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
+        self._tick = tock
+        self._say(table_line(record))
+        self.records.append(record | {"note": self._note} if self._note else record)
+        self._note = ""
+        if self._options.callback is not None:
+            try:
+                self._options.callback(record)
+            except StopIteration:
+                return True
+        return False

@@ -1,0 +1,212 @@
+"""Problem: a simulator, a start, a horizon, costs, constraints and limits, checked once and bound to arrays."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.planning.manifold import tangent_layout
+from dojo_opt.planning.names import chosen_components
+from dojo_opt.planning.term import Spec, numbers, state_table, table
+from sim.mechanism.checks import whole_number
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+__all__ = ["Problem"]
+
+
+def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector, Vector] | None:
+    """Control limits as two (nu,) arrays, infinite where free."""
+    if limits is None:
+        return None
+    if not hasattr(limits, "__len__") or len(limits) != 2:
+        raise ValueError(f"Problem(control_limits=...): expected (lower, upper), got {limits!r}")
+    lo, hi = (numbers("Problem(control_limits=...)", b) for b in limits)
+    for side, bound in (("lower", lo), ("upper", hi)):
+        if bound.shape not in ((), (nu,)) or np.any(np.isnan(bound)):
+            raise ValueError(
+                f"Problem(control_limits=...): expected a number or shape ({nu},) without NaN as {side} limit, got "
+                f"shape {bound.shape}: {bound}"
+            )
+    lo, hi = (np.broadcast_to(b, (nu,)).copy() for b in (lo, hi))
+    if np.any(lo > hi):
+        i = int(np.argmax(lo > hi))
+        raise ValueError(f"Problem(control_limits=...): expected lower <= upper, got [{lo[i]}, {hi[i]}] of control {i}")
+    return lo, hi
+
+
+def _components(call: str, chosen: Any, sim: Any) -> Any:
+    """Component numbers as an array; None for none, True for all."""
+    if chosen is None or chosen is False:
+        return None
+    return np.unique(chosen_components(call, None if chosen is True else chosen, sim))
+
+
+def _memory() -> float:
+    """Bytes of the machine, infinite where it does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+
+
+def _terms(given: Any) -> tuple[Spec, ...]:
+    """One term, or several, as a tuple."""
+    return tuple(given) if isinstance(given, Iterable) else (given,)
+
+
+class Problem:
+    """min sum of costs over x (T + 1, nx), u (T, nu) with x_0 = start, the simulator's motion, constraints and limits.
+
+    The attribute `refinement` is 1. Set to more, `ilqr` ends by planning `refined(refinement)` from its first plan.
+    `refined_constraints` are constraints of that problem only, for those that lead nowhere from a distant guess.
+
+    Args:
+        sim: the simulator.
+        start: (nx,) first state.
+        horizon: number T of knots.
+        cost: one cost or several, see `dojo.cost`.
+        constraints: one constraint or several, see `dojo.constraint`.
+        control_limits: (lower, upper), numbers or (nu,) [N, N m], which hold at every iteration (default None: none).
+        substeps: steps of `sim.time_step` per knot, with the input held (default 1).
+        controls0: (T, nu) guess of the inputs [N, N m] (default zero).
+        states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
+            None: the rollout of the inputs).
+        free_start: tangent components of the start that the planner may change, by number or name, or True for all;
+            `start` is then a guess. With the constraint `Periodic`, such a plan is a gait that repeats itself.
+
+    Raises:
+        TypeError: for a `sim` that is no Simulator, or an entry of `cost` or `constraints` that is no term.
+        ValueError: for a wrong shape, a number that is not finite, or a horizon that exceeds the memory.
+    """
+
+    def __init__(
+        self,
+        sim: Any,
+        start: ArrayLike,
+        horizon: int,
+        *,
+        cost: Spec | Sequence[Spec] = (),
+        constraints: Spec | Sequence[Spec] = (),
+        control_limits: tuple[ArrayLike, ArrayLike] | None = None,
+        substeps: int = 1,
+        controls0: ArrayLike | None = None,
+        states0: ArrayLike | None = None,
+        free_start: Any = None,
+    ) -> None:
+        if not all(hasattr(sim, name) for name in ("nx", "ndx", "nu", "integrate", "horizon")):
+            raise TypeError(f"Problem(sim): expected a Simulator, got {sim!r}")
+        self.sim = sim
+        self.horizon = whole_number("Problem(horizon=...)", horizon)
+        self.substeps = whole_number("Problem(substeps=...)", substeps)
+        self.refinement = 1
+        self.refined_constraints: tuple[Spec, ...] = ()
+        self._check_memory()
+        start = numbers("Problem(start=...)", start)
+        if start.shape != (sim.nx,):
+            raise ValueError(f"Problem(start=...): expected shape ({sim.nx},), got {start.shape}")
+        self.layout = tangent_layout(sim, sim.neutral())
+        self.start: Vector = state_table("Problem(start=...)", start, 1, sim.nx, self.layout)[0]
+        self.free_start = _components("Problem(free_start=...)", free_start, sim)
+        self.specs = (_terms(cost), _terms(constraints))
+        for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
+            for i, spec in enumerate(specs):
+                if not hasattr(spec, "bind"):
+                    what = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
+                    raise TypeError(f"Problem({argument}=...): entry {i} is {what}")
+        self.bind()
+        self.control_limits = _limits(control_limits, sim.nu)
+        self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
+        self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
+
+    def __repr__(self) -> str:
+        knots = f"{self.horizon} knots of {self.knot_time:g} s"
+        terms = [type(spec).__name__ for spec in (*self.specs[0], *self.specs[1])]
+        name = getattr(self.sim.mechanism, "name", type(self.sim).__name__)
+        return f"Problem({name}, {knots}, {', '.join(terms) or 'no terms'})"
+
+    def _check_memory(self) -> None:
+        """Refuse a horizon whose derivatives alone are larger than the memory of the machine."""
+        size = self.sim.ndx + self.sim.nu
+        needed = 8.0 * (self.horizon + 1) * (2 * self.sim.ndx * size + 2 * size**2)  # A, B, twice; H, and its copy
+        if needed > (memory := _memory()):
+            raise ValueError(
+                f"Problem(horizon=...): derivatives at {self.horizon} knots with {size} numbers each take "
+                f"{needed / 2**30:.3g} GiB of memory, and this machine has {memory / 2**30:.3g} GiB"
+            )
+
+    def refined(self, count: int = 5) -> Problem:
+        """The same problem with every time step cut into `count`: same knots, inputs, terms; `refined_constraints` too.
+
+        A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
+        shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
+        """
+        count = whole_number("Problem.refined(count)", count)
+        finer = copy.copy(self)
+        finer.sim = self.sim.replace(time_step=self.sim.time_step / count)
+        finer.substeps = self.substeps * count
+        finer.refinement = 1
+        finer.specs, finer.refined_constraints = (self.specs[0], (*self.specs[1], *self.refined_constraints)), ()
+        finer.bind()
+        return finer
+
+    def with_own_terms(self, **settings: Any) -> Problem:
+        """The same problem, its start given, with a simulator and terms of its own, for loops that write into them.
+
+        settings: of `Simulator.replace`.
+        """
+        own = copy.copy(self)
+        own.sim = self.sim.replace(**settings)
+        own.free_start = None
+        own.bind()
+        return own
+
+    def bind(self) -> None:
+        """Make the terms of `specs` anew, with arrays and compiled functions of their own."""
+        self.costs = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[0]]
+        self.constraints = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[1]]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("costs", "constraints")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self.bind()  # loops around a user's function cannot be pickled
+
+    @property
+    def knot_time(self) -> float:
+        """Length of a knot [s]."""
+        return float(self.sim.time_step * self.substeps)
+
+    def check_controls(self, call: str, controls: ArrayLike) -> Matrix:
+        """A finite (T, nu) copy of `controls`, or an error that names `call`."""
+        if np.ndim(controls) == 2 and np.shape(controls) != (self.horizon, self.sim.nu):
+            raise ValueError(f"{call}: expected shape ({self.horizon}, {self.sim.nu}), got {np.shape(controls)}")
+        return table(call, controls, self.horizon, self.sim.nu)
+
+    def check_states(self, call: str, states: ArrayLike) -> Matrix:
+        """A finite (T + 1, nx) copy of `states` with the start in its first row, or an error that names `call`."""
+        if np.shape(states) != (self.horizon + 1, self.sim.nx):
+            raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {np.shape(states)}")
+        checked = table(call, states, self.horizon + 1, self.sim.nx)
+        if self.free_start is None:
+            checked[0] = self.start
+        return checked
+
+    def cost(self, xs: Matrix, us: Matrix) -> float:
+        """Sum of the costs at (xs, us), without constraints."""
+        return sum(term.value(xs, us) for term in self.costs)
+
+    def violation(self, xs: Matrix, us: Matrix) -> float:
+        """Largest violation of a constraint at (xs, us)."""
+        worst = 0.0
+        for term in self.constraints:
+            term.update(xs, us)
+            worst = max(worst, float(term.violation().max(initial=0.0)))
+        return worst

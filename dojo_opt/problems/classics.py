@@ -1,0 +1,103 @@
+"""Reference problems of small systems: a hop, a pushed block, swing-ups."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dojo_opt import models
+from dojo_opt.constraint import Goal
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+from sim.simulator.simulator import Simulator
+
+__all__ = ["block", "hop", "swingup"]
+
+
+def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:
+    """Raibert's hopper jumps from rest to `target` [m] (x, y from where it stands) in one second, 20 knots of 50 ms.
+
+    A knot is one step of 50 ms, or `substeps` shorter ones. Knots 0 to 9 track the target `height` above the ground it
+    stands on, the others the target itself; squares of position weigh 1, attitude .1, leg 1, velocity and angular
+    velocity .01, leg rate .01, and impulses .01 per (N s)^2. At the end the pose is a constraint. The guess is the leg
+    force that carries the body.   Howell et al. 2022, Dojo, hopper example.
+    """
+    knot, horizon = 0.05, 20
+    place = np.array(checks.vector("problems.hop(target=...)", target, 2))
+    height = checks.number("problems.hop(height=...)", height)
+    substeps = whole_number("problems.hop(substeps=...)", substeps)
+    sim = Simulator(models.raiberthopper(**model), time_step=knot / substeps, kappa=PLANNED)
+    start = sim.neutral()
+    goal, apex = start.copy(), start.copy()
+    goal[:2] += place
+    apex[:3] = goal[0], goal[1], goal[2] + height
+    weight = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1, 1.0, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01])
+    half = horizon // 2
+    mass = float(sim.mechanism.bodies[0].mass)
+    return Problem(
+        sim,
+        start,
+        horizon,
+        cost=[
+            Tracking(np.array([apex] * half + [goal] * (horizon + 1 - half)), weight),
+            Effort(0.01 * knot**2),
+        ],
+        constraints=[Goal(goal, components=np.arange(sim.nv))],
+        substeps=substeps,
+        controls0=np.array([0.0, 0.0, 9.81 * mass]),
+    )
+
+
+def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Problem:
+    """A half-metre cube of 1 kg is brought from rest on the ground to rest one metre to the right, or one metre up.
+
+    Ten knots of 0.1 s, three forces at the centre, zero at first: "up" has no gradient there without smoothing. Half of
+    the squares of position, velocity and angular velocity, a quarter of that for the rotation vector, and 1e-2 per N^2;
+    the full state at the end is a constraint.
+    """
+    shifts = {"right": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
+    if goal not in shifts:
+        raise ValueError(f'problems.block(goal=...): expected "right" or "up", got {goal!r}')
+    sim = Simulator(models.block(friction=friction, **model), time_step=0.1, kappa=PLANNED)
+    start = sim.neutral()
+    target = start.copy()
+    target[:3] += shifts[goal]
+    weight = np.array([1.0] * 3 + [0.25] * 3 + [1.0] * 6)
+    terms = (Tracking(target, weight, scale=0.5), Effort(1e-2, scale=0.5))
+    return Problem(sim, start, 10, cost=terms, constraints=[Goal(target)])
+
+
+def swingup(name: str = "cartpole") -> Problem:
+    """Pendulum, cart-pole or acrobot from hanging at rest to upright at rest, which is a constraint.
+
+    pendulum: 51 states, 50 ms, |torque| <= 200 N m, weights .1 and .01. cartpole: 26 states, 100 ms, .1 and .001.
+    acrobot: 51 states, 100 ms, .1 on the velocities and .1 on the torque.
+    """
+    weight: ArrayLike
+    if name == "pendulum":
+        sim, horizon, upright = Simulator(models.pendulum(damper=1.0), time_step=0.05), 50, [np.pi]
+        weight, effort, limits = 0.1, 0.01, (-200.0, 200.0)
+    elif name == "cartpole":
+        sim, horizon, upright = Simulator(models.cartpole(), time_step=0.1), 25, [0.0, np.pi]
+        weight, effort, limits = 0.1, 1e-3, None
+    elif name == "acrobot":
+        sim, horizon, upright = Simulator(models.acrobot(), time_step=0.1), 50, [np.pi, 0.0]
+        weight, effort, limits = np.array([0.0, 0.0, 0.1, 0.1]), 0.1, None
+    else:
+        raise ValueError(f'problems.swingup(name): expected "pendulum", "cartpole" or "acrobot", got {name!r}')
+    target = np.concatenate([upright, np.zeros(sim.nv)])
+    ramp = np.linspace(1.0, 0.0, horizon)[:, None] * 1e-2  # hanging still is a stationary point: leave it
+    return Problem(
+        sim,
+        np.zeros(sim.nx),
+        horizon,
+        cost=[Tracking(target, weight), Effort(effort)],
+        constraints=[Goal(target)],
+        control_limits=limits,
+        controls0=np.broadcast_to(ramp, (horizon, sim.nu)).copy(),
+    )

@@ -1,0 +1,84 @@
+"""Leaps: problems of a quadruped that jumps with no gait to follow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt import models
+from dojo_opt.constraint import Goal
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from dojo_opt.problems.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["leap"]
+
+
+def leap(
+    *,
+    distance: float = 0.3,
+    height: float = 0.2,
+    duration: float = 1.0,
+    crouch: float = 0.1,
+    damping: float = 0.5,
+    time_step: float = 0.02,
+    refinement: int = 5,
+    **model: Any,
+) -> Problem:
+    """The quadruped gets `distance` [m] ahead from rest, its base rising by `height` [m]: no gait, no contact sequence.
+
+    As in `hop`, the cost asks for a few poses: for a fifth of `duration` [s] the standing one lowered by `crouch` [m],
+    for two fifths that half-way to the goal, `height` up, then that at the goal. Squares of place weigh 1, 1, 20,
+    attitude 2, angles .05 per second, the rest as in `follow`, and the pose of the base at the end is a constraint. The
+    guess is a robot that stands still, at the smoothing of the planner's first stage: states and torques. Its torques
+    alone are no guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
+
+    Legs that push from where they stand reach their torque limits below .27 m: hence the crouch, which no planner finds
+    from a goal that is up. `ilqr` ends with every step cut into `refinement`, since most leaps planned with steps of
+    20 ms stumble at their landing in shorter ones, and there the height is a constraint, too: half-way between the
+    crouch and the landing the base is that much higher than at first, or the plan is no success. With refinement=1, the
+    height is asked for and missed by up to some centimetres.
+    """
+    call = "problems.leap"
+    distance = checks.number(f"{call}(distance=...)", distance)
+    height = checks.number(f"{call}(height=...)", height)
+    duration = checks.number(f"{call}(duration=...)", duration, above=0.0)
+    crouch = checks.number(f"{call}(crouch=...)", crouch, at_least=0.0)
+    step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
+    refinement = whole_number(f"{call}(refinement=...)", refinement)
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
+    start, _ = equilibrium(sim)
+    still, torques = standing(sim)
+    low, apex, goal = (_moved(start, *by) for by in ((0.0, -crouch), (0.5 * distance, height), (distance, 0.0)))
+    horizon = max(5, round(duration / step))
+    down, up = round(0.2 * horizon), round(0.4 * horizon)
+    poses = np.array([low] * down + [apex] * up + [goal] * (horizon + 1 - down - up))
+    problem = Problem(
+        sim,
+        start,
+        horizon,
+        cost=[Tracking(poses, step * weights(sim, (1.0, 1.0, 20.0), 2.0, 0.05)), Effort(step * EFFORT)],
+        constraints=[Goal(goal, components=np.arange(6))],
+        control_limits=(-TORQUE_LIMIT, TORQUE_LIMIT),
+        controls0=torques,
+        states0=np.tile(still, (horizon + 1, 1)),
+    )
+    problem.refinement = refinement
+    problem.refined_constraints = (Goal(apex, components=[2], knots=down + up // 2),)
+    return problem
+
+
+def _moved(x: Array, ahead: float, up: float) -> Array:
+    """The state (nx,) with the base so far [m] ahead and up."""
+    out = x.copy()
+    out[[0, 2]] += ahead, up
+    return out

@@ -1,0 +1,210 @@
+"""Problems of a quadruped: follow a reference gait, and arrive where it arrives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt import gaits, models
+from dojo_opt.constraint import Goal, Periodic
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.gait import Gait
+from dojo_opt.planning.options import CONTINUATION, PLANNED
+from dojo_opt.planning.problem import Problem
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["bound", "follow", "jump", "pace", "trot", "turn", "walk"]
+
+TORQUE_LIMIT = 33.5  # of every hinge of the A1 [N m]
+# weights of squares per second: base place (x, y, z), its rotation vector, angles, base velocities, joint rates
+PLACE, ATTITUDE, ANGLE, VELOCITY, RATE = (0.3, 0.05, 0.05), 0.01, 0.2, 0.01, 0.001
+EFFORT = 2.5e-5  # per second and (N m)^2
+# feet FR, FL, RR, RL of the trot of Dojo's examples, from the centre of mass of the trunk [m]
+TROT_FOOTHOLDS = ((0.19, -0.13205), (0.19, 0.13205), (-0.27, -0.13205), (-0.27, 0.13205))
+
+
+def follow(
+    gait: Gait,
+    *,
+    guess: str = "reference",
+    substeps: int = 1,
+    control_limits: Any = None,
+    place: ArrayLike = PLACE,
+    attitude: float = ATTITUDE,
+    effort: float = EFFORT,
+    periodic: bool = False,
+) -> Problem:
+    """Follow a gait, and have the base where the gait has it at the end: place and attitude are constraints.
+
+    A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
+    torques by inverse dynamics, whose gaps are closed on the way; "standing" from nothing but a robot that stands
+    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
+    squares: place [1/m^2] along x, y, z, attitude [1/rad^2] and effort [1/(N m)^2]; angles weigh .2, velocities of the
+    base .01, joint rates .001.
+
+    periodic: instead of a start at the first state of the gait and a goal, the start is free, but for its place along x
+    and y and its heading, and the end has to be the start, moved on as the gait moves on. The plan's gains are periodic
+    then, and `plan.repeated(5)` walks on with them.
+    """
+    sim = gait.simulator
+    checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
+    substeps = whole_number("problems.follow(substeps=...)", substeps)
+    if (len(gait.x) - 1) % substeps:
+        raise ValueError(f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are no multiple of {substeps}")
+    reference = gait.x[::substeps]
+    horizon = len(reference) - 1
+    knot = sim.time_step * substeps
+    if guess == "reference":
+        states, controls = reference, gait.torques().reshape(horizon, substeps, sim.nu).mean(axis=1)
+    else:
+        still, torques = standing(sim, gait.foot_names)
+        states, controls = np.tile(still, (horizon + 1, 1)), np.tile(torques, (horizon, 1))
+    if control_limits is not None:
+        controls = np.clip(controls, *control_limits)
+    constraint: Any = Goal(reference[-1], components=np.arange(6))
+    if periodic:
+        constraint = Periodic(_stride(sim, reference))
+    return Problem(
+        sim,
+        reference[0],
+        horizon,
+        cost=[Tracking(reference, knot * weights(sim, place, attitude, ANGLE)), Effort(knot * effort)],
+        constraints=[constraint],
+        free_start=np.setdiff1d(np.arange(sim.ndx), [0, 1, 5]) if periodic else None,
+        control_limits=control_limits,
+        substeps=substeps,
+        controls0=controls,
+        states0=states,
+    )
+
+
+def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> Array:
+    """(ndx,) weights of squares: base place and attitude, joint angles, then their velocities."""
+    legs = sim.nv - 6
+    pose = [np.broadcast_to(place, 3), np.full(3, attitude), np.full(legs, angle)]
+    return np.concatenate([*pose, np.full(6, VELOCITY), np.full(legs, RATE)])
+
+
+def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Array, Array]:
+    """State and torques of a robot that stands on its feet at the smoothing a planner begins with."""
+    on_feet = replace(sim.mechanism, contacts=Feet(sim, feet).contacts)
+    return equilibrium(sim.replace(mechanism=on_feet, kappa=CONTINUATION[0].kappa_eval))
+
+
+def _stride(sim: Simulator, reference: Array) -> Array:
+    """(ndx,) displacement of the reference over its period: a translation of the base."""
+    stride = sim.difference(reference[-1], reference[0])
+    if np.abs(stride[2:]).max() > 1e-6:
+        raise ValueError(
+            "problems.follow(periodic=True): expected a gait that ends as it began but for its place, in whole periods "
+            f"and without turning, got a largest difference of {np.abs(stride[2:]).max():.3g}"
+        )
+    stride[2:] = 0.0
+    return np.asarray(stride)
+
+
+def trot(
+    *,
+    speed: float = 0.2,
+    damping: float = 0.5,
+    step_height: float = 0.025,
+    height: float | None = 0.29,
+    footholds: ArrayLike | None = TROT_FOOTHOLDS,
+    time_step: float = 0.05,
+    **settings: Any,
+) -> Problem:
+    """A quadruped of the A1's size trots at `speed` [m/s] for two periods of one second, 40 knots of 50 ms.
+
+    A plan with periodic=True is one period long, unless it is given `cycles`.
+    By default the reference of Dojo's quadruped example, with its weights (impulses .01 per (N m s)^2), its friction of
+    .8 and less damping in the joints (5 N m s/rad there, .5 here, where the robot falls over by itself). The pose of
+    the base at the end is a constraint, torques are limited to 33.5 N m. speed=0 trots on the spot.
+
+    settings: of `gaits.trot` (period, duty, cycles, heading_rate, ...), of `follow` (guess, ...), friction.
+    """
+    return _quadruped(
+        gaits.trot,
+        time_step,
+        damping,
+        settings,
+        speed=speed,
+        step_height=step_height,
+        height=height,
+        footholds=footholds,
+    )
+
+
+def turn(*, heading_rate: float = 0.5, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
+    """The quadruped turns on the spot at `heading_rate` [rad/s], trotting; settings as for `trot`."""
+    return _quadruped(gaits.turn, time_step, damping, settings, heading_rate=heading_rate)
+
+
+def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
+    """The quadruped paces at `speed` [m/s], both feet of a side together; settings as for `trot`."""
+    return _quadruped(gaits.pace, time_step, damping, settings, speed=speed)
+
+
+def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, **settings: Any) -> Problem:
+    """The quadruped walks at `speed` [m/s], one foot after the other; settings as for `trot`."""
+    return _quadruped(gaits.walk, time_step, damping, settings, speed=speed)
+
+
+def bound(
+    *, speed: float = 0.5, damping: float = 0.5, step_height: float = 0.08, time_step: float = 0.02, **settings: Any
+) -> Problem:
+    """The quadruped bounds at `speed` [m/s]: hind feet, flight, front feet, flight; settings as for `trot`.
+
+    A foot that swings by less than the default `step_height` [m] is so low at the beginning and the end of its swing
+    that plans drag it instead of flying.
+    """
+    return _quadruped(gaits.bound, time_step, damping, settings, speed=speed, step_height=step_height)
+
+
+def jump(
+    *,
+    distance: float = 0.3,
+    height: float = 0.2,
+    damping: float = 0.5,
+    time_step: float = 0.02,
+    refinement: int = 5,
+    **settings: Any,
+) -> Problem:
+    """The quadruped jumps `distance` [m] forward, its base rising by `height` [m]: standing, flight, standing.
+
+    settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction. Jumps planned with steps of
+    20 ms land up to 72 mm off at 1 ms, those up and backwards worst. As for `leap`, `ilqr` therefore ends with every
+    step cut into `refinement`, and they land within 4 mm. There the height is a constraint, at the top of the gait.
+    """
+    problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+    tracking = problem.specs[0][0]
+    assert isinstance(tracking, Tracking)
+    path = np.asarray(tracking.reference)
+    top = int(path[:, 2].argmax())
+    problem.refinement = whole_number("problems.jump(refinement=...)", refinement)
+    problem.refined_constraints = (Goal(path[top], components=[2], knots=top),)
+    return problem
+
+
+_FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
+
+
+def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, Any], **keywords: Any) -> Problem:
+    """The problem to follow a gait of the quadruped; `settings` are shared out between the model, gait and problem."""
+    follows: dict[str, Any] = {"control_limits": (-TORQUE_LIMIT, TORQUE_LIMIT)}
+    follows |= {key: settings[key] for key in _FOLLOW if key in settings}
+    rest = {key: value for key, value in settings.items() if key not in (*_FOLLOW, "friction", "contacts")}
+    model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
+    if follows.get("periodic") and gait is not gaits.jump:
+        rest.setdefault("cycles", 1)
+    h = time_step / whole_number("problems.follow(substeps=...)", follows.get("substeps", 1))
+    sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
+    return follow(gait(sim, **keywords, **rest), **follows)

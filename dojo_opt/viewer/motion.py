@@ -1,0 +1,75 @@
+"""Motion: a trajectory or a plan in world coordinates, for plots and the viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.shapes import rotation_matrix
+from sim.simulator.simulator import Simulator
+from solvers.types import Vector
+
+Array = Vector
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of the bodies and forces of the contacts over time."""
+
+    mechanism: Mechanism
+    time: Array  # (T + 1,) [s]
+    x: Array  # (T + 1, nx)
+    u: Array  # (T, nu) [N, N m]
+    position: Array  # (T + 1, nbody, 3) [m]
+    quaternion: Array  # (T + 1, nbody, 4)
+    contact_time: Array  # (N,) end of each simulation step [s]
+    normal_force: Array  # (N, ncontact) mean over the step [N]
+    friction_force: Array  # (N, ncontact) likewise, its size
+
+    __repr__ = brief_repr
+
+    def points(self, body: int, point: Any) -> Array:
+        """Path (T + 1, 3) of a point given in the axes of a body, from its centre of mass [m]."""
+        R = np.array([rotation_matrix(q) for q in self.quaternion[:, body]])
+        return np.asarray(self.position[:, body] + R @ np.asarray(point, dtype=np.float64))
+
+
+def motion(result: Any, simulator: Simulator | None = None) -> Motion:
+    """Motion of a Trajectory, a closed loop, or a plan; the contact forces of a plan come from its steps, solved again.
+
+    simulator: the one the result was made with; only needed for a result that was read from a file.
+    """
+    sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
+    if sim is None:
+        if not hasattr(result, "x") or not hasattr(result, "u"):
+            raise TypeError(f"expected a Trajectory, a Plan or a ClosedLoop to show, got a {type(result).__name__}")
+        raise ValueError(f"this {type(result).__name__} does not know its simulator; give simulator=...")
+    x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
+    substeps = getattr(result, "substeps", 1)
+    known = getattr(result, "contacts", None)  # a plan has none
+    if known is None:
+        normal, friction = _contact_forces(sim, x, u, substeps)
+    else:
+        normal, friction = known.normal_force, known.friction_force
+    z = sim.maximal(x)
+    return Motion(
+        mechanism=sim.mechanism,
+        time=sim.time_step * substeps * np.arange(len(x), dtype=np.float64),
+        x=x,
+        u=u,
+        position=z[:, :, 0:3],
+        quaternion=z[:, :, 6:10],
+        contact_time=sim.time_step * np.arange(1, len(normal) + 1, dtype=np.float64),
+        normal_force=normal,
+        friction_force=friction,
+    )
+
+
+def _contact_forces(sim: Simulator, x: Array, u: Array, substeps: int) -> tuple[Array, Array]:
+    """Mean normal and friction force of every simulation step; a knot spans `substeps` of them."""
+    knots = [sim.rollout(x[t], np.tile(u[t], (substeps, 1)), throw=True).contacts for t in range(len(u))]
+    return np.concatenate([c.normal_force for c in knots]), np.concatenate([c.friction_force for c in knots])

@@ -1,0 +1,96 @@
+"""`dojo-opt show`: the parts of a model or a file, and its motion under gravity."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import dojo_opt as dojo
+from sim.mechanism import checks
+from sim.mechanism.checks import nearest
+
+__all__ = ["add_show", "show"]
+
+
+def add_show(commands: Any) -> None:
+    """The arguments of the command."""
+    what = "Load a model, a URDF or an MJCF file; print what it consists of, let it go, and show the motion."
+    parser = commands.add_parser("show", help="look at a robot: a model, a URDF or an MJCF file", description=what)
+    parser.add_argument("robot", metavar="ROBOT", help="a model that `dojo-opt models` lists, ROBOT.urdf, or ROBOT.xml")
+    parser.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
+    parser.add_argument("--repair", action="store_true", help="replace inertias of ROBOT.urdf that no body can have")
+    parser.add_argument("--seconds", type=float, default=2.0, metavar="S", help="length of the motion, 2 by default")
+    parser.add_argument("--time-step", type=float, default=0.005, metavar="H", help="[s], .005 by default")
+    parser.add_argument("--drop", type=float, default=0.0, metavar="M", help="height that it falls from [m]")
+    parser.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the motion")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
+    parser.add_argument("--json", action="store_true", help="print sizes and motion as JSON, and no text")
+
+
+def load(args: argparse.Namespace) -> dojo.Mechanism:
+    """The mechanism of a file, or of a model by name."""
+    suffix = Path(args.robot).suffix
+    if suffix == ".urdf":
+        return dojo.load_urdf(args.robot, floating=not args.fixed, repair=args.repair)
+    if suffix == ".xml":
+        return dojo.load_mjcf(args.robot)
+    names = dojo.models.__all__
+    if args.robot not in names:
+        close = nearest(args.robot, names) or "; `dojo-opt models` lists them"
+        raise ValueError(f"{args.robot!r} is neither a .urdf nor an .xml file, nor a model{close}")
+    found: dojo.Mechanism = getattr(dojo.models, args.robot)()
+    return found
+
+
+def _numbers(sim: dojo.Simulator, motion: dojo.Trajectory) -> dict[str, Any]:
+    """Sizes of the robot and its motion, as `dojo-opt run --json` has those of a plan."""
+    mechanism = sim.mechanism
+    report = getattr(mechanism, "report", None)  # of files
+    return {
+        "robot": mechanism.name,
+        **{name: getattr(sim, name) for name in ("nbody", "nq", "nv", "nu", "ncontact")},
+        "bodies": list(mechanism.body_names),
+        "joints": list(mechanism.joint_names),
+        "report": None if report is None else str(report),
+        "success": motion.success,
+        "status": int(motion.status),
+        "message": motion.message,
+        "seconds": float(motion.time[-1]),
+        "time": motion.time.tolist(),
+        "x": motion.x.tolist(),
+    }
+
+
+def show(args: argparse.Namespace) -> int:
+    """Print, simulate, draw; returns the exit status."""
+    checks.number("--seconds", args.seconds, above=0.0)
+    checks.number("--drop", args.drop)
+    mechanism = load(args)
+    sim = dojo.Simulator(mechanism, time_step=args.time_step)
+    if not args.json:
+        print(sim.describe())
+        if getattr(mechanism, "report", None) is not None:
+            print(mechanism.report)  # type: ignore[attr-defined]
+    x = sim.neutral()
+    if args.drop and mechanism.joints[0].kind != "floating":
+        raise ValueError(
+            f"--drop is for a floating base, and {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}"
+        )
+    if args.drop:
+        x[2] += args.drop
+    motion = sim.rollout(x, np.zeros((max(1, round(args.seconds / args.time_step)), sim.nu)))
+    if args.out:
+        dojo.plots.trajectory(motion).savefig(args.out, dpi=150)
+    if args.html:
+        dojo.viewer.save_html(motion, args.html)
+    if args.json:
+        print(json.dumps(_numbers(sim, motion)))
+        return 0 if motion.success else 1
+    print(f"let go for {motion.time[-1]:g} s, inputs zero: {motion.message}")
+    for path in filter(None, (args.out, args.html)):
+        print(f"wrote {path}")
+    return 0 if motion.success else 1
