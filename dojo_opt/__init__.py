@@ -130,7 +130,7 @@ _HOME: dict[str, str | None] = {
     "cost": None,
     "equilibrium": "dojo_opt.rest",
     "gaits": None,
-    "ilqr": "dojo_opt.planner",
+    "ilqr": "dojo_opt.planning.ilqr",
     "kernel": "dojo_opt.residual",
     "load_mjcf": "sim.mjcf",
     "load_urdf": "sim.urdf.load",
@@ -152,7 +152,7 @@ if TYPE_CHECKING:
     from dojo_opt.options import Options, Stage
     from dojo_opt.parameter_space import ParameterSpace
     from dojo_opt.plan import Plan
-    from dojo_opt.planner import ilqr
+    from dojo_opt.planning.ilqr import ilqr
     from dojo_opt.plant.disturbances import Disturbances
     from dojo_opt.plant.loop import ClosedLoop, closed_loop
     from dojo_opt.plant.perturbation import Perturbation, Push

@@ -1,4 +1,4 @@
-"""FreeStart: the first state as a decision of its own, and what the end has to do with it."""
+"""Free starts: the first state as a decision of its own, and the gains of a motion that repeats itself."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from numpy.typing import NDArray
 
 from dojo_opt.periodic import PeriodicTerm
 from dojo_opt.problem import Problem
-from solvers.riccati import Quadratic
+from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
+from solvers.status import Status
 
 Array = NDArray[np.float64]
 
 _CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
+_CYCLES = 200  # a trot takes 20
+_TOLERANCE = 1e-8  # change of the value from one cycle to the next, relative to its largest curvature
 _TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
 
 
@@ -104,3 +107,29 @@ class FreeStart:
             d0 += float(first @ r0)
             d1 += float(second @ (r0 * (r0 + 2.0 * rT)))
         return d0, d1
+
+
+def periodic_gains(model: Quadratic) -> Array | None:
+    """K (T, nu, ndx) of the cycle around which `model` is expanded, repeated for ever; None where that has no solution.
+
+    Backward passes over the cycle, each from the value at the start of the one before, until that repeats itself, too.
+    Those of a single cycle look no further than its end: repeated, they let a robot fall that these hold up.
+    Controls at a limit get no feedback.
+    """
+    T, n, m = model.B.shape
+    K, k = np.zeros((T, m, n)), np.zeros((T, m))
+    buffer, free = np.zeros(work_size(n, m)), np.zeros(m, dtype=np.int64)
+    H = model.H.copy()
+    H[T] = 0.0
+    H[T, :n, :n] = model.H[0, :n, :n]
+    cycle = model._replace(g=np.zeros_like(model.g), H=H, gaps=np.zeros_like(model.gaps))
+    V = H[T, :n, :n]
+    for _ in range(_CYCLES):
+        if backward(cycle, Regularization(0.0, 0.0, np.ones(m)), K, k, free, buffer).status != Status.SOLVED:
+            return None
+        before = value_hessian(buffer, n)
+        change = np.abs(before - V).max()
+        V[:] = before
+        if change <= _TOLERANCE * np.abs(V).max():
+            return K
+    return None

@@ -1,8 +1,9 @@
-"""Plan: what `ilqr` returns."""
+"""Plan: the result of `ilqr`, and the history of its iterations."""
 
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.options import Options
 from sim.border import whole
 from sim.brief import brief_table
 from solvers.status import Status
@@ -17,7 +19,7 @@ from solvers.status import Status
 Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
-__all__ = ["Plan"]
+__all__ = ["History", "Plan"]
 
 COLUMNS = ("iter", "cost", "merit", "|grad|", "k_eval", "k_grad", "mu", "alpha", "gap", "viol", "ms")
 HEADER = "{:>4} {:>11} {:>11} {:>8} {:>7} {:>7} {:>7} {:>8} {:>7} {:>7} {:>6}".format(*COLUMNS)
@@ -131,3 +133,54 @@ class Plan:
             penalties = [data[f"penalty_{i}"] for i in range(count)]
             arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data.files}
             return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties)
+
+
+class History:
+    """The record of all iterations of a solve, what is printed of it, and whether the budget is used up."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self.reset()
+
+    def reset(self, began: float | None = None) -> None:
+        """Forget the last solve and start the clock; began: `time.perf_counter()` when it was started elsewhere."""
+        self._tick = time.perf_counter()
+        self.began = self._tick if began is None else began
+        self.records: list[dict[str, Any]] = []
+        self._note = ""
+        self._headed = False
+
+    def budget(self) -> Status:
+        """SOLVED while there is some left."""
+        if len(self.records) >= self._options.max_iterations:
+            return Status.MAX_ITERATIONS
+        if time.perf_counter() - self.began >= self._options.time_limit:
+            return Status.TIME_LIMIT
+        return Status.SOLVED
+
+    def note(self, text: str) -> None:
+        """Put a line of text into the table, before the next iteration."""
+        self._note = text
+        self._say(f"     {text}")
+
+    def _say(self, line: str) -> None:
+        """Print a line of the table, the first one below the header."""
+        if not self._headed:
+            self._options.say(HEADER)
+        self._headed = True
+        self._options.say(line)
+
+    def add(self, **record: Any) -> bool:
+        """Record an iteration, print it, call back; True when the callback wants to stop."""
+        tock = time.perf_counter()
+        record = {"iteration": len(self.records) + 1, **record, "milliseconds": 1e3 * (tock - self._tick)}
+        self._tick = tock
+        self._say(table_line(record))
+        self.records.append(record | {"note": self._note} if self._note else record)
+        self._note = ""
+        if self._options.callback is not None:
+            try:
+                self._options.callback(record)
+            except StopIteration:
+                return True
+        return False

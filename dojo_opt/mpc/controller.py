@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.line_search import Iterate
 from dojo_opt.mpc.delay import Delay
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.mpc.horizon import shift_multipliers, tail, with_own_terms
@@ -18,7 +17,7 @@ from dojo_opt.mpc.moving import References
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.tick import Settings, Tick
 from dojo_opt.plan import Plan
-from dojo_opt.planner import Solver
+from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.study import Sampler, Study, monte_carlo
 from dojo_opt.problem import Problem
@@ -98,8 +97,7 @@ class MPC:
         self._due = -np.inf
         self.problem.start = self.start.copy()
         self._ground.forget()
-        self._solver.descent.reset()
-        self._solver.objective.reset()
+        self._solver.reset()
 
     def __call__(self, time: float, x: ArrayLike) -> Vector:
         """Input (nu,) [N, N m] for the measured state x (nx,) at `time` [s]; with a `delay`, that for time + delay."""
@@ -138,7 +136,7 @@ class MPC:
         shape = (self.problem.horizon, self.sim.nu)
         if plan.u.shape != shape:
             raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")
-        self._solver.objective.reset(plan.multipliers)
+        self._solver.reset(plan.multipliers)
         self.policy = self._policy(now, plan.x, plan.u, plan.K)
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
         self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, plan.x[0])
@@ -147,41 +145,35 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = self._solver.horizon.states("MPC(x)", self._delay.ahead(now, self._measured))
+        start = solver.states("MPC(x)", self._delay.ahead(now, self._measured))
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
         self.references.move(now + self.settings.delay, self._ground.rise)
         shifted = old.shifted(now + self.settings.delay, lambda count: tail(old, self.references, count))
         problem.start = start
-        continuation = solver.continuation
-        continuation.reset()
-        solver.descent.K[:] = shifted.K
-        solver.descent.k.fill(0.0)
         shift_multipliers(problem.constraints, (now - self.log[-1].time) / problem.knot_time)
-        guess, kappa = self._guess(shifted)
+        guess = self._guess(shifted)
         if guess is None:
-            status = Status.SIMULATION_FAILED
-        else:
-            continuation.start(guess, kappa)
-            status = continuation.run(solver.options.stages[0])
-        history = continuation.journal.records
-        alpha = history[-1]["alpha"] if history else 1.0
-        taken = status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT) and self._usable()
-        rolled = not taken and status in (Status.SOLVED, Status.LINE_SEARCH) and self._roll()
-        if taken or rolled:
-            after = continuation.now
-            if taken and after.gaps is None:  # what an inconsistent trajectory violates says little
-                solver.objective.update_multipliers(after.x, after.u)
-            self.policy = self._policy(now, after.x, after.u, solver.descent.K.copy())
-        cost = continuation.now.cost if taken or rolled else self.log[-1].cost
-        self._record(now, begin, status, not taken, len(history), cost, alpha, shifted.x[0])
+            self._record(now, begin, Status.SIMULATION_FAILED, True, 0, self.log[-1].cost, 1.0, shifted.x[0])
+            return
+        result = solver.iterate(guess, shifted.K, began=begin[0])
+        after = result.now if self._usable(result) else None
+        if after is not None and after.gaps is None:  # the violations of an inconsistent trajectory say little
+            solver.update_multipliers(after)
+        taken = after is not None
+        if after is None and result.status in (Status.SOLVED, Status.LINE_SEARCH):
+            after = self._rolled(result)
+        if after is not None:
+            self.policy = self._policy(now, after.x, after.u, result.K.copy())
+        cost = self.log[-1].cost if after is None else after.cost
+        iterations = len(result.history)
+        self._record(now, begin, result.status, not taken, iterations, cost, result.alpha, shifted.x[0])
 
-    def _roll(self) -> bool:
-        """After a rejected step: roll the shifted plan out with its gains; False when that leads nowhere near it."""
-        continuation = self._solver.continuation
-        before = continuation.now.merit
-        return continuation.roll_with_gains(self.settings.kappa) and continuation.now.merit <= _LOST * before
+    def _rolled(self, result: Iteration) -> Iterate | None:
+        """After a rejected step: the rollout of the shifted plan under its gains, None when it is nowhere near it."""
+        there = self._solver.rollout(result.now, result.K)
+        return there if there is not None and there.merit <= _LOST * result.now.merit else None
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
@@ -189,29 +181,22 @@ class MPC:
         lead = (now, self._measured.state()) if delay else None
         return Policy(self.sim, now + delay, x, u, K, self.problem.substeps, lead)
 
-    def _usable(self) -> bool:
-        """Whether the present iterate is a trajectory of the model, up to what a short step leaves open."""
-        now, history = self._solver.continuation.now, self._solver.continuation.journal.records
-        moved = any(record["alpha"] > 0.0 for record in history)
-        return bool(np.isfinite(now.merit)) and (moved or now.gaps is None)
+    def _usable(self, result: Iteration) -> bool:
+        """Whether the result is a trajectory of the model, up to what a short step leaves open."""
+        ended = result.status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT)
+        return ended and bool(np.isfinite(result.now.merit)) and result.consistent
 
-    def _guess(self, shifted: Policy) -> tuple[Iterate | None, float | None]:
-        """First iterate of a tick, and the smoothing at which its gaps are known to be closed."""
-        solver, kappa = self._solver, self.settings.kappa
+    def _guess(self, shifted: Policy) -> Iterate | None:
+        """First trajectory of a tick: the shifted plan, or the best rollout under its gains or a share of them."""
+        solver = self._solver
         if self.settings.guess == "states":
             xs = shifted.x.copy()
             xs[0] = self.problem.start
-            return Iterate(xs, shifted.u, None, *solver.objective.evaluate(xs, shifted.u)), None
+            return solver.guess(xs, shifted.u)
         scales = _SCALES if self.settings.guess == "feedback" else (0.0,)
-        nominal = Iterate(shifted.x, shifted.u, None, np.inf, np.inf)
-        best = None
-        for scale in scales:
-            shot = solver.line_search.roll(nominal, None, scale * shifted.K, 1.0, kappa)
-            if shot.status == Status.SOLVED:
-                trial = solver.line_search.accept(shot, None)
-                if best is None or trial.merit < best.merit:
-                    best = trial
-        return best, kappa
+        nominal = Iterate(shifted.x, shifted.u)
+        shots = (solver.rollout(nominal, scale * shifted.K) for scale in scales)
+        return min((shot for shot in shots if shot is not None), key=lambda shot: shot.merit, default=None)
 
     def _record(
         self,

@@ -7,11 +7,11 @@ from scipy.linalg import solve_discrete_are
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.cycle import periodic_gains
+from dojo_opt.free_start import periodic_gains
 from dojo_opt.options import Stage
 from dojo_opt.periodic import Periodic
 from dojo_opt.plan import Plan
-from dojo_opt.planner import ilqr
+from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.problem import Problem
 from solvers.riccati import Quadratic
 

@@ -9,7 +9,7 @@ from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.options import Stage
 from dojo_opt.periodic import Periodic
-from dojo_opt.planner import ilqr
+from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.problem import Problem
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)

@@ -13,7 +13,7 @@ from dojo_opt.constraint import ControlBounds, Goal, StateBounds
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.options import Options
 from dojo_opt.plan import Plan
-from dojo_opt.planner import Solver, ilqr
+from dojo_opt.planning.ilqr import Solver, ilqr
 from dojo_opt.problem import Problem
 from dojo_opt.problems import hop
 from solvers.status import Status
@@ -205,7 +205,7 @@ def test_penalties_are_in_units_of_the_cost():
         DoubleIntegrator(), [1.0, 0.0], 5, cost=[Tracking(np.zeros(2), [2.0, 0.0])], constraints=[Goal([0.0, 0.0])]
     )
     solver = Solver(problem, Options(penalty=10.0))
-    solver.objective.reset()
+    solver.reset()
     # half the penalty: 10 times the curvature 4 of the position; the velocity has no weight and takes the largest
     np.testing.assert_allclose(problem.constraints[0].weight, [[20.0, 20.0]])
 

@@ -7,7 +7,7 @@ from small_problems import gaps, lqr, swingup
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.options import Options
-from dojo_opt.planner import Solver, ilqr
+from dojo_opt.planning.ilqr import Solver, ilqr
 from dojo_opt.problem import Problem
 from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
@@ -134,11 +134,12 @@ def test_derivatives_that_cannot_be_had_are_said():
     assert "Derivatives at knot 4, NO_PROGRESS: " + MESSAGES[Status.NO_PROGRESS] in plan.message
 
 
-def test_a_box_qp_that_does_not_end():
-    solver = Solver(lqr(), Options())
-    solver.solve()
-    assert solver.descent.fault(Promise(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0), solver.continuation.now) == 1
-    assert "quadratic program of the control limits, at knot 3" in solver.descent.detail
+def test_a_box_qp_that_does_not_end(monkeypatch):
+    unfinished = Promise(Status.MAX_ITERATIONS, 3, 0.0, 0.0, 0.0)
+    monkeypatch.setattr("dojo_opt.planning.ilqr.backward", lambda *arguments: unfinished)
+    plan = ilqr(lqr())
+    assert plan.status == Status.MAX_ITERATIONS
+    assert "quadratic program of the control limits, at knot 3" in plan.message
 
 
 def test_gains_of_a_plan_have_no_more_regularization_than_they_need():
@@ -151,7 +152,7 @@ def test_gains_of_a_plan_have_no_more_regularization_than_they_need():
     solver = Solver(problem, Options(regularization=1e3, max_iterations=1))
     concave = solver.solve()
     assert concave.history[-1]["mu"] == 1e3
-    assert 1.0 <= solver.descent.mu <= 4.0
+    assert 1.0 <= solver.regularization <= 4.0
     assert np.all(np.isfinite(concave.K)) and np.abs(concave.K).max() > 0.0
 
 

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from doubles import Pendulum, SmoothedWall
+from doubles import DoubleIntegrator, Pendulum, SmoothedWall
 from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.options import Options, Stage
-from dojo_opt.planner import Solver, ilqr
+from dojo_opt.planning.ilqr import Iterate, Solver, ilqr
+from dojo_opt.planning.ilqr_search import Direction, Search
 from dojo_opt.problem import Problem
-from dojo_opt.shooting import Shooting
+from solvers.riccati import Promise
 from solvers.status import Status
 
 
@@ -27,17 +28,18 @@ def test_continuation_ends_at_the_hard_wall(reopen):
     assert used == sorted(used, reverse=True) and used[-1][0] == 1e-6
 
 
+def entered(problem, now, stage):
+    """A trajectory after its passage to a stage, before its first iteration."""
+    return Solver(problem, Options(stages=(stage._replace(iterations=0),), reopen="gaps")).iterate(now).now
+
+
 def test_gaps_reopen_when_kappa_changes():
     problem = Problem(SmoothedWall(), [1.0, 0.0], 20, cost=[Tracking([-1.0, 0.0], 1.0), Effort(0.01)])
-    solver = Solver(problem, Options(stages=(Stage(1.0, 1.0), Stage(1e-4, 1e-4)), reopen="gaps"))
-    solver.objective.reset()
-    solver.descent.reset()
-    solver._guess(None, None)
-    solver.continuation.run(solver.options.stages[0])
-    before = solver.continuation.now
-    assert before.gaps is None
-    solver.continuation._enter(solver.options.stages[1])
-    now = solver.continuation.now
+    solver = Solver(problem, Options(stages=(Stage(1.0, 1.0),)))
+    result = solver.iterate(solver.rollout(Iterate(np.tile(problem.start, (21, 1)), problem.controls0)))
+    before = result.now
+    assert result.success and result.history and before.gaps is None
+    now = entered(problem, before, Stage(1e-4, 1e-4))
     np.testing.assert_array_equal(now.x, before.x)  # states and merit are kept, the mismatch is in the gaps
     assert now.merit == before.merit and now.gap > 1e-3
     for t in range(20):
@@ -45,21 +47,42 @@ def test_gaps_reopen_when_kappa_changes():
         np.testing.assert_allclose(now.gaps[t + 1], following - now.x[t + 1], atol=1e-12)
 
 
-def test_partial_steps_leave_the_rest_of_the_gaps():
+def test_partial_steps_leave_the_rest_of_the_gaps(rng):
     problem = swingup()
-    solver = Solver(problem, Options(stages=ONE_STAGE))
-    solver.objective.reset()
-    solver.descent.reset()
+    solver = Solver(problem)
     states = np.linspace([0.0, 0.0], [np.pi, 0.0], 31)
-    solver._guess(None, states)
-    solver.continuation._enter(ONE_STAGE[0])
-    now = solver.continuation.now
-    solver.descent.linearize(now, 1e-4, 1e-4)
-    solver.descent.gains(now)
-    shot = solver.line_search.roll(now, solver.descent.k, solver.descent.K, 0.25, 1e-4)
+    now = entered(problem, solver.guess(states, problem.controls0), ONE_STAGE[0])
+    k, K = rng.standard_normal((30, 1)), rng.standard_normal((30, 1, 2))
+    horizon = problem.sim.horizon(problem.horizon, problem.substeps, problem.control_limits)
+    search = Search(problem, horizon, solver.objective, solver.options)
+    linear = horizon.linearize(now.x, now.u, 1e-4)
+    shot = search.rollout(now, K, 1e-4, Direction(k, K, None, linear, Promise(Status.SOLVED, 0, 0.0, 0.0, 0.0)), 0.25)
+    assert now.gap > 1e-2
     for t in range(30):
         following = problem.sim.advance(shot.x[t], shot.u[t], 1, 1e-4)
         np.testing.assert_allclose(following - shot.x[t + 1], 0.75 * now.gaps[t + 1], atol=1e-12)
+
+
+def test_iterations_one_by_one_are_those_of_a_solve():
+    """Gains and regularisation carry over from one call to the next."""
+    problem, (stage,) = swingup(), ONE_STAGE
+    plan = ilqr(problem, stages=ONE_STAGE)
+    solver = Solver(problem, Options(stages=(stage._replace(iterations=1),)))
+    now = solver.rollout(Iterate(np.tile(problem.start, (31, 1)), problem.controls0))
+    steps = [solver.iterate(now)]
+    while steps[-1].history:
+        steps.append(solver.iterate(steps[-1].now))
+    assert [s.alpha for s in steps[:-1]] == [r["alpha"] for r in plan.history]
+    np.testing.assert_array_equal(steps[-1].now.x, plan.x)
+    assert steps[-1].success and steps[-1].consistent and steps[-1].now.cost == plan.fun
+
+
+def test_an_iteration_keeps_a_guess_that_no_step_improves():
+    problem, (stage,) = swingup(Stuck()), ONE_STAGE
+    solver = Solver(problem, Options(stages=(stage._replace(iterations=1),), shooting=0.0))
+    result = solver.iterate(solver.guess(np.linspace([0.0, 0.0], [np.pi, 0.0], 31), problem.controls0))
+    assert result.alpha == 0.0 and not result.consistent and result.now.gap > 0.0
+    assert solver.rollout(result.now, result.K) is None
 
 
 def test_a_good_guess_of_states_skips_the_smooth_stages():
@@ -73,27 +96,6 @@ def test_a_good_guess_of_states_skips_the_smooth_stages():
     assert again.success and poor.success
 
 
-def test_a_step_of_all_states_solves_a_linear_problem():
-    problem = lqr()
-    solver = Solver(problem, Options(stages=ONE_STAGE))
-    solver.solve()  # makes buffers belong to the problem
-    solver.continuation.reset()
-    solver.descent.reset()
-    solver._guess(None, np.zeros_like(solver.continuation.now.x))
-    solver.continuation._enter(ONE_STAGE[0])
-    now = solver.continuation.now
-    assert now.gaps is not None
-    solver.descent.linearize(now, 1e-4, 1e-4)
-    promise = solver.descent.gains(now)
-    shooting = Shooting(problem, solver.horizon, solver.objective, solver.options)
-    alpha, there, linear = shooting.search(
-        now, promise, solver.descent.linear, (solver.descent.k, solver.descent.K, None), 1e-4
-    )
-    assert alpha == 1.0 and there.gap < 1e-9
-    np.testing.assert_allclose(there.x, ilqr(problem).x, atol=1e-7)
-    np.testing.assert_allclose(linear.x_next, there.x[1:], atol=1e-9)
-
-
 class Lost(Pendulum):
     """Its rollouts fail, the first so many of them."""
 
@@ -103,6 +105,28 @@ class Lost(Pendulum):
         self.lost -= 1
         shot = super().closed_loop(x0, us, *rest)
         return shot if self.lost < 0 else shot._replace(status=Status.MAX_ITERATIONS)
+
+
+class Stuck(Lost):
+    """All of its rollouts fail."""
+
+    lost = 10**9
+
+
+class StuckIntegrator(Stuck, DoubleIntegrator):
+    """The same of a linear system."""
+
+    move = DoubleIntegrator.move
+
+
+def test_a_step_of_all_states_solves_a_linear_problem():
+    exact, problem, (stage,) = ilqr(lqr()), lqr(), ONE_STAGE
+    problem.sim = StuckIntegrator()
+    solver = Solver(problem, Options(stages=(stage._replace(iterations=1),)))
+    guess = solver.guess(np.zeros_like(exact.x), problem.controls0)
+    result = solver.iterate(guess._replace(x=np.concatenate([[problem.start], guess.x[1:]])))
+    assert result.alpha == 1.0 and result.now.gap < 1e-9
+    np.testing.assert_allclose(result.now.x, exact.x, atol=1e-7)
 
 
 def test_steps_of_all_states_are_taken_where_rollouts_are_lost():

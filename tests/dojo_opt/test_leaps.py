@@ -5,7 +5,7 @@ import pytest
 from planned_legs import lands, lowest_foot
 
 from dojo_opt import problems
-from dojo_opt.planner import ilqr
+from dojo_opt.planning.ilqr import ilqr
 
 
 @pytest.mark.parametrize(

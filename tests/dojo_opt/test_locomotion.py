@@ -7,7 +7,7 @@ from planned_legs import check, lands, lowest_foot, upright
 from dojo_opt import gaits, models, plots, problems
 from dojo_opt.feet import Feet
 from dojo_opt.motion import motion
-from dojo_opt.planner import ilqr
+from dojo_opt.planning.ilqr import ilqr
 from sim.simulator import Simulator
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dojo_opt import problems
-from dojo_opt.planner import ilqr
+from dojo_opt.planning.ilqr import ilqr
 
 pytestmark = pytest.mark.slow
 

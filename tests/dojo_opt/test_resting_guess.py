@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.attempt import FAILED
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.planner import Solver
+from dojo_opt.planning.ilqr import FAILED, Solver
 from solvers.status import Status
 
 

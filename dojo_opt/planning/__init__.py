@@ -1,0 +1,1 @@
+"""Planning: a problem as arrays, and iLQR, which solves it."""

@@ -1,0 +1,764 @@
+"""`ilqr`: iterative LQR with gaps, single and multiple shooting in one code path, through contact that hardens.
+
+Read from top to bottom: a solve makes attempts from a guess; an attempt goes through stages of falling smoothing; a
+stage iterates. One iteration differentiates the time steps along the trajectory, solves the linear-quadratic problem
+around it, and searches along the result:
+
+    ilqr -> Solver.solve -> _attempts -> _descend -> _stage -> _iterate -> _linearize, _gains, _step
+
+`Solver.iterate` is the last part of it alone, for MPC. The derivations are in docs/theory/ilqr.md.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.free_start import FreeStart, periodic_gains
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options, Stage
+from dojo_opt.plan import History, Plan
+from dojo_opt.planning.ilqr_search import Direction, Iterate, Search
+from dojo_opt.problem import Problem
+from sim import checks
+from sim.results import Interrupted
+from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
+from solvers.status import MESSAGES, Status
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+__all__ = ["Iteration", "Iterate", "Solver", "ilqr"]
+
+# ends of an attempt after which another first stage may lead further; all others end the solve
+FAILED = (
+    Status.SIMULATION_FAILED,
+    Status.INFEASIBLE,
+    Status.LINE_SEARCH,
+    Status.MAX_REGULARIZATION,
+    Status.NOT_FINITE,
+)
+
+# attempts and stages
+_GOOD_FIT = 2.0  # times the least sum of squared gaps: a guess fits a smoother stage nearly as well
+_REST = 1e-9  # [m, rad] largest motion from one knot to the next of a joint at rest
+_ASKED = 1e-6  # [m, rad, m/s, rad/s] Newton step above which the objective asks a joint to move
+_LESS = 0.9  # share of the least violation so far that counts as progress
+_STALLED = 5  # multiplier updates of the last stage without progress
+_SOFTEN = 3  # times that a stuck last stage may go back to the one before it
+# one stage
+_GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
+_POOR_STEP = 0.1  # one shorter than this raises it
+_LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
+_SLOW = 2  # short steps in a row with next to no decrease end a stage
+_SLOW_OPEN = 6  # the same with open gaps and a model that promises more: standing still is a poor guess of a trot
+_SHARPER = 0.1  # factor of kappa_grad when its derivatives lead nowhere
+_PATIENCE = 3  # times the rejections allowed where only regularisation is left to try
+_CREEPING = 15  # short or rejected steps in a row: of 116 planned gaits and hops, none takes more than 11
+_FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
+_FALLEN = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
+_SMALL = 1e-9  # merit below which changes are judged absolutely
+# regularisation
+_FACTOR = 2.0  # of the schedule, growing geometrically with repeated use: Tassa 2012, section II.F
+_USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
+
+
+def ilqr(
+    problem: Problem,
+    controls: ArrayLike | None = None,
+    states: ArrayLike | None = None,
+    *,
+    warm_start: Plan | None = None,
+    options: Options | None = None,
+    **settings: Any,
+) -> Plan:
+    """Plan a trajectory.
+
+    A guess of states begins at the stage that it fits best, so that smooth contact does not lead a good one away. A
+    guess in which a joint rests that has to move begins at the smoothest stage. When an attempt fails, the planner
+    begins again at another stage, within `max_iterations`; the table of iterations says so.
+
+    A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones. The plan
+    is then one of the finer problem, and its history is that of both.
+
+    Args:
+        problem: the problem.
+        controls: (T, nu) guess of the inputs [N, N m]; by default that of the problem.
+        states: (T + 1, nx) guess of the states; by default that of the problem, or the rollout of the inputs.
+        warm_start: an earlier plan of the same problem, whose trajectory, multipliers and penalties are taken over. A
+            plan of an easier variant, with more damping, say, often helps where a direct solve fails.
+        options: settings of the planner.
+        **settings: fields of `dojo.Options` by name; they take precedence over `options`.
+
+    Returns:
+        The plan; `success`, `status` and `message` say how the solve ended.
+
+    Raises:
+        TypeError: for an unknown setting, or an argument of the wrong kind.
+        ValueError: for a guess of the wrong shape, or with numbers that are not finite.
+        Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the Plan of the last iteration, INTERRUPTED.
+    """
+    checks.keywords("ilqr(...)", settings, Options.__dataclass_fields__)
+    if options is not None and not isinstance(options, Options):
+        raise TypeError(f"ilqr(options=...): expected Options, got {options!r}")
+    if warm_start is not None and not isinstance(warm_start, Plan):
+        raise TypeError(f"ilqr(warm_start=...): expected a Plan, got {warm_start!r}")
+    options = Options(**settings) if options is None else replace(options, **settings)
+    solver = Solver(problem, options)
+    finer = None if problem.refinement == 1 else problem.refined(problem.refinement)  # refused before any work
+    plan = solver.solve(controls, states, warm_start)
+    if finer is None or not plan.success:
+        return plan
+    options.say(f"Once more, every time step cut into {problem.refinement}:")
+    last = Solver(finer, options).solve(warm_start=plan)
+    history, seconds = plan.history + last.history, plan.seconds + last.seconds
+    both = replace(last, nit=plan.nit + last.nit, history=history, seconds=seconds)
+    options.say(f"{plan.nit} + {last.nit} iterations, {1e3 * seconds:.1f} ms in all")
+    return both
+
+
+class Iteration(NamedTuple):
+    """Result of `Solver.iterate`."""
+
+    status: Status  # SOLVED: as good as the stage asks for, or all its iterations are used; LINE_SEARCH: stuck
+    message: str
+    now: Iterate  # the trajectory that was reached
+    K: Stack  # (T, nu, ndx) gains of the last backward pass
+    k: Matrix  # (T, nu) step that it proposes
+    history: list[dict[str, Any]]  # one record per iteration, as in `Plan.history`
+
+    @property
+    def success(self) -> bool:
+        """Whether the stage was not cut short."""
+        return self.status == Status.SOLVED
+
+    @property
+    def alpha(self) -> float:
+        """Last step size; 0 after a rejected step, 1 when no iteration was needed."""
+        return float(self.history[-1]["alpha"]) if self.history else 1.0
+
+    @property
+    def consistent(self) -> bool:
+        """Whether a step was accepted, or the trajectory has no gaps: not a guess handed back."""
+        return self.now.gaps is None or any(record["alpha"] > 0.0 for record in self.history)
+
+
+class _Damping:
+    """Schedule of the regularisation, in units of the mean control weight."""
+
+    def __init__(self, options: Options) -> None:
+        self._options = options
+        self.reset()
+
+    def reset(self, mu: float | None = None) -> None:
+        """Back to the first value, or to mu."""
+        self.mu = self._options.regularization if mu is None else mu
+        self._growth = 1.0
+
+    def increase(self) -> None:
+        """After a failure: faster with every failure in a row."""
+        self._growth = max(_FACTOR, self._growth * _FACTOR)
+        self.mu = min(max(_USEFUL, self.mu * self._growth), self._options.regularization_max)
+
+    def decrease(self) -> None:
+        """After a good step: faster with every good step in a row."""
+        self._growth = min(1.0 / _FACTOR, self._growth / _FACTOR)
+        self.mu = self.mu * self._growth if self.mu * self._growth >= _USEFUL else 0.0
+
+
+class _Attempt(NamedTuple):
+    """Where an attempt ended, with the gains, multipliers and half penalties that belong to it."""
+
+    status: Status
+    detail: str
+    mismatch: float  # of the constraints; infinite with open gaps or where the simulation failed
+    now: Iterate
+    K: Stack
+    slopes: list[Matrix]
+    weights: list[Matrix]
+
+
+class Solver:
+    """iLQR with its buffers, for problems that are solved again and again from changing starts.
+
+    `solve` plans from a guess to the end. `guess` or `rollout`, and then `iterate`, take single iterations: gains,
+    multipliers and regularisation carry over from one call to the next, until `reset`.
+    """
+
+    now: Iterate  # the present trajectory
+
+    def __init__(self, problem: Problem, options: Options | None = None) -> None:
+        if not isinstance(problem, Problem):
+            raise TypeError(f"ilqr(problem): expected a Problem, got {problem!r}")
+        sim, T = problem.sim, problem.horizon
+        self.problem = problem
+        self.options = Options() if options is None else options
+        self.objective = Objective(problem, self.options)
+        self._horizon = sim.horizon(T, problem.substeps, problem.control_limits)
+        self._search = Search(problem, self._horizon, self.objective, self.options)
+        self._start = None if problem.free_start is None else FreeStart(problem)
+        self._history = History(self.options)
+        self._damping = _Damping(self.options)
+        self._begun = False  # whether `now` belongs to the present solve
+        self._detail = ""  # place and cause of a failure, in addition to the status
+        self._K, self._k = np.zeros((T, sim.nu, sim.ndx)), np.zeros((T, sim.nu))
+        self._linear: Any = None  # derivatives of the dynamics; they belong to `now` when `_expanded_at` is `now`
+        self._expanded_at: Iterate | None = None
+        self._apart: tuple[float, Matrix] | None = None  # another smoothing, and by how much its steps end elsewhere
+        self._unit = np.ones(sim.nu)  # of the regularisation
+        self._free, self._buffer = np.zeros(sim.nu, dtype=np.int64), np.zeros(work_size(sim.ndx, sim.nu))
+        self._no_gaps = np.zeros((T + 1, sim.ndx))
+        self._no_limits = np.full((T, sim.nu), -np.inf), np.full((T, sim.nu), np.inf)
+
+    # ---- single iterations ------------------------------------------------------------------------------------------
+
+    def reset(self, multipliers: Sequence[Matrix] = (), penalties: Sequence[Matrix] = ()) -> None:
+        """Forget gains and regularisation, and start from these multipliers and penalties, or those of the options.
+
+        Args:
+            multipliers: one (m, d) array per constraint, as in `Plan.multipliers`; zero by default.
+            penalties: likewise, as in `Plan.penalties`.
+        """
+        self._damping.reset()
+        self._detail = ""
+        self._K.fill(0.0)
+        self._k.fill(0.0)
+        self.objective.reset(multipliers, penalties)
+
+    @property
+    def regularization(self) -> float:
+        """The present regularisation, in units of the mean control weight."""
+        return self._damping.mu
+
+    def states(self, call: str, xs: ArrayLike) -> Matrix:
+        """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
+        return np.asarray(self._horizon.states(call, xs))
+
+    def guess(self, xs: Matrix, us: Matrix) -> Iterate:
+        """States (T + 1, nx) and inputs (T, nu) to begin with; their gaps are not known yet."""
+        cost, merit = self.objective.evaluate(xs, us)
+        return Iterate(xs, us, cost=cost, merit=merit)
+
+    def rollout(self, now: Iterate, K: Stack | None = None) -> Iterate | None:
+        """The motion from the start of the problem at the first smoothing, under the gains K (T, nu, ndx) around `now`.
+
+        Returns:
+            The motion, without gaps; None when the simulator cannot step it to the end.
+        """
+        kappa = self.options.stages[0].kappa_eval
+        shot = self._search.rollout(now, K, kappa)
+        return self._search.iterate(shot, None, kappa) if shot.status == Status.SOLVED else None
+
+    def iterate(self, now: Iterate, K: Stack | None = None, *, began: float | None = None) -> Iteration:
+        """Iterate from a trajectory as often as the first stage of the options says.
+
+        Args:
+            now: the trajectory, from `guess`, `rollout`, or the iteration before.
+            K: (T, nu, ndx) its gains; by default those of the backward pass before.
+            began: `time.perf_counter()` from which the time limit counts [s]; by default the present.
+
+        Returns:
+            The trajectory that was reached, with its gains. K and k are buffers, overwritten by the next call.
+        """
+        self._history.reset(began)
+        if K is not None:
+            self._K[:] = K
+        self._k.fill(0.0)
+        self._detail = ""
+        self._begin(now)
+        status = self._iterate(self.options.stages[0])
+        message = MESSAGES[status] + ("" if status == Status.SOLVED else self._detail)
+        return Iteration(status, message, self.now, self._K, self._k, self._history.records)
+
+    def update_multipliers(self, now: Iterate) -> None:
+        """Update the multipliers and penalties of the constraints by their violation at `now`."""
+        self.objective.update_multipliers(now.x, now.u)
+
+    # ---- a solve: attempts from a guess -----------------------------------------------------------------------------
+
+    def solve(
+        self, controls: ArrayLike | None = None, states: ArrayLike | None = None, warm_start: Plan | None = None
+    ) -> Plan:
+        """Plan from a guess; see `ilqr` for the arguments."""
+        self._history.reset()
+        self._begun = False
+        try:
+            status, detail = self._solve(controls, states, warm_start)
+            return self._plan(status, detail)
+        except KeyboardInterrupt:
+            raise Interrupted(self._plan(Status.INTERRUPTED, "") if self._begun else None) from None
+
+    def _solve(
+        self, controls: ArrayLike | None, states: ArrayLike | None, warm_start: Plan | None
+    ) -> tuple[Status, str]:
+        """How the solve ended, and where; `now` is the result."""
+        self._forget(warm_start)
+        if warm_start is not None:
+            controls = warm_start.u if controls is None else controls
+            states = warm_start.x if states is None else states
+        problem = self.problem
+        us = problem.controls0 if controls is None else problem.check_controls("ilqr(controls=...)", controls)
+        if problem.control_limits is not None:
+            us = np.clip(us, *problem.control_limits)
+        xs = problem.states0 if states is None and controls is None else states
+        if xs is not None:
+            xs = self.states("ilqr(states=...)", problem.check_states("ilqr(states=...)", xs))
+            self._begin(self.guess(xs, us))
+            return self._attempts(warm_start)
+        idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us)
+        kappa = self.options.stages[0].kappa_eval
+        shot = self._search.rollout(idle, None, kappa)
+        if shot.status != Status.SOLVED:
+            self._begin(idle._replace(kappa=kappa))
+            reason = Status(int(shot.status))
+            return Status.SIMULATION_FAILED, f" Knot {int(shot.knot)}, {reason.name}: {MESSAGES[reason]}"
+        self._begin(self._search.iterate(shot, None, kappa))
+        return self._attempts(warm_start)
+
+    def _forget(self, warm_start: Plan | None) -> None:
+        """Regularisation, gains, multipliers and penalties as before the first iteration."""
+        self.reset() if warm_start is None else self.reset(warm_start.multipliers, warm_start.penalties)
+
+    def _begin(self, now: Iterate) -> None:
+        """Start from another trajectory."""
+        self._search.forget()
+        self._begun = True
+        self.now, self._expanded_at = now, None
+
+    def _attempts(self, warm_start: Plan | None) -> tuple[Status, str]:
+        """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation."""
+        guess = self.now
+        kappas = [f"{stage.kappa_eval:.0e}" for stage in self.options.stages]
+        ends: list[_Attempt] = []
+        for first in self._first_stages():
+            if ends:
+                self._history.note(f"{ends[-1].status.name}; again from the guess, beginning at k_eval {kappas[first]}")
+                self._forget(warm_start)
+                self._begin(guess)
+            elif first:
+                skipped = ", ".join(kappas[:first])
+                self._history.note(f"k_eval {skipped} skipped: the guess of states fits {kappas[first]} best")
+            status = self._descend(first)
+            ends.append(self._ended(status))
+            if status not in FAILED or ends[-1].mismatch <= self.options.violation:
+                return status, "" if status == Status.SOLVED else self._detail
+        best = min(ends, key=lambda end: end.mismatch)
+        if best is not ends[-1]:
+            self._begin(best.now)
+            self._K[:] = best.K
+            for term, slope, weight in zip(self.objective.constraints, best.slopes, best.weights, strict=True):
+                term.slope[:], term.weight[:] = slope, weight
+        return best.status, best.detail
+
+    def _ended(self, status: Status) -> _Attempt:
+        """The present state of the solver."""
+        now, constraints = self.now, self.objective.constraints
+        lost = now.gaps is not None or status == Status.SIMULATION_FAILED or not np.isfinite(now.merit)
+        mismatch = np.inf if lost else self.objective.mismatch(now.x, now.u)
+        slopes, weights = [term.slope.copy() for term in constraints], [term.weight.copy() for term in constraints]
+        return _Attempt(status, self._detail, mismatch, now, self._K.copy(), slopes, weights)
+
+    def _first_stages(self) -> list[int]:
+        """The stages to begin with: one, and then those for when the ones before fail.
+
+        The first is the smoothest down to which a guess of states fits nearly as well as at harder ones. A good
+        reference leaves small gaps at a hard contact and large ones at a smooth one, where contact begins above the
+        ground; smoothing it first would only lead away from it. A poor one fits nowhere, and needs all the stages. So
+        does one in which a joint rests that has to move: it fits a hard contact because nothing happens there, and says
+        nothing of how contact moves that joint, which smooth stages find out.
+        """
+        now, stages = self.now, self.options.stages
+        if now.kappa is not None or len(stages) == 1:
+            return [0]
+        if self._rests(now):
+            return list(range(len(stages)))
+        best, chosen, there = np.inf, 0, None
+        for i in range(len(stages) - 1, -1, -1):
+            linear = self._horizon.linearize(now.x, now.u, stages[i].kappa_eval)
+            misfit = np.inf if np.any(linear.status) else float(np.sum(self._horizon.gaps(linear, now.x) ** 2))
+            if misfit <= _GOOD_FIT * best and misfit < np.inf:
+                chosen, there = i, linear
+            elif best < np.inf:
+                break
+            best = min(best, misfit)
+        if there is not None:
+            self._open_gaps(stages[chosen], there)
+        return [chosen, *range(chosen)]
+
+    def _rests(self, now: Iterate) -> bool:
+        """Whether a joint rests in the states from the second on, though it starts elsewhere or has to move."""
+        sim, objective = self.problem.sim, self.objective
+        start, *_ = steps = np.abs(sim.difference(now.x[1:], now.x[:-1]))[:, : sim.nv]
+        objective.expand(now.x, now.u)
+        gradient = np.abs(objective.g[1:, : sim.ndx])
+        curvature = np.abs(objective.H[1:].diagonal(axis1=1, axis2=2)[:, : sim.ndx])
+        asked = np.any(gradient > _ASKED * curvature, axis=0)
+        asked = asked[: sim.nv] | asked[sim.nv :] | (start > _ASKED)
+        rests = np.all(steps[1:] <= _REST, axis=0)
+        first = 0
+        for joint in sim.mechanism.joints:
+            dofs = slice(first, first := first + joint.nv)
+            if rests[dofs].all() and asked[dofs].any():
+                return True
+        return False
+
+    # ---- an attempt: stages from smooth to hard ---------------------------------------------------------------------
+
+    def _descend(self, first: int) -> Status:
+        """Stages from smooth to hard; after each the multipliers are updated; the last is repeated until they fit.
+
+        Where the last is stuck before they do, larger penalties would only make it stiffer: it is softened again, a
+        few times; after that the attempt ends. It ends, too, when updates in a row do not bring the violation down.
+        """
+        options = self.options
+        last = len(options.stages) - 1
+        index, softened = first, 0
+        least, stalled = np.inf, 0
+        for _ in range(last + options.max_updates + 1):
+            status = self._stage(options.stages[index], options.bisections)
+            if status == Status.SIMULATION_FAILED and index < last:
+                index += 1  # the next stage is another way down
+                continue
+            if status not in (Status.SOLVED, Status.LINE_SEARCH):
+                return status
+            now = self.now
+            if index == last:
+                mismatch = self.objective.mismatch(now.x, now.u)
+                if mismatch <= options.violation and now.gap <= options.gap:
+                    return status
+                stalled = 0 if mismatch < _LESS * least else stalled + 1
+                least = min(least, mismatch)
+                if stalled >= _STALLED:
+                    return Status.INFEASIBLE
+                if status == Status.LINE_SEARCH and last > 0:
+                    if softened >= _SOFTEN:
+                        return status
+                    index, softened = last - 1, softened + 1
+                    continue
+            self.update_multipliers(now)
+            self._reevaluate()
+            index = min(index + 1, last)
+        return Status.INFEASIBLE
+
+    def _reevaluate(self) -> None:
+        """The multipliers have changed: bring the merit and the model of the objective up to date."""
+        fresh = self._expanded_at is self.now
+        cost, merit = self.objective.evaluate(self.now.x, self.now.u)
+        self.now = self.now._replace(cost=cost, merit=merit)
+        if fresh:
+            self._expand(self._linear)
+
+    def _stage(self, stage: Stage, bisections: int) -> Status:
+        """One stage; when the trajectory does not survive the step of kappa, by way of the geometric mean."""
+        kappa = self.now.kappa
+        if self.options.reopen == "feedback" and bisections > 0 and kappa is not None:
+            if not self._follow(stage.kappa_eval):
+                middle = (kappa * stage.kappa_eval) ** 0.5
+                status = self._stage(Stage(middle, max(middle, stage.kappa_grad), stage.decrease), bisections - 1)
+                if status not in (Status.SOLVED, Status.LINE_SEARCH, Status.SIMULATION_FAILED):
+                    return status
+        return self._iterate(stage)
+
+    def _enter(self, stage: Stage) -> Status:
+        """Make the trajectory belong to the smoothing of `stage`: roll out, or keep its states and open the gaps."""
+        now, kappa = self.now, stage.kappa_eval
+        if now.kappa == kappa:
+            return Status.SOLVED
+        if self.options.reopen == "feedback" and now.kappa is not None and self._follow(kappa):
+            return Status.SOLVED
+        linear = self._horizon.linearize(now.x, now.u, kappa)
+        if np.any(linear.status):
+            return Status.SOLVED if self._roll_out(kappa) else Status.SIMULATION_FAILED
+        self._open_gaps(stage, linear)
+        return Status.SOLVED
+
+    def _open_gaps(self, stage: Stage, linear: Any) -> None:
+        """Keep the states at the smoothing of `stage`, where their derivatives are `linear`."""
+        gaps = self._horizon.gaps(linear, self.now.x)
+        closed = float(np.abs(gaps).max()) <= self.options.gap
+        self.now = self.now._replace(gaps=None if closed else gaps, kappa=stage.kappa_eval)
+        if stage.kappa_grad == stage.kappa_eval:
+            self._expand(linear)
+
+    def _roll_out(self, kappa: float) -> bool:
+        """Replace the trajectory by its own closed-loop rollout at `kappa`; False when the simulator cannot."""
+        shot = self._search.rollout(self.now, self._K, kappa)
+        if shot.status == Status.SOLVED:
+            self.now = self._search.iterate(shot, None, kappa)
+        return bool(shot.status == Status.SOLVED)
+
+    def _follow(self, kappa: float) -> bool:
+        """Roll out with the gains at another smoothing; False, and nothing changed, when that loses the trajectory."""
+        before = self.now
+        if kappa == before.kappa:
+            return True
+        if not self._roll_out(kappa):
+            return False
+        if self.now.merit - before.merit <= self.options.follow * abs(before.merit):
+            return True
+        self.now = before
+        return False
+
+    # ---- a stage: iterations at one smoothing -----------------------------------------------------------------------
+
+    def _iterate(self, stage: Stage) -> Status:
+        """Iterate until the stage is done (SOLVED), stuck (LINE_SEARCH), or the whole solve has to end."""
+        status = self._enter(stage)
+        if status != Status.SOLVED:
+            return status
+        rejections, kappa_grad = self.options.rejections, stage.kappa_grad
+        last = stage is self.options.stages[-1]  # it must not leave gaps; others leave them to the stages to come
+        rejected = slow = short = 0
+        self._search.restart()
+        for _ in range(stage.iterations):
+            before = self.now
+            if self._expanded_at is not before and self._linearize(kappa_grad, stage.kappa_eval) != Status.SOLVED:
+                return Status.SIMULATION_FAILED
+            promise, mu = self._gains(), self._damping.mu
+            if promise.status != Status.SOLVED:
+                return self._fault(promise)
+            small = stage.decrease * (abs(before.merit) + _SMALL)
+            promised = -(promise.d0 + 0.5 * promise.d1)
+            if before.gaps is None and mu <= _LIGHT and promised <= small:
+                return Status.SOLVED
+            status = self._history.budget()
+            if status != Status.SOLVED:
+                return status
+            alpha = self._step(promise, stage, kappa_grad)
+            if self._record(promise, stage, kappa_grad, mu, alpha):
+                return Status.STOPPED
+            rejected = 0 if alpha > 0.0 else rejected + 1
+            short = 0 if alpha >= _POOR_STEP else short + 1
+            helped = False
+            if rejected >= rejections:
+                kappa_grad, helped = self._unstick(stage, kappa_grad)
+            patience = _PATIENCE if self.now.gaps is None or last else 1
+            if helped:
+                rejected = 0
+            elif rejected >= patience * rejections or short >= _CREEPING:
+                return Status.LINE_SEARCH
+            if alpha > 0.0:
+                slow = slow + 1 if abs(before.merit - self.now.merit) <= small else 0
+                if slow >= _slow_steps(alpha, before, promised > small):
+                    if self.now.gaps is None or not last:
+                        return Status.SOLVED
+                    self._close_gaps(stage)
+                    slow = 0
+        return Status.SOLVED
+
+    def _step(self, promise: Promise, stage: Stage, kappa_grad: float) -> float:
+        """Search along the gains, and regularise as the step size asks for; the step size, 0 when none is accepted."""
+        before, damping, kappa = self.now, self._damping, stage.kappa_eval
+        start = None if self._start is None else self._start.step
+        direction = Direction(self._k, self._K, start, self._linear, promise)
+        alpha, self.now = self._search.rollouts(before, direction, kappa)
+        linear = None
+        if alpha < self.options.shooting and before.gaps is not None:
+            shot, there, beside = self._search.states(before, direction, kappa)
+            if shot > alpha:
+                alpha, self.now, linear = shot, there, beside
+        if alpha >= _GOOD_STEP:
+            damping.decrease()
+        elif (
+            alpha < _POOR_STEP
+            # while contact is discovered, gaps close only under gains that keep the robot up: at 1e6 none are left
+            and (self.now.gaps is None or damping.mu < _FIRM or stage is self.options.stages[-1])
+        ):
+            damping.increase()
+        if linear is not None and kappa == kappa_grad:
+            self._expand(linear)
+        return alpha
+
+    def _record(self, promise: Promise, stage: Stage, kappa_grad: float, mu: float, alpha: float) -> bool:
+        """Put the iteration into the history; True when the callback wants to stop."""
+        now = self.now
+        return self._history.add(
+            cost=now.cost,
+            merit=now.merit,
+            gradient=promise.gradient,
+            kappa_eval=stage.kappa_eval,
+            kappa_grad=kappa_grad,
+            mu=mu,
+            alpha=alpha,
+            promised=alpha * (promise.d0 + 0.5 * alpha * promise.d1),
+            gap=now.gap,
+            violation=self.objective.violation(now.x, now.u),
+        )
+
+    def _unstick(self, stage: Stage, kappa_grad: float) -> tuple[float, bool]:
+        """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts.
+
+        Returns the smoothing of the derivatives from now on, and whether anything has changed.
+        """
+        if self.now.gaps is not None:
+            return kappa_grad, self._close_gaps(stage)
+        if kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
+            return kappa_grad, False
+        self._damping.reset()
+        self._expanded_at = None
+        return max(_SHARPER * kappa_grad, stage.kappa_eval), True
+
+    def _close_gaps(self, stage: Stage) -> bool:
+        """Close the gaps by a rollout; False where that falls over, but the last stage must not leave gaps."""
+        # gains without the regularisation of the failures, which leads to open-loop rollouts
+        self._damping.reset()
+        before = self.now
+        if self._gains().status != Status.SOLVED or not self._roll_out(stage.kappa_eval):
+            return False
+        if stage is self.options.stages[-1] or self.now.merit <= _FALLEN * before.merit:
+            return True
+        self.now = before
+        return False
+
+    # ---- the linear-quadratic problem around a trajectory -----------------------------------------------------------
+
+    def _linearize(self, kappa: float, kappa_eval: float) -> Status:
+        """Expand dynamics and objective around `now`, at the first smoothing that solves every knot.
+
+        kappa, ten times that, and at last kappa_eval, where the trajectory itself was solved.
+        """
+        now, status, self._detail = self.now, Status.SOLVED, ""
+        for level in (kappa, 10.0 * kappa, kappa_eval):
+            apart, guess = level != kappa_eval, None
+            if apart and self._apart is not None and self._apart[0] == level:
+                guess = now.x[1:] + self._apart[1]  # next states: as far from the trajectory as the last time
+            linear = self._horizon.linearize(now.x, now.u, level, guess)
+            failed = np.flatnonzero(linear.status)
+            if failed.size == 0:
+                if apart:
+                    self._apart = level, linear.x_next - now.x[1:]
+                self._expand(linear)
+                self._detail = ""
+                return Status.SOLVED
+            status = Status(int(linear.status[failed[0]]))
+            self._detail = f" Derivatives at knot {failed[0]}, {status.name}: {MESSAGES[status]}"
+        return status
+
+    def _expand(self, linear: Any) -> None:
+        """Take derivatives at `now`, expand the objective there, and regularise in units of the mean control weight."""
+        now, n = self.now, self.problem.sim.ndx
+        self._linear, self._expanded_at = linear, now
+        self.objective.expand(now.x, now.u)
+        weight = self.objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
+        self._unit = np.where(weight > 0.0, weight, 1.0)
+
+    def _model(self) -> Quadratic:
+        """The linear-quadratic problem around `now`."""
+        now, (lo, hi) = self.now, self._no_limits
+        if self.problem.control_limits is not None:
+            lo, hi = (bound - now.u for bound in self.problem.control_limits)
+        gaps = self._no_gaps if now.gaps is None else now.gaps
+        return Quadratic(self._linear.A, self._linear.B, self.objective.g, self.objective.H, gaps, lo, hi)
+
+    def _gains(self) -> Promise:
+        """K and k at the first regularisation, from the present one upwards, with all Q_uu positive definite."""
+        model, damping, options = self._model(), self._damping, self.options
+        while True:
+            added = Regularization(damping.mu, damping.mu * options.value_regularization, self._unit)
+            promise = backward(model, added, self._K, self._k, self._free, self._buffer)
+            if promise.status == Status.SOLVED and self._start is not None:
+                promise = self._free_the_start(self._start, model, promise)
+            if promise.status == Status.SOLVED or damping.mu >= options.regularization_max:
+                return promise
+            damping.increase()
+
+    def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise) -> Promise:
+        """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
+        now, mu = self.now, self._damping.mu
+        start.step[:] = 0.0
+        if now.gaps is not None:
+            return promise
+        k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
+        if not d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone promises more
+            start.step[:] = 0.0
+            return promise
+        self._k[:] = k
+        return promise._replace(d0=d0, d1=d1)
+
+    def _fault(self, promise: Promise) -> Status:
+        """Why the backward pass at `now` failed with that promise; `_detail` says where."""
+        model, knot = self._model(), promise.knot
+        if promise.status == Status.MAX_ITERATIONS:
+            self._detail = f" That of the quadratic program of the control limits, at knot {knot}."
+            return promise.status
+        for name, parts in (("dynamics", (model.A, model.B, model.gaps[1:])), ("costs", (model.g, model.H))):
+            knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
+            if knots:
+                self._detail = f" In the derivatives of the {name}, at knot {min(knots)}."
+                return Status.NOT_FINITE
+        value = value_hessian(self._buffer, self.problem.sim.ndx)
+        if promise.status == Status.NOT_FINITE or not np.all(np.isfinite(value)):
+            self._detail = f" The cost to go grows beyond all numbers, at knot {knot}."
+            return Status.NOT_FINITE
+        self._detail = f" At knot {knot}."
+        return Status.MAX_REGULARIZATION
+
+    # ---- the plan ---------------------------------------------------------------------------------------------------
+
+    def _finish(self, stage: Stage) -> None:
+        """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned.
+
+        The gains have the least regularisation that every Q_uu needs: that of the last iterations only shortens their
+        steps, and would leave little feedback.
+        """
+        if self.now.gaps is not None or self.now.kappa != stage.kappa_eval:
+            self._roll_out(stage.kappa_eval)
+        fresh = self._expanded_at is self.now
+        if fresh or self._linearize(stage.kappa_grad, stage.kappa_eval) == Status.SOLVED:
+            self._damping.reset(0.0)
+            self._gains()
+
+    def _repeat(self) -> bool:
+        """Replace K by the gains of the motion repeated for ever; False, and nothing changed, where there are none."""
+        K = periodic_gains(self._model())
+        if K is not None:
+            self._K[:] = K
+        return K is not None
+
+    def _plan(self, status: Status, detail: str) -> Plan:
+        """The result, made consistent at the last smoothing, with the gains that belong to it."""
+        options, history, constraints = self.options, self._history, self.objective.constraints
+        if status not in (Status.SIMULATION_FAILED, Status.INTERRUPTED):
+            self._finish(options.stages[-1])
+        now, stride = self.now, None if self._start is None else self._start.stride
+        if stride is not None and status == Status.SOLVED and not self._repeat():
+            detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
+        violation, culprit = self.objective.worst(now.x, now.u)
+        if status != Status.SOLVED and violation > options.violation:
+            detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
+            detail += f" Violated most: {culprit}, by {violation:.2g}."
+        plan = Plan(
+            success=status == Status.SOLVED,
+            status=status,
+            message=MESSAGES[status] + detail,
+            nit=len(history.records),
+            fun=now.cost,
+            x=now.x,
+            u=now.u,
+            K=self._K.copy(),
+            k=self._k.copy(),
+            violation=violation,
+            gap=now.gap,
+            seconds=time.perf_counter() - history.began,
+            time_step=float(self.problem.sim.time_step),
+            substeps=self.problem.substeps,
+            stride=stride,
+            history=history.records,
+            multipliers=[term.slope.copy() for term in constraints],
+            penalties=[2.0 * term.weight for term in constraints],
+            problem=self.problem,
+        )
+        options.say(plan.closing_line())
+        return plan
+
+
+def _slow_steps(alpha: float, before: Iterate, promising: bool) -> int:
+    """How many steps in a row with next to no decrease end the stage."""
+    if before.gaps is None:
+        return 1 if alpha >= _GOOD_STEP else _SLOW
+    return _SLOW_OPEN if promising else _SLOW

@@ -1,0 +1,174 @@
+"""Search: how far to go along the gains of a backward pass, by rollouts or by a step of all states at once."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.objective import Objective
+from dojo_opt.options import Options
+from dojo_opt.problem import Problem
+from sim.horizon import Horizon
+from solvers.riccati import Promise
+from solvers.status import Status
+
+Matrix = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+__all__ = ["Direction", "Iterate", "Search"]
+
+_LENGTHEN = 4.0  # first trial relative to the last accepted step: a rollout costs as much as a linearisation
+
+
+class Iterate(NamedTuple):
+    """A trajectory and its cost."""
+
+    x: Matrix  # (T + 1, nx) states
+    u: Matrix  # (T, nu) inputs
+    gaps: Matrix | None = None  # (T + 1, ndx) f(x_t, u_t) (-) x_{t+1}; None when consistent
+    cost: float = np.inf  # without the terms of the constraints
+    merit: float = np.inf  # cost + augmented Lagrangian
+    kappa: float | None = None  # smoothing [N s m] of the motion to which the gaps belong; None: gaps not known yet
+    steps: Any = None  # cone variables of the steps, the starting points of a rollout nearby (sim/horizon.py)
+
+    @property
+    def gap(self) -> float:
+        """Largest entry of the gaps."""
+        return 0.0 if self.gaps is None else float(np.abs(self.gaps).max())
+
+
+class Direction(NamedTuple):
+    """The result of a backward pass: du = k + K dx and, for a free start, dx_0."""
+
+    k: Matrix  # (T, nu)
+    K: Stack  # (T, nu, ndx)
+    start: Any  # (ndx,) step of a free start, None when the start is given
+    linear: Any  # derivatives of the dynamics that the gains belong to
+    promise: Promise
+
+    def predicted(self, alpha: float) -> float:
+        """Change of merit that the model promises for step size alpha."""
+        return alpha * (self.promise.d0 + 0.5 * alpha * self.promise.d1)
+
+
+class Search:
+    """Step sizes 1, 1/2, 1/4, ... along a direction; trials that the simulator cannot step do not count.
+
+    `rollouts` is single shooting, the usual line search of iLQR. `states` is multiple shooting, for unstable robots
+    whose rollouts fall before the horizon ends. The derivation is in docs/theory/ilqr.md.
+    """
+
+    def __init__(self, problem: Problem, horizon: Horizon, objective: Objective, options: Options) -> None:
+        self._problem, self._horizon, self._objective, self._options = problem, horizon, objective, options
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget step sizes and prices of an earlier trajectory."""
+        self.restart()
+        self._price = np.zeros(self._problem.sim.ndx)  # of gaps: the largest costates so far
+
+    def restart(self) -> None:
+        """Try the full step first again."""
+        self._first = 1.0
+
+    def rollout(
+        self, now: Iterate, K: Stack | None, kappa: float, direction: Direction | None = None, alpha: float = 1.0
+    ) -> Any:
+        """One rollout around `now` under the gains K; it stops at the first step that the simulator cannot solve.
+
+        u_t = us_t + a k_t + K_t (x_t (-) xs_t),  with the share 1 - a of every gap left open; k = 0 without a direction
+        """
+        start = self._problem.start
+        k = linear = None
+        if self._problem.free_start is not None:
+            start = now.x[0]
+        if direction is not None:
+            k, linear = direction.k, direction.linear
+            if self._problem.free_start is not None:
+                start = self._problem.sim.integrate(start, alpha * direction.start)
+        return self._horizon.roll(
+            start, now.x, now.u, kappa, k=k, K=K, gaps=now.gaps, alpha=alpha, linear=linear, steps=now.steps
+        )
+
+    def iterate(self, shot: Any, gaps: Matrix | None, kappa: float) -> Iterate:
+        """A rollout with its cost."""
+        return Iterate(shot.x, shot.u, gaps, *self._objective.evaluate(shot.x, shot.u), kappa, shot.steps)
+
+    def rollouts(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
+        """(step size, new iterate) of the first rollout that is good enough; (0, now) without one.
+
+        With d the promised change of merit, a step is taken when merit - merit_old <= armijo d for d < 0. With open
+        gaps, closing them may cost: d > 0 allows an increase up to ascent d.   Mastalli et al. 2020, "Crocoddyl".
+        """
+        options, alpha = self._options, self._first
+        while alpha >= 0.5**options.halvings:
+            shot = self.rollout(now, direction.K, kappa, direction, alpha)
+            if shot.status == Status.SOLVED:
+                gaps = None if now.gaps is None or alpha == 1.0 else (1.0 - alpha) * now.gaps
+                there, predicted = self.iterate(shot, gaps, kappa), direction.predicted(alpha)
+                if predicted < 0.0:
+                    good = there.merit - now.merit <= options.armijo * predicted
+                else:
+                    good = now.gaps is not None and there.merit - now.merit <= options.ascent * predicted
+                if good:
+                    self._first = min(1.0, _LENGTHEN * alpha)
+                    return alpha, there
+            alpha *= 0.5
+        self.restart()
+        return 0.0, now
+
+    def states(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate, Any]:
+        """(step size, new iterate, derivatives there); (0, now, None) when no step size is good enough.
+
+        All states move along the linear model, and its errors become gaps:
+
+            x_t <- x_t (+) a dx_t,   u_t <- u_t + a du_t,   dx_t+1 = A dx_t + B du_t + gap_t+1,   du_t = k_t + K_t dx_t
+
+        judged by merit + sum of price |gap|, an exact penalty with the largest costates so far as prices.
+        """
+        problem, options, promise = self._problem, self._options, direction.promise
+        dx, du = _full_step(now, direction)
+        gaps = 0.0 if now.gaps is None else np.abs(now.gaps).sum(axis=0)
+        self._price = np.maximum(self._price, self._costates(direction.linear, dx, du))
+        owed = float(np.sum(gaps * self._price))
+        alpha = 1.0
+        while alpha >= 0.5**options.halvings:
+            x, u = problem.sim.integrate(now.x, alpha * dx), now.u + alpha * du
+            if problem.control_limits is not None:
+                np.clip(u, *problem.control_limits, out=u)
+            linear = self._horizon.linearize(x, u, kappa)
+            if not np.any(linear.status):
+                left = self._horizon.gaps(linear, x)
+                there = Iterate(x, u, left, *self._objective.evaluate(x, u), kappa)
+                change = there.merit - now.merit + float(np.abs(left).sum(axis=0) @ self._price) - owed
+                if change <= options.armijo * alpha * (promise.d0 + 0.5 * alpha * promise.d1 - owed):
+                    return alpha, there, linear
+            alpha *= 0.5
+        return 0.0, now, None
+
+    def _costates(self, linear: Any, dx: Matrix, du: Matrix) -> Matrix:
+        """(ndx,) largest costate of each component, the price of a gap there."""
+        g, H, n = self._objective.g, self._objective.H, dx.shape[1]
+        costate = g[-1, :n] + H[-1, :n, :n] @ dx[-1]
+        largest = np.abs(costate)
+        for t in range(len(du) - 1, 0, -1):
+            costate = g[t, :n] + H[t, :n, :n] @ dx[t] + H[t, :n, n:] @ du[t] + linear.A[t].T @ costate
+            np.maximum(largest, np.abs(costate), out=largest)
+        return np.asarray(largest)
+
+
+def _full_step(now: Iterate, direction: Direction) -> tuple[Matrix, Matrix]:
+    """dx (T + 1, ndx) and du (T, nu) of the full step along the linear model."""
+    k, K, start, linear, _ = direction
+    T, m, n = K.shape
+    dx, du = np.zeros((T + 1, n)), np.zeros((T, m))
+    if start is not None:
+        dx[0] = start
+    for t in range(T):
+        du[t] = k[t] + K[t] @ dx[t]
+        dx[t + 1] = linear.A[t] @ dx[t] + linear.B[t] @ du[t]
+        if now.gaps is not None:
+            dx[t + 1] += now.gaps[t + 1]
+    return dx, du
