@@ -28,7 +28,7 @@ import numpy as np
 from command import deliver, number, parser, progress
 
 import dojo_opt as dojo
-from dojo_opt.mpc.tick import milliseconds
+from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
 
 MASS = 4.7  # of the hopper [kg]

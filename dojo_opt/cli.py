@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.mpc.tick import milliseconds
+from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report import STUDIES, run_reports, write_page
-from dojo_opt.show import add_show, show
+from dojo_opt.viewer.show import add_show, show
 from sim.checks import nearest
 
 # what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on

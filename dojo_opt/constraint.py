@@ -9,15 +9,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.names import chosen_components, chosen_inputs, component_name
-from dojo_opt.residual import ResidualKernels, check_residual
-from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, numbers, state_table
+from dojo_opt.planning.names import chosen_components, chosen_inputs, component_name
+from dojo_opt.planning.residual import ResidualKernels, check_residual
+from dojo_opt.planning.term import (
+    PeriodicTerm,
+    Pick,
+    PickTerm,
+    ResidualTerm,
+    StateTerm,
+    Term,
+    knot_list,
+    numbers,
+    state_table,
+    table,
+)
 from sim.brief import brief_repr
 
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
 
-__all__ = ["ControlBounds", "Goal", "ResidualConstraint", "StateBounds"]
+__all__ = ["ControlBounds", "Goal", "Periodic", "ResidualConstraint", "StateBounds"]
 
 
 @dataclass(frozen=True)
@@ -131,3 +142,24 @@ class ResidualConstraint:
         kernels = ResidualKernels(self.function, self.jacobian, sim.nu)
         weight = np.ones((knots.size, self.dimension))
         return ResidualTerm("ResidualConstraint", knots, weight, not self.equality, kernels, layout)
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """(x_T (-) (x_0 (+) shift))_i = 0 for the chosen tangent components i (default all).
+
+    shift: (ndx,), zero in the rotations: by what a period moves the robot on. For problems whose start is free.
+    """
+
+    shift: ArrayLike = 0.0
+    components: Any = None
+
+    __repr__ = brief_repr
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        shift = table("Periodic(shift=...)", self.shift, 1, sim.ndx)[0]
+        if np.any(shift[layout < 0]):
+            raise ValueError("Periodic(shift=...): expected zeros for rotations by quaternion")
+        mask = np.zeros((1, sim.ndx))
+        mask[:, chosen_components("Periodic(components=...)", self.components, sim)] = 1.0
+        return PeriodicTerm(sim, horizon, mask, shift, layout)

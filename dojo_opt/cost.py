@@ -7,28 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.names import input_weight, state_weight
-from dojo_opt.residual import ResidualKernels, check_residual
-from dojo_opt.term import Pick, PickTerm, ResidualTerm, StateTerm, Term, knot_list, state_table, table
+from dojo_opt.planning.names import input_weight, state_weight
+from dojo_opt.planning.residual import ResidualKernels, check_residual
+from dojo_opt.planning.term import Pick, PickTerm, ResidualTerm, Spec, StateTerm, Term, knot_list, state_table, table
 from sim import checks
 from sim.brief import brief_repr
 
 Integers = NDArray[np.int64]
 
 __all__ = ["Effort", "ResidualCost", "Spec", "Tracking"]
-
-
-class Spec(Protocol):
-    """A cost or constraint as a user writes it."""
-
-    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
-        """The same for one simulator and horizon, with its arrays."""
-        ...
 
 
 def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale: float) -> NDArray[np.float64]:

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits, models
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Sampled
-from dojo_opt.mpc.tick import OPTIONS
-from dojo_opt.options import PLANNED
+from dojo_opt.mpc.settings import OPTIONS
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.plant import Plant
-from dojo_opt.problem import Problem
 from sim import checks
 from sim.border import whole
 from sim.checks import nearest

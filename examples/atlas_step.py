@@ -13,7 +13,7 @@ from _common import QUICK, finish
 import dojo_opt as dojo
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 
 STEPS = [("l_foot", 0.2), ("r_foot", 0.4), ("l_foot", 0.2)][: 1 if QUICK else 3]  # [m]
 sim = dojo.Simulator(dojo.models.atlas(damper=5.0), time_step=0.05, kappa=1e-6)  # that of plans

@@ -4,8 +4,8 @@ import numpy as np
 from doubles import DoubleIntegrator, Pendulum
 
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.options import Stage
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import Stage
+from dojo_opt.planning.problem import Problem
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 

@@ -53,7 +53,7 @@ def test_tables_for_notebooks_are_short_and_escaped(objects):
     tables = [thing._repr_html_() for thing in objects if hasattr(thing, "_repr_html_")]
     assert len(tables) >= 3
     assert all("<table>" in table and len(table) < 20_000 for table in tables)
-    study = next(thing for thing in objects if type(thing).__name__ == "Study")
+    study = next(thing for thing in objects if type(thing).__name__ == "MonteCarlo")
     hostile = dataclasses.replace(study.outcomes[0], message="<script>alert(1)</script>")
     many = dataclasses.replace(study, outcomes=[hostile] * 300)
     assert "<script>" not in many._repr_html_() and "&lt;script&gt;" in many._repr_html_()

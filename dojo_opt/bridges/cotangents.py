@@ -13,8 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.cross import cross
-from dojo_opt.manifold import tangent_layout
+from dojo_opt.planning.manifold import cross, tangent_layout
 from sim.simulator import Simulator
 
 Floats = NDArray[np.float64]

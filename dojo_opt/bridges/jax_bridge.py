@@ -6,7 +6,7 @@ from typing import Any
 
 from dojo_opt.bridges.jax_call import called
 from dojo_opt.bridges.rollouts import Functions, Rollouts
-from dojo_opt.parameter_space import ParameterSpace
+from dojo_opt.identification.parameter_space import ParameterSpace
 from sim.simulator import Simulator
 
 _CALL = "bridges.to_jax"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.bridges.cotangents import Cotangents
-from dojo_opt.parameter_space import ParameterSpace
+from dojo_opt.identification.parameter_space import ParameterSpace
 from sim import checks
 from sim.results import SimulationError
 from sim.simulator import Simulator

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dojo_opt.bridges.rollouts import Functions, Rollouts
-from dojo_opt.parameter_space import ParameterSpace
+from dojo_opt.identification.parameter_space import ParameterSpace
 from sim.simulator import Simulator
 
 _CALL = "bridges.to_torch"
@@ -70,7 +70,7 @@ def _states(torch: Any, core: Rollouts) -> Any:
     def array(tensor: Any) -> Any:
         return tensor.detach().cpu().numpy()
 
-    class States(torch.autograd.Function):
+    class RolloutStates(torch.autograd.Function):
         @staticmethod
         def forward(ctx: Any, x0: Any, us: Any, theta: Any) -> Any:
             xs = torch.from_numpy(core.states(*map(array, (x0, us, theta)))).to(us.device)
@@ -83,4 +83,4 @@ def _states(torch: Any, core: Rollouts) -> Any:
             gradients = core.pullback(*map(array, (*ctx.saved_tensors, by_xs)))
             return tuple(torch.from_numpy(g).to(by_xs.device) for g in gradients)
 
-    return States.apply
+    return RolloutStates.apply

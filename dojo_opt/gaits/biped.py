@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait, assemble
 from sim import checks
 from sim.simulator import Simulator

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.feet import Feet
-from dojo_opt.rest import input_map, least_pushes
+from dojo_opt.gaits.equilibrium import input_map, least_pushes
+from dojo_opt.gaits.feet import Feet
 from sim.brief import brief_repr
 from sim.parts import Input, Joint
 from sim.simulator import Simulator

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim import checks

@@ -11,8 +11,7 @@ from dojo_opt.models.atlas import atlas
 from dojo_opt.models.block import block
 from dojo_opt.models.block2d import block2d
 from dojo_opt.models.cartpole import cartpole
-from dojo_opt.models.catalogue import Entry as Entry
-from dojo_opt.models.catalogue import catalogue as catalogue
+from dojo_opt.models.catalogue import Entry, entry
 from dojo_opt.models.delta import delta
 from dojo_opt.models.double_pendulum import double_pendulum
 from dojo_opt.models.dzhanibekov import dzhanibekov
@@ -83,6 +82,11 @@ __all__ = [
 ]
 
 box, box2d = block, block2d
+
+
+def catalogue() -> list[Entry]:
+    """All models, by name."""
+    return [entry(globals()[name]) for name in sorted(__all__)]
 
 
 if not TYPE_CHECKING:

@@ -1,10 +1,10 @@
-"""catalogue: every ready-made mechanism with its sizes."""
+"""Entry: a ready-made mechanism with its sizes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
-import dojo_opt.models as models
 from sim.build import mechanism_sizes
 from sim.mechanism import Mechanism
 
@@ -22,21 +22,16 @@ class Entry:
     limits: int  # bounds of joints
     mass: float  # [kg]
     what: str
+    builder: Callable[..., Mechanism] = field(repr=False)
 
     def build(self) -> Mechanism:
         """The mechanism with default parameters."""
-        mech: Mechanism = getattr(models, self.name)()
-        return mech
+        return self.builder()
 
 
-def catalogue() -> list[Entry]:
-    """All models, by name."""
-    out = []
-    for name in sorted(models.__all__):
-        builder = getattr(models, name)
-        mech = builder()
-        size = mechanism_sizes(mech)
-        sizes = (size.nbody, size.nq, size.nv, size.nu, size.ncontact, size.nlimit)
-        what = (builder.__doc__ or "").split("\n")[0]
-        out.append(Entry(name, *sizes, sum(body.mass for body in mech.bodies), what))
-    return out
+def entry(builder: Callable[..., Mechanism]) -> Entry:
+    """The entry of a builder: what it builds with default parameters."""
+    mech, what = builder(), (builder.__doc__ or "").split("\n")[0]
+    size, mass = mechanism_sizes(mech), sum(body.mass for body in mech.bodies)
+    sizes = (size.nbody, size.nq, size.nv, size.nu, size.ncontact, size.nlimit)
+    return Entry(builder.__name__, *sizes, mass, what, builder)

@@ -11,17 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.mpc.delay import Delay
 from dojo_opt.mpc.ground import Ground
-from dojo_opt.mpc.horizon import shift_multipliers, tail, with_own_terms
+from dojo_opt.mpc.horizon import shift_multipliers, tail
 from dojo_opt.mpc.measurement import Measurement
 from dojo_opt.mpc.moving import References
 from dojo_opt.mpc.policy import Policy
-from dojo_opt.mpc.tick import Settings, Tick
-from dojo_opt.plan import Plan
+from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
+from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.term import StateTerm
 from dojo_opt.plant.plant import Plant
-from dojo_opt.plant.study import Sampler, Study, monte_carlo
-from dojo_opt.problem import Problem
-from dojo_opt.term import StateTerm
+from dojo_opt.plant.study import MonteCarlo, Sampler, monte_carlo
+from dojo_opt.plant.tick import Tick
 from sim import checks
 from sim.border import whole
 from solvers.status import Status
@@ -45,7 +46,7 @@ class MPC:
                 constraints is not seen by an iteration that starts on its good side, and takes about three
     reference   what to track over time, see `mpc.moving.References`; without it, the problem's own at every tick
     plan        the first plan, at the time of the first call; without it, that of `ilqr` without refinement
-    settings    fields of `dojo_opt.mpc.tick.Settings` by name
+    settings    fields of `dojo_opt.mpc.settings.MPCSettings` by name
 
     A tick shifts the plan by the time that has passed and keeps its states as the guess, the measured one in front: the
     disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
@@ -59,12 +60,12 @@ class MPC:
         iterations = whole("MPC(iterations=...)", iterations)
         if not isinstance(problem, Problem):
             raise TypeError(f"MPC(problem): expected a Problem, got {problem!r}")
-        checks.keywords("MPC(...)", settings, Settings.__dataclass_fields__)
-        self.settings = Settings(**settings)
+        checks.keywords("MPC(...)", settings, MPCSettings.__dataclass_fields__)
+        self.settings = MPCSettings(**settings)
         self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
         friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
         self.nominal = problem.sim  # what a plant is made from
-        self.problem = with_own_terms(problem, **friction)
+        self.problem = problem.with_own_terms(**friction)
         self.sim = self.problem.sim  # what plans are made with
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
@@ -84,7 +85,7 @@ class MPC:
         """Another one, made from the same arguments."""
         return self._again()
 
-    def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> Study:
+    def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> MonteCarlo:
         """Closed loops under random perturbations; see `dojo_opt.plant.study`."""
         return monte_carlo(self, plant, sampler, duration, **settings)
 

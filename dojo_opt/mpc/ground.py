@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.cross import cross
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.planning.manifold import cross
 from sim.simulator import Simulator
 
 Vector = NDArray[np.float64]

@@ -1,22 +1,19 @@
-"""Horizon: the problem of a tick, and what has to be made up when it moves on, at its end and for its constraints."""
+"""Receding horizon: the states and inputs beyond the end of a plan, and the multipliers of the shifted constraints."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.mpc.moving import References
 from dojo_opt.mpc.policy import Policy
-from dojo_opt.problem import Problem
-from dojo_opt.term import PickTerm, StateTerm, Term
+from dojo_opt.planning.term import PickTerm, StateTerm, Term
 
 Matrix = NDArray[np.float64]
 
-__all__ = ["shift_multipliers", "tail", "with_own_terms"]
+__all__ = ["shift_multipliers", "tail"]
 
 
 def tail(policy: Policy, references: References, count: int) -> tuple[Matrix, Matrix]:
@@ -47,15 +44,3 @@ def shift_multipliers(constraints: Sequence[Term], knots: float) -> None:
             first = np.minimum(np.arange(rows) + n, rows - 1)
             after = np.minimum(first + 1, rows - 1)
             term.slope[:] = (1.0 - f) * term.slope[first] + f * term.slope[after]
-
-
-def with_own_terms(problem: Problem, **settings: Any) -> Problem:
-    """The problem with a simulator and terms of its own: MPC moves their references and ground, and gives the start.
-
-    settings: of `Simulator.replace`.
-    """
-    own = copy.copy(problem)
-    own.sim = problem.sim.replace(**settings)
-    own.free_start = None
-    own.bind()
-    return own

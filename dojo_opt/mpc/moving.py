@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.problem import Problem
-from dojo_opt.term import PickTerm, StateTerm
+from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.term import PickTerm, StateTerm
 from sim import checks
 from sim.simulator import Simulator
 

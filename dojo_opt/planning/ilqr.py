@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.free_start import FreeStart, periodic_gains
-from dojo_opt.objective import Objective
-from dojo_opt.options import Options, Stage
-from dojo_opt.plan import History, Plan
 from dojo_opt.planning.ilqr_search import Direction, Iterate, Search
-from dojo_opt.problem import Problem
+from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
+from dojo_opt.planning.objective import Objective
+from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.plan import History, Plan
+from dojo_opt.planning.problem import Problem
 from sim import checks
 from sim.results import Interrupted
 from solvers.riccati import Promise, Quadratic, Regularization, backward, value_hessian, work_size
@@ -36,18 +36,9 @@ Stack = NDArray[np.float64]
 __all__ = ["Iteration", "Iterate", "Solver", "ilqr"]
 
 # ends of an attempt after which another first stage may lead further; all others end the solve
-FAILED = (
-    Status.SIMULATION_FAILED,
-    Status.INFEASIBLE,
-    Status.LINE_SEARCH,
-    Status.MAX_REGULARIZATION,
-    Status.NOT_FINITE,
-)
+FAILED = (Status.SIMULATION_FAILED, Status.INFEASIBLE, Status.LINE_SEARCH, Status.MAX_REGULARIZATION, Status.NOT_FINITE)
 
 # attempts and stages
-_GOOD_FIT = 2.0  # times the least sum of squared gaps: a guess fits a smoother stage nearly as well
-_REST = 1e-9  # [m, rad] largest motion from one knot to the next of a joint at rest
-_ASKED = 1e-6  # [m, rad, m/s, rad/s] Newton step above which the objective asks a joint to move
 _LESS = 0.9  # share of the least violation so far that counts as progress
 _STALLED = 5  # multiplier updates of the last stage without progress
 _SOFTEN = 3  # times that a stuck last stage may go back to the one before it
@@ -297,7 +288,8 @@ class Solver:
         self, controls: ArrayLike | None, states: ArrayLike | None, warm_start: Plan | None
     ) -> tuple[Status, str]:
         """How the solve ended, and where; `now` is the result."""
-        self._forget(warm_start)
+        duals = () if warm_start is None else (warm_start.multipliers, warm_start.penalties)
+        self.reset(*duals)
         if warm_start is not None:
             controls = warm_start.u if controls is None else controls
             states = warm_start.x if states is None else states
@@ -309,7 +301,7 @@ class Solver:
         if xs is not None:
             xs = self.states("ilqr(states=...)", problem.check_states("ilqr(states=...)", xs))
             self._begin(self.guess(xs, us))
-            return self._attempts(warm_start)
+            return self._attempts(duals)
         idle = Iterate(np.tile(problem.start, (problem.horizon + 1, 1)), us)
         kappa = self.options.stages[0].kappa_eval
         shot = self._search.rollout(idle, None, kappa)
@@ -318,11 +310,7 @@ class Solver:
             reason = Status(int(shot.status))
             return Status.SIMULATION_FAILED, f" Knot {int(shot.knot)}, {reason.name}: {MESSAGES[reason]}"
         self._begin(self._search.iterate(shot, None, kappa))
-        return self._attempts(warm_start)
-
-    def _forget(self, warm_start: Plan | None) -> None:
-        """Regularisation, gains, multipliers and penalties as before the first iteration."""
-        self.reset() if warm_start is None else self.reset(warm_start.multipliers, warm_start.penalties)
+        return self._attempts(duals)
 
     def _begin(self, now: Iterate) -> None:
         """Start from another trajectory."""
@@ -330,15 +318,18 @@ class Solver:
         self._begun = True
         self.now, self._expanded_at = now, None
 
-    def _attempts(self, warm_start: Plan | None) -> tuple[Status, str]:
-        """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation."""
+    def _attempts(self, duals: tuple[Sequence[Matrix], ...]) -> tuple[Status, str]:
+        """Attempts from the guess, each beginning at a stage, until one is good; else that with the least violation.
+
+        duals: the multipliers and penalties that each begins with, if not those of the options.
+        """
         guess = self.now
         kappas = [f"{stage.kappa_eval:.0e}" for stage in self.options.stages]
         ends: list[_Attempt] = []
         for first in self._first_stages():
             if ends:
                 self._history.note(f"{ends[-1].status.name}; again from the guess, beginning at k_eval {kappas[first]}")
-                self._forget(warm_start)
+                self.reset(*duals)
                 self._begin(guess)
             elif first:
                 skipped = ", ".join(kappas[:first])
@@ -364,48 +355,16 @@ class Solver:
         return _Attempt(status, self._detail, mismatch, now, self._K.copy(), slopes, weights)
 
     def _first_stages(self) -> list[int]:
-        """The stages to begin with: one, and then those for when the ones before fail.
-
-        The first is the smoothest down to which a guess of states fits nearly as well as at harder ones. A good
-        reference leaves small gaps at a hard contact and large ones at a smooth one, where contact begins above the
-        ground; smoothing it first would only lead away from it. A poor one fits nowhere, and needs all the stages. So
-        does one in which a joint rests that has to move: it fits a hard contact because nothing happens there, and says
-        nothing of how contact moves that joint, which smooth stages find out.
-        """
+        """The stages to begin with: one, and then those for when the ones before fail; see `fitting_stage`."""
         now, stages = self.now, self.options.stages
         if now.kappa is not None or len(stages) == 1:
             return [0]
-        if self._rests(now):
+        if at_rest(self.problem.sim, self.objective, now):
             return list(range(len(stages)))
-        best, chosen, there = np.inf, 0, None
-        for i in range(len(stages) - 1, -1, -1):
-            linear = self._horizon.linearize(now.x, now.u, stages[i].kappa_eval)
-            misfit = np.inf if np.any(linear.status) else float(np.sum(self._horizon.gaps(linear, now.x) ** 2))
-            if misfit <= _GOOD_FIT * best and misfit < np.inf:
-                chosen, there = i, linear
-            elif best < np.inf:
-                break
-            best = min(best, misfit)
-        if there is not None:
-            self._open_gaps(stages[chosen], there)
-        return [chosen, *range(chosen)]
-
-    def _rests(self, now: Iterate) -> bool:
-        """Whether a joint rests in the states from the second on, though it starts elsewhere or has to move."""
-        sim, objective = self.problem.sim, self.objective
-        start, *_ = steps = np.abs(sim.difference(now.x[1:], now.x[:-1]))[:, : sim.nv]
-        objective.expand(now.x, now.u)
-        gradient = np.abs(objective.g[1:, : sim.ndx])
-        curvature = np.abs(objective.H[1:].diagonal(axis1=1, axis2=2)[:, : sim.ndx])
-        asked = np.any(gradient > _ASKED * curvature, axis=0)
-        asked = asked[: sim.nv] | asked[sim.nv :] | (start > _ASKED)
-        rests = np.all(steps[1:] <= _REST, axis=0)
-        first = 0
-        for joint in sim.mechanism.joints:
-            dofs = slice(first, first := first + joint.nv)
-            if rests[dofs].all() and asked[dofs].any():
-                return True
-        return False
+        first, linear = fitting_stage(self._horizon, now, stages)
+        if linear is not None:
+            self._open_gaps(stages[first], linear)
+        return [first, *range(first)]
 
     # ---- an attempt: stages from smooth to hard ---------------------------------------------------------------------
 
@@ -441,17 +400,12 @@ class Solver:
                     index, softened = last - 1, softened + 1
                     continue
             self.update_multipliers(now)
-            self._reevaluate()
+            fresh, (cost, merit) = self._expanded_at is now, self.objective.evaluate(now.x, now.u)
+            self.now = now._replace(cost=cost, merit=merit)
+            if fresh:
+                self._expand(self._linear)
             index = min(index + 1, last)
         return Status.INFEASIBLE
-
-    def _reevaluate(self) -> None:
-        """The multipliers have changed: bring the merit and the model of the objective up to date."""
-        fresh = self._expanded_at is self.now
-        cost, merit = self.objective.evaluate(self.now.x, self.now.u)
-        self.now = self.now._replace(cost=cost, merit=merit)
-        if fresh:
-            self._expand(self._linear)
 
     def _stage(self, stage: Stage, bisections: int) -> Status:
         """One stage; when the trajectory does not survive the step of kappa, by way of the geometric mean."""
@@ -576,19 +530,11 @@ class Solver:
 
     def _record(self, promise: Promise, stage: Stage, kappa_grad: float, mu: float, alpha: float) -> bool:
         """Put the iteration into the history; True when the callback wants to stop."""
-        now = self.now
-        return self._history.add(
-            cost=now.cost,
-            merit=now.merit,
-            gradient=promise.gradient,
-            kappa_eval=stage.kappa_eval,
-            kappa_grad=kappa_grad,
-            mu=mu,
-            alpha=alpha,
-            promised=alpha * (promise.d0 + 0.5 * alpha * promise.d1),
-            gap=now.gap,
-            violation=self.objective.violation(now.x, now.u),
-        )
+        now, promised = self.now, alpha * (promise.d0 + 0.5 * alpha * promise.d1)
+        kappas = {"kappa_eval": stage.kappa_eval, "kappa_grad": kappa_grad}
+        merit = {"cost": now.cost, "merit": now.merit, "gradient": promise.gradient}
+        step = {"mu": mu, "alpha": alpha, "promised": promised, "gap": now.gap}
+        return self._history.add(**merit, **kappas, **step, violation=self.objective.violation(now.x, now.u))
 
     def _unstick(self, stage: Stage, kappa_grad: float) -> tuple[float, bool]:
         """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts.
@@ -713,21 +659,18 @@ class Solver:
             self._damping.reset(0.0)
             self._gains()
 
-    def _repeat(self) -> bool:
-        """Replace K by the gains of the motion repeated for ever; False, and nothing changed, where there are none."""
-        K = periodic_gains(self._model())
-        if K is not None:
-            self._K[:] = K
-        return K is not None
-
     def _plan(self, status: Status, detail: str) -> Plan:
         """The result, made consistent at the last smoothing, with the gains that belong to it."""
         options, history, constraints = self.options, self._history, self.objective.constraints
         if status not in (Status.SIMULATION_FAILED, Status.INTERRUPTED):
             self._finish(options.stages[-1])
         now, stride = self.now, None if self._start is None else self._start.stride
-        if stride is not None and status == Status.SOLVED and not self._repeat():
-            detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
+        if stride is not None and status == Status.SOLVED:
+            repeated = periodic_gains(self._model())
+            if repeated is None:
+                detail = " Its gains are those of a single cycle: the motion repeated for ever has none."
+            else:
+                self._K[:] = repeated
         violation, culprit = self.objective.worst(now.x, now.u)
         if status != Status.SOLVED and violation > options.violation:
             detail += "" if status == Status.INFEASIBLE else " Constraints are not met."

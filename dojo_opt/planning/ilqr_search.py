@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.objective import Objective
-from dojo_opt.options import Options
-from dojo_opt.problem import Problem
+from dojo_opt.planning.objective import Objective
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import Problem
 from sim.horizon import Horizon
 from solvers.riccati import Promise
 from solvers.status import Status

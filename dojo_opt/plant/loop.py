@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.mpc.tick import Tick
-from dojo_opt.names import chosen_components
+from dojo_opt.planning.names import chosen_components
 from dojo_opt.plant.plant import Plant
+from dojo_opt.plant.tick import Tick
 from sim import checks
 from sim.brief import brief_table
 from sim.results import Contacts, Interrupted
@@ -115,7 +115,7 @@ def closed_loop(
     plant.reset()
     if hasattr(controller, "reset"):
         controller.reset()
-    run = _Run([plant.x])
+    run = _LoopRecord([plant.x])
     try:
         _drive(run, controller, plant, steps, every, plant.fallen if fallen is None else fallen)
     except KeyboardInterrupt:
@@ -124,7 +124,7 @@ def closed_loop(
     return _closed_loop(run, controller, plant, reference)
 
 
-def _closed_loop(run: _Run, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
+def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
     """What was kept of the steps, as arrays."""
     h, count = plant.sim.time_step, len(run.u)
     own, tracked = getattr(controller, "references", None), None
@@ -163,7 +163,7 @@ class Raised:
 
 
 @dataclass
-class _Run:
+class _LoopRecord:
     """What is kept of every step."""
 
     x: list[Vector]
@@ -177,7 +177,7 @@ class _Run:
 
 
 def _drive(
-    run: _Run, controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]
+    run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]
 ) -> None:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
     command = np.zeros(plant.sim.nu)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.plant.perturbation import Perturbation
 from sim import checks
 from sim.mechanism import Mechanism

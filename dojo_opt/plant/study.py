@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.mpc.tick import Tick, milliseconds
 from dojo_opt.plant.loop import closed_loop
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
+from dojo_opt.plant.tick import Tick, milliseconds
 from sim import checks
 from sim.border import whole
 from sim.brief import brief_repr, brief_table
@@ -24,11 +24,11 @@ from sim.results import Interrupted
 Vector = NDArray[np.float64]
 Sampler = Callable[[np.random.Generator], Perturbation]
 
-__all__ = ["Outcome", "Study", "monte_carlo", "wilson_interval"]
+__all__ = ["MonteCarloRun", "MonteCarlo", "monte_carlo", "wilson_interval"]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MonteCarloRun:
     """One run."""
 
     survived: bool
@@ -44,10 +44,10 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Study:
+class MonteCarlo:
     """All runs, in the order of their numbers."""
 
-    outcomes: Sequence[Outcome]
+    outcomes: Sequence[MonteCarloRun]
     duration: float  # that each run was meant to last [s]
     seed: int
 
@@ -101,7 +101,7 @@ def monte_carlo(
     executor: Executor | None = None,
     control_step: float | None = None,
     components: Any = None,
-) -> Study:
+) -> MonteCarlo:
     """Run the closed loop `runs` times for `duration` [s], each under a perturbation drawn by the sampler.
 
     controller  an `MPC`, or a function of (time, x) without memory
@@ -113,7 +113,7 @@ def monte_carlo(
     Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
     number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
 
-    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the Study of the runs that are done.
+    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the MonteCarlo of the runs that are done.
     """
     count = whole("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):
@@ -128,7 +128,7 @@ def monte_carlo(
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]
     futures: list[Any] = []
-    outcomes: list[Outcome] = []
+    outcomes: list[MonteCarloRun] = []
     try:
         futures += [] if executor is None else [executor.submit(_run, *task) for task in tasks]
         for i, task in enumerate(tasks):
@@ -136,8 +136,8 @@ def monte_carlo(
     except KeyboardInterrupt:
         for future in futures:
             future.cancel()
-        raise Interrupted(Study(outcomes, float(duration), seed) if outcomes else None) from None
-    return Study(outcomes, float(duration), seed)
+        raise Interrupted(MonteCarlo(outcomes, float(duration), seed) if outcomes else None) from None
+    return MonteCarlo(outcomes, float(duration), seed)
 
 
 def _run(
@@ -147,7 +147,7 @@ def _run(
     duration: float,
     settings: tuple[float | None, Any],
     seed: np.random.SeedSequence,
-) -> Outcome:
+) -> MonteCarloRun:
     """One run; at module level, so that other processes can import it."""
     perturbation = sampler(np.random.default_rng(seed))
     if not isinstance(perturbation, Perturbation):
@@ -155,7 +155,7 @@ def _run(
     control_step, components = settings
     own = controller.fresh() if hasattr(controller, "fresh") else copy.copy(controller)
     loop = closed_loop(own, plant.perturbed(perturbation), duration, control_step=control_step)
-    return Outcome(
+    return MonteCarloRun(
         survived=loop.survived,
         message=loop.message,
         duration=loop.duration,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
-from dojo_opt.motion import Motion, motion
+from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dojo_opt.motion import Array, Motion, motion
 from dojo_opt.plots.axes import finish, panel
+from dojo_opt.viewer.motion import Array, Motion, motion
 from sim.simulator import Simulator
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.motion import motion
-from dojo_opt.mpc.tick import Tick, milliseconds
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.plant.plant import stands_free
-from dojo_opt.plant.study import Study
+from dojo_opt.plant.study import MonteCarlo
+from dojo_opt.plant.tick import Tick, milliseconds
 from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities
+from dojo_opt.viewer.motion import motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,7 +129,7 @@ def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None
     return finish(ax, "tick [ms]", "time [s]")
 
 
-def study(result: Study) -> Figure:
+def study(result: MonteCarlo) -> Figure:
     """Two panels of a Monte Carlo study: survival, and the times of all its ticks."""
     from matplotlib.figure import Figure
 
@@ -145,7 +145,7 @@ def study(result: Study) -> Figure:
     return figure
 
 
-def survival(studies: dict[str, Study], ax: Axes | None = None) -> Axes:
+def survival(studies: dict[str, MonteCarlo], ax: Axes | None = None) -> Axes:
     """Share of the runs that still stand over time, one line per study, with Wilson's 95 % interval at the end."""
     ax = _axes(ax)
     for name, result in studies.items():

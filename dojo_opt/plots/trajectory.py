@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from dojo_opt.motion import Motion, motion
 from dojo_opt.plots.axes import finish as _finish
 from dojo_opt.plots.axes import input_units, panel, units
+from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism import Mechanism
 from sim.simulator import Simulator
 

@@ -1,7 +1,7 @@
 """A gait planned by crocoddyl (FDDP, C++), as a yardstick for an easier problem: it is told when each foot stands.
 
 The robot is built from the arrays of the same mechanism, and gets the knots, the cost, the reference and the guess of
-a problem of `dojo_opt.locomotion.follow`. What is different, all of it easier: in every knot the feet that stand, and
+a problem of `dojo.problems.follow`. What is different, all of it easier: in every knot the feet that stand, and
 where, are given, as constraints on the acceleration; an explicit Euler step per knot; no torque limits, no stops and no
 damping of the joints (crocoddyl has none); friction and the pose at the end are penalties, so one solve is all. Nothing
 keeps a foot in the air out of the ground: in the trot of `dojo.problems` they dip into it by 7 mm.
@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.feet import Feet
-from dojo_opt.problem import Problem
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.planning.problem import Problem
 from sim.model import Matrix, Model
 
 TOUCH = 1e-6  # [m] a foot this near to the ground at both ends of a knot stands in it

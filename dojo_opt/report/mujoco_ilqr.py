@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dojo_opt.objective import Objective
-from dojo_opt.options import Options
-from dojo_opt.problem import Problem
+from dojo_opt.planning.objective import Objective
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import Problem
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.mujoco_warnings import quiet
 from sim.model import Matrix, Vector

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.mpc.tick import milliseconds
-from dojo_opt.problem import Problem
+from dojo_opt.planning.problem import Problem
+from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.crocoddyl_trot import CrocoddylTrot
 from dojo_opt.report.mujoco_ilqr import MujocoIlqr

@@ -20,13 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave, ratio, slope
 from dojo_opt.report.planning_time import add_planning
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.robots import add_robots
 from dojo_opt.report.study import Progress
-from dojo_opt.rest import equilibrium
 from sim.model import Vector
 from sim.simulator import Simulator
 from solvers.parallel import threads

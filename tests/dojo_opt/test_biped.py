@@ -8,7 +8,7 @@ from scipy.linalg import solve_discrete_are
 
 import dojo_opt as dojo
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,13 @@ import pytest
 from doubles import DoubleIntegrator
 from scipy.linalg import solve_discrete_are
 
-from dojo_opt.constraint import Goal
+from dojo_opt.constraint import Goal, Periodic
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.free_start import periodic_gains
-from dojo_opt.options import Stage
-from dojo_opt.periodic import Periodic
-from dojo_opt.plan import Plan
 from dojo_opt.planning.ilqr import ilqr
-from dojo_opt.problem import Problem
+from dojo_opt.planning.ilqr_start import periodic_gains
+from dojo_opt.planning.options import Stage
+from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.problem import Problem
 from solvers.riccati import Quadratic
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)

@@ -5,8 +5,8 @@ import pytest
 from hills import WAVES
 
 from dojo_opt import Terrain, models
-from dojo_opt.feet import Feet
-from dojo_opt.rest import equilibrium, potential_gradient
+from dojo_opt.gaits.equilibrium import equilibrium, potential_gradient
+from dojo_opt.gaits.feet import Feet
 from sim.simulator import Simulator
 
 

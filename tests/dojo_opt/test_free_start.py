@@ -5,12 +5,11 @@ import pytest
 from doubles import DoubleIntegrator, FreeBody
 from scipy.spatial.transform import Rotation
 
-from dojo_opt.constraint import Goal
+from dojo_opt.constraint import Goal, Periodic
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.options import Stage
-from dojo_opt.periodic import Periodic
 from dojo_opt.planning.ilqr import ilqr
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import Stage
+from dojo_opt.planning.problem import Problem
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 T = 12

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from dojo_opt import gaits, models
-from dojo_opt.feet import Feet
-from dojo_opt.rest import equilibrium
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.gaits.feet import Feet
 from sim.simulator import Simulator
 
 PERIODIC = {

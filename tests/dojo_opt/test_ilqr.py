@@ -11,10 +11,10 @@ from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import ControlBounds, Goal, StateBounds
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.options import Options
-from dojo_opt.plan import Plan
 from dojo_opt.planning.ilqr import Solver, ilqr
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import hop
 from solvers.status import Status
 

@@ -6,9 +6,9 @@ from small_problems import gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.options import Options
 from dojo_opt.planning.ilqr import Solver, ilqr
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import Problem
 from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
 

@@ -7,10 +7,10 @@ from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.options import Options, Stage
 from dojo_opt.planning.ilqr import Iterate, Solver, ilqr
 from dojo_opt.planning.ilqr_search import Direction, Search
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.problem import Problem
 from solvers.riccati import Promise
 from solvers.status import Status
 

@@ -5,9 +5,9 @@ import pytest
 from planned_legs import check, lands, lowest_foot, upright
 
 from dojo_opt import gaits, models, plots, problems
-from dojo_opt.feet import Feet
-from dojo_opt.motion import motion
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.planning.ilqr import ilqr
+from dojo_opt.viewer.motion import motion
 from sim.simulator import Simulator
 
 

@@ -7,8 +7,9 @@ import pytest
 from standing_hopper import HOPPER, standing_problem
 
 import dojo_opt as dojo
-from dojo_opt.mpc.tick import Settings, milliseconds
-from dojo_opt.options import Options
+from dojo_opt.mpc.settings import MPCSettings
+from dojo_opt.planning.options import Options
+from dojo_opt.plant.tick import milliseconds
 from solvers.jit import local_kernel
 from solvers.status import Status
 
@@ -26,7 +27,7 @@ from solvers.status import Status
 )
 def test_settings_are_checked(settings, message):
     with pytest.raises(ValueError, match=message):
-        Settings(**settings)
+        MPCSettings(**settings)
 
 
 def test_calls_are_checked():
@@ -79,7 +80,7 @@ def test_problems_with_compiled_residuals_can_be_sent_to_other_processes():
 
 
 def test_the_log_keeps_the_last_ticks_and_a_loop_all_of_its_own():
-    assert Settings().log == 10_000
+    assert MPCSettings().log == 10_000
     mpc = dojo.MPC(standing_problem(), log=4)
     loop = dojo.closed_loop(mpc, dojo.Plant(HOPPER.replace(time_step=0.01, kappa=1e-8)), 0.5)
     assert [tick.time for tick in mpc.log] == [tick.time for tick in loop.log[-4:]]
@@ -88,7 +89,7 @@ def test_the_log_keeps_the_last_ticks_and_a_loop_all_of_its_own():
     dojo.closed_loop(everything, dojo.Plant(HOPPER.replace(time_step=0.01, kappa=1e-8)), 0.5)
     assert len(everything.log) == 10
     with pytest.raises(ValueError, match=r"MPC\(log=...\): expected a whole number"):
-        Settings(log=0)
+        MPCSettings(log=0)
 
 
 def test_a_tick_without_time_keeps_the_old_plan():

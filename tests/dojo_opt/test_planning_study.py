@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.options import Options, Stage
+from dojo_opt.planning.options import Options, Stage
 from dojo_opt.report import Progress
 from dojo_opt.report.mujoco_ilqr import MujocoIlqr, Settings
 from dojo_opt.report.planning import Planning, cases, families, measure

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.report import planning_time
 from dojo_opt.report.result import Report
 

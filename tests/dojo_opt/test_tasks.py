@@ -7,7 +7,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.cli import main
-from dojo_opt.plant.study import Outcome, Study
+from dojo_opt.plant.study import MonteCarlo, MonteCarloRun
 
 
 @pytest.fixture(scope="module")
@@ -144,9 +144,9 @@ def test_figures_show_what_happened(quadruped):
 
 def test_figure_of_survival_steps_down_at_every_fall():
     def outcome(survived, duration):
-        return Outcome(survived, "", duration, 0.0, np.zeros(1), (), dojo.Perturbation(), 0)
+        return MonteCarloRun(survived, "", duration, 0.0, np.zeros(1), (), dojo.Perturbation(), 0)
 
-    study = Study([outcome(False, 1.0), outcome(True, 4.0), outcome(False, 2.0), outcome(True, 4.0)], 4.0, 0)
+    study = MonteCarlo([outcome(False, 1.0), outcome(True, 4.0), outcome(False, 2.0), outcome(True, 4.0)], 4.0, 0)
     line = dojo.plots.survival({"all": study}).lines[0]
     np.testing.assert_allclose(line.get_xdata(), [0.0, 1.0, 2.0, 4.0])
     np.testing.assert_allclose(line.get_ydata(), [1.0, 0.75, 0.5, 0.5])

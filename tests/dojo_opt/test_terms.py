@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import ControlBounds, Goal, ResidualConstraint, StateBounds
 from dojo_opt.cost import Effort, ResidualCost, Tracking
-from dojo_opt.manifold import tangent_layout
+from dojo_opt.planning.manifold import tangent_layout
 from solvers.jit import kernel
 
 T = 4

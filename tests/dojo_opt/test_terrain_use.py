@@ -10,7 +10,7 @@ from hills import GRID, WAVES
 from scenes import ball
 
 import dojo_opt as dojo
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.report.engines.bullet_scene import check
@@ -30,8 +30,8 @@ def test_figure_and_viewer_show_the_ground(tmp_path):
     page = dojo.viewer.save_html(t, tmp_path / "ball.html").read_text()
     assert len(page) > 1e5
 
-    from dojo_opt.motion import motion
     from dojo_opt.viewer import _surface
+    from dojo_opt.viewer.motion import motion
 
     vertices, triangles = _surface(motion(t), WAVES, 0.1)
     np.testing.assert_allclose(vertices[:, 2], WAVES.height(vertices[:, 0], vertices[:, 1]) + 0.1)

@@ -9,8 +9,8 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt import viewer
-from dojo_opt.motion import motion
-from dojo_opt.viewer_page import page as page_of
+from dojo_opt.viewer.motion import motion
+from dojo_opt.viewer.page import page as page_of
 
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [

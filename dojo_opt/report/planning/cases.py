@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.options import CONTINUATION, Stage
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import CONTINUATION, Stage
+from dojo_opt.planning.problem import Problem
 
 NAMES = ("hop", "block right", "block up", "trot")
 FAMILIES = (*NAMES, "hop, 5 x 10 ms")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dojo_opt.problem import Problem
+from dojo_opt.planning.problem import Problem
 from dojo_opt.report.planning.cases import Setting
 from dojo_opt.report.planning.measure import Outcome, ours
 

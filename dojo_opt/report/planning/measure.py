@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from dojo_opt.plan import Plan
-from dojo_opt.problem import Problem
+from dojo_opt.planning.plan import Plan
+from dojo_opt.planning.problem import Problem
 from dojo_opt.report.mujoco_ilqr import MujocoIlqr, Settings
 
 Matrix = NDArray[np.float64]

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.manifold import state_residual
-from dojo_opt.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
-from dojo_opt.residual import ResidualKernels
+from dojo_opt.planning.manifold import state_residual
+from dojo_opt.planning.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
+from dojo_opt.planning.residual import ResidualKernels
 from sim import checks
+from sim.rotation import inverse_right_jacobian
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -21,8 +22,16 @@ _UNIT = 1e-6  # by how much the length of a quaternion may be off
 _ROUNDED = 1e-12  # below, it is as near to one as sums get
 
 
+class Spec(Protocol):
+    """A cost or constraint as a user writes it."""
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        """The same for one simulator and horizon, with its arrays."""
+        ...
+
+
 class Term:
-    """Residual r (m, d) at `knots` (m,), weight and slope (m, d); see `dojo_opt.penalty` for what it adds.
+    """Residual r (m, d) at `knots` (m,), weight and slope (m, d); see `dojo_opt.planning.penalty` for what it adds.
 
     A cost keeps its weights; of a constraint, slope is the multiplier and weight half the penalty.
     """
@@ -88,6 +97,36 @@ class StateTerm(Term):
 
     def _add(self, xs: Matrix, us: Matrix, g: Matrix, H: Stack) -> None:
         add_expansion(self.residual, self._first, self._second, self.knots, self._column, self._sign, g, H)
+
+
+class PeriodicTerm(StateTerm):
+    """r = x_T (-) (x_0 (+) shift); its dependence on x_0 is left to `jacobians`."""
+
+    def __init__(self, sim: Any, horizon: int, mask: Matrix, shift: Matrix, layout: Integers) -> None:
+        super().__init__("Periodic", np.array([horizon]), mask, np.zeros((1, sim.nx)), layout)
+        self._sim, self.shift = sim, shift
+
+    def update(self, xs: Matrix, us: Matrix) -> None:
+        self.reference[0] = self._sim.integrate(xs[0], self.shift)
+        super().update(xs, us)
+
+    def coupling(self, xs: Matrix, us: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+        """(dr/dx_T, dr/dx_0, first and second derivative of the contribution by r) at (xs, us)."""
+        self.update(xs, us)
+        first, second = np.empty_like(self.weight), np.empty_like(self.weight)
+        penalty_derivatives(self.residual, self.weight, self.slope, self.one_sided, first, second)
+        end, start = np.eye(self._layout.size), -np.eye(self._layout.size)
+        i = 0
+        while i < self._layout.size:
+            if self._layout[i] >= 0:
+                i += 1
+                continue
+            r = self.residual[0, i : i + 3]
+            J = np.array(inverse_right_jacobian(r[0], r[1], r[2])).reshape(3, 3)
+            end[i : i + 3, i : i + 3] = J  # r = log(q_0^* q_T): Jr^-1 on the right,
+            start[i : i + 3, i : i + 3] = -J.T  # and Jl^-1 = Jr^-T on the left
+            i += 3
+        return end, start, first[0], second[0]
 
 
 class Pick(NamedTuple):
@@ -156,7 +195,7 @@ def table(call: str, value: ArrayLike, rows: int, columns: int) -> Matrix:
 
 
 def state_table(call: str, value: ArrayLike, rows: int, columns: int, layout: Integers) -> Matrix:
-    """`table` of states, whose quaternions have to be of length one; layout: see `dojo_opt.manifold.tangent_layout`."""
+    """`table` of states, whose quaternions have to be of length one; layout: see `manifold.tangent_layout`."""
     states = table(call, value, rows, columns)
     for first in np.unique(-layout[layout < 0] - 1):
         part = states[:, first : first + 4]

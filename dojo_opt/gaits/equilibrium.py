@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.feet import Feet
 from sim import checks
 from sim.simulator import Simulator
 
@@ -109,7 +109,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
     carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that shall carry have to be
     within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by
-    `dojo_opt.feet.Feet.place`.
+    `dojo_opt.gaits.feet.Feet.place`.
 
     ValueError when no such forces exist: the centre of mass is not above the feet, a joint without input would have to
     carry something, the ground is steeper than friction holds, or the smoothing is so large that contacts far above the

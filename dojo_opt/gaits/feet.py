@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.cross import cross
+from dojo_opt.planning.manifold import cross
 from sim import checks
 from sim.simulator import Simulator
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.motion import Motion, motion
-from dojo_opt.viewer_page import page
+from dojo_opt.viewer.motion import Motion, motion
+from dojo_opt.viewer.page import page
 from sim import shapes
 from sim.build import contact_frame
 from sim.parts import WORLD

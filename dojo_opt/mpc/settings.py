@@ -1,30 +1,22 @@
-"""Tick: what MPC did at one planning instant, and the settings of all of them."""
+"""Settings of `MPC`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dojo_opt.options import Options, Stage
+from dojo_opt.planning.options import Options, Stage
 from sim import checks
 from sim.border import whole
-from sim.brief import brief_repr
-from solvers.status import Status
-
-Vector = NDArray[np.float64]
 
 # penalties that grew with every tick would never stop; a second line search would take its time
 OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
 GUESSES = ("states", "feedback", "open loop")
 
-__all__ = ["GUESSES", "OPTIONS", "Settings", "Tick", "milliseconds"]
+__all__ = ["GUESSES", "OPTIONS", "MPCSettings"]
 
 
 @dataclass(frozen=True)
-class Settings:
+class MPCSettings:
     """Settings of `MPC`."""
 
     period: float | None = None  # between plans [s]; a knot by default
@@ -62,29 +54,3 @@ class Settings:
         stage = Stage(self.kappa, self.kappa_grad or self.kappa, base.tolerance, iterations)
         settings = {name: getattr(base, name) for name in base.__dataclass_fields__}
         return Options(**(settings | {"stages": (stage,), "time_limit": self.time_limit}))
-
-
-@dataclass(frozen=True)
-class Tick:
-    """One planning instant. When `fallback` is true the plan before it stays in force, with its gains."""
-
-    time: float  # of the measurement [s]
-    milliseconds: float  # that the tick took, by the clock
-    cpu_milliseconds: float  # by the processor: what is left when others use the machine, too
-    iterations: int  # of the planner, rejected ones included
-    cost: float  # of the plan that is in force, when it was made
-    alpha: float  # last step size; 0 when it was rejected
-    gap: float  # largest entry of x (-) the state that the plan before expected
-    status: Status
-    fallback: bool
-    contacts: tuple[str, ...]  # that touch the ground
-    error: Vector = field(repr=False)  # (nv,) coordinates of x (-) reference [m, rad]; empty without a reference
-    x: Vector = field(repr=False)  # (nx,) start of the plan: measured, as the model means it, after the delay
-    first: bool = False  # the plan from which the others are warm-started
-
-    __repr__ = brief_repr
-
-
-def milliseconds(log: Sequence[Tick], cpu: bool = False) -> Vector:
-    """Times of the ticks of a log but the first [ms], by the clock or by the processor."""
-    return np.array([tick.cpu_milliseconds if cpu else tick.milliseconds for tick in log if not tick.first])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.problem import Problem
+from dojo_opt.planning.problem import Problem
 from solvers.status import Status
 
 Array = NDArray[np.float64]

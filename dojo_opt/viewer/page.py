@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dojo_opt.motion import Motion
+from dojo_opt.viewer.motion import Motion
 
 __all__ = ["page"]
 

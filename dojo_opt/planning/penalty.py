@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.manifold import add_rotation_block
+from dojo_opt.planning.manifold import add_rotation_block
 from solvers.jit import kernel
 
 Vector = NDArray[np.float64]

@@ -7,10 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.mpc.horizon import with_own_terms
+from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.study import Sampler
-from dojo_opt.problem import Problem
 from sim import checks
 
 try:
@@ -47,7 +46,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
             raise TypeError(f"Environment(plant=...): expected a Plant, as Plant(simulator), got {plant!r}")
         if sampler is not None and not callable(sampler):
             raise TypeError(f"Environment(sampler=...): expected a function of a generator, got {sampler!r}")
-        self.problem = with_own_terms(problem)
+        self.problem = problem.with_own_terms()
         self._plant = self.plant = Plant(problem.sim, problem.start) if plant is None else plant
         self._sampler = sampler
         self._steps = round(problem.knot_time / self.plant.sim.time_step)

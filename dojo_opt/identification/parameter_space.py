@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt import inertia_coordinates
+from dojo_opt.identification import inertia_coordinates
 from sim import checks
 from sim.simulator import Simulator
 
@@ -22,7 +22,7 @@ _POSITIVE = ("mass", "time_step", "size_a", "size_b", "friction")  # a contact w
 _LEAST = 1e-6  # of the value: where positive parameters end
 
 
-class _Group(NamedTuple):
+class _ParameterGroup(NamedTuple):
     """Coordinates that are seen in a few blocks of derivatives."""
 
     names: tuple[str, ...]  # of blocks
@@ -57,7 +57,7 @@ class ParameterSpace:
     ) -> None:
         call = "ParameterSpace"
         self._sim = sim
-        self._groups: list[_Group] = []
+        self._groups: list[_ParameterGroup] = []
         self._rows: dict[str, tuple[float, float, float]] = {}  # value, low, high
         found = sim.parameters(tuple(names))
         checks.distinct(f"{call}(names)", found.names)
@@ -117,7 +117,7 @@ class ParameterSpace:
         first = len(self._rows)
         checks.distinct("ParameterSpace", (*self._rows, *rows))
         self._rows.update(rows)
-        self._groups.append(_Group(tuple(names), slice(first, first + len(rows)), chart))
+        self._groups.append(_ParameterGroup(tuple(names), slice(first, first + len(rows)), chart))
 
     def _add(self, call: str, name: str, entries: list[str], values: list[float]) -> None:
         """A parameter, or the three of a direction or a rotation."""

@@ -1,8 +1,8 @@
-"""The reference problems, ready to solve: a hop, a pushed block, swing-ups, and the gaits of a quadruped."""
+"""Reference problems of small systems: a hop, a pushed block, swing-ups."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,16 +10,13 @@ from numpy.typing import ArrayLike
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.leaps import leap
-from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
-from dojo_opt.options import PLANNED
-from dojo_opt.problem import Problem
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
 from sim import checks
 from sim.border import whole
-from sim.checks import nearest
 from sim.simulator import Simulator
 
-__all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
+__all__ = ["block", "hop", "swingup"]
 
 
 def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:
@@ -104,12 +101,3 @@ def swingup(name: str = "cartpole") -> Problem:
         control_limits=limits,
         controls0=np.broadcast_to(ramp, (horizon, sim.nu)).copy(),
     )
-
-
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        """A name that is not there, with the ones that are."""
-        raise AttributeError(
-            f"dojo_opt.problems has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}"
-        )

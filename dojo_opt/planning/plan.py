@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.options import Options
+from dojo_opt.planning.options import Options
 from sim.border import whole
 from sim.brief import brief_table
 from solvers.status import Status

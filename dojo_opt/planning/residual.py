@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.captured import fingerprint
-from dojo_opt.manifold import displace
+from dojo_opt.planning.captured import fingerprint
+from dojo_opt.planning.manifold import displace
 from sim.pace import rows
 from solvers.jit import CompilationError, users_kernel, users_loop
 

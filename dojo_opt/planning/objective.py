@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.names import component_name
-from dojo_opt.options import Options
-from dojo_opt.problem import Problem
-from dojo_opt.term import Term
+from dojo_opt.planning.names import component_name
+from dojo_opt.planning.options import Options
+from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.term import Term
 
 Matrix = NDArray[np.float64]
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.cost import Spec
-from dojo_opt.manifold import tangent_layout
-from dojo_opt.names import chosen_components
-from dojo_opt.term import numbers, state_table, table
+from dojo_opt.planning.manifold import tangent_layout
+from dojo_opt.planning.names import chosen_components
+from dojo_opt.planning.term import Spec, numbers, state_table, table
 from sim.border import whole
 
 Vector = NDArray[np.float64]
@@ -145,6 +144,17 @@ class Problem:
         finer.specs, finer.refined_constraints = (self.specs[0], (*self.specs[1], *self.refined_constraints)), ()
         finer.bind()
         return finer
+
+    def with_own_terms(self, **settings: Any) -> Problem:
+        """The same problem, its start given, with a simulator and terms of its own, for loops that write into them.
+
+        settings: of `Simulator.replace`.
+        """
+        own = copy.copy(self)
+        own.sim = self.sim.replace(**settings)
+        own.free_start = None
+        own.bind()
+        return own
 
     def bind(self) -> None:
         """Make the terms of `specs` anew, with arrays and compiled functions of their own."""

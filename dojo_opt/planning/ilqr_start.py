@@ -1,21 +1,70 @@
-"""Free starts: the first state as a decision of its own, and the gains of a motion that repeats itself."""
+"""Starts: the stage that fits a guess, the first state as a decision, and the gains of a repeated motion."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.periodic import PeriodicTerm
-from dojo_opt.problem import Problem
+from dojo_opt.planning.ilqr_search import Iterate
+from dojo_opt.planning.objective import Objective
+from dojo_opt.planning.options import Stage
+from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.term import PeriodicTerm
+from sim.horizon import Horizon
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
 from solvers.status import Status
 
 Array = NDArray[np.float64]
 
+_GOOD_FIT = 2.0  # times the least sum of squared gaps: a guess fits a smoother stage nearly as well
+_REST = 1e-9  # [m, rad] largest motion from one knot to the next of a joint at rest
+_ASKED = 1e-6  # [m, rad, m/s, rad/s] Newton step above which the objective asks a joint to move
 _CURVED = 1e-8  # curvature, relative to that of the components, below which a direction is rounding
 _CYCLES = 200  # a trot takes 20
 _TOLERANCE = 1e-8  # change of the value from one cycle to the next, relative to its largest curvature
 _TRUST = 1e-2  # share of the regularisation that holds the start, relative to the curvature there
+
+
+def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...]) -> tuple[int, Any]:
+    """The stage that a guess of states fits best, and the derivatives there, None where no stage can be linearised.
+
+    It is the smoothest down to which the guess fits nearly as well as at harder ones. A good reference leaves small
+    gaps at a hard contact and large ones at a smooth one, where contact begins above the ground; smoothing it first
+    would only lead away from it. A poor one fits nowhere, and needs all the stages.
+    """
+    best, chosen, there = np.inf, 0, None
+    for i in range(len(stages) - 1, -1, -1):
+        linear = horizon.linearize(now.x, now.u, stages[i].kappa_eval)
+        misfit = np.inf if np.any(linear.status) else float(np.sum(horizon.gaps(linear, now.x) ** 2))
+        if misfit <= _GOOD_FIT * best and misfit < np.inf:
+            chosen, there = i, linear
+        elif best < np.inf:
+            break
+        best = min(best, misfit)
+    return chosen, there
+
+
+def at_rest(sim: Any, objective: Objective, now: Iterate) -> bool:
+    """Whether a joint rests in the states from the second on, though it starts elsewhere or has to move.
+
+    Such a guess fits a hard contact because nothing happens there. It says nothing of how contact moves that joint:
+    smooth stages find that out.
+    """
+    start, *_ = steps = np.abs(sim.difference(now.x[1:], now.x[:-1]))[:, : sim.nv]
+    objective.expand(now.x, now.u)
+    gradient = np.abs(objective.g[1:, : sim.ndx])
+    curvature = np.abs(objective.H[1:].diagonal(axis1=1, axis2=2)[:, : sim.ndx])
+    asked = np.any(gradient > _ASKED * curvature, axis=0)
+    asked = asked[: sim.nv] | asked[sim.nv :] | (start > _ASKED)
+    rests = np.all(steps[1:] <= _REST, axis=0)
+    first = 0
+    for joint in sim.mechanism.joints:
+        dofs = slice(first, first := first + joint.nv)
+        if rests[dofs].all() and asked[dofs].any():
+            return True
+    return False
 
 
 class FreeStart:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from dojo_opt import models
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
-from dojo_opt.options import PLANNED
-from dojo_opt.problem import Problem
-from dojo_opt.rest import equilibrium
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from dojo_opt.problems.locomotion import EFFORT, TORQUE_LIMIT, standing, weights
 from sim import checks
 from sim.border import whole
 from sim.simulator import Simulator

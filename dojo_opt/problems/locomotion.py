@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt import gaits, models
-from dojo_opt.constraint import Goal
+from dojo_opt.constraint import Goal, Periodic
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.feet import Feet
+from dojo_opt.gaits.equilibrium import equilibrium
+from dojo_opt.gaits.feet import Feet
 from dojo_opt.gaits.gait import Gait
-from dojo_opt.options import CONTINUATION, PLANNED
-from dojo_opt.periodic import Periodic
-from dojo_opt.problem import Problem
-from dojo_opt.rest import equilibrium
+from dojo_opt.planning.options import CONTINUATION, PLANNED
+from dojo_opt.planning.problem import Problem
 from sim import checks
 from sim.border import whole
 from sim.simulator import Simulator

@@ -1,0 +1,62 @@
+"""The public names of dojo_opt and where they live: read by type checkers and editors, and by `__init__.py`."""
+
+from dojo_opt import (
+    bridges as bridges,
+    constraint as constraint,
+    cost as cost,
+    gaits as gaits,
+    models as models,
+    plots as plots,
+    problems as problems,
+    report as report,
+    tasks as tasks,
+    viewer as viewer,
+)
+from dojo_opt.gaits.equilibrium import equilibrium as equilibrium
+from dojo_opt.identification.parameter_space import ParameterSpace as ParameterSpace
+from dojo_opt.mpc.controller import MPC as MPC
+from dojo_opt.mpc.moving import Sampled as Sampled
+from dojo_opt.planning.ilqr import ilqr as ilqr
+from dojo_opt.planning.options import Options as Options, Stage as Stage
+from dojo_opt.planning.plan import Plan as Plan
+from dojo_opt.planning.problem import Problem as Problem
+from dojo_opt.planning.residual import kernel as kernel
+from dojo_opt.planning.tracking import tracking_gains as tracking_gains
+from dojo_opt.plant.disturbances import Disturbances as Disturbances
+from dojo_opt.plant.environment import Environment as Environment
+from dojo_opt.plant.loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
+from dojo_opt.plant.perturbation import Perturbation as Perturbation, Push as Push
+from dojo_opt.plant.plant import Plant as Plant
+from dojo_opt.plant.study import monte_carlo as monte_carlo
+from sim.collisions import Collision as Collision
+from sim.gear import Gear as Gear
+from sim.mechanism import Mechanism as Mechanism
+from sim.mjcf import MjcfMechanism as MjcfMechanism, MjcfWarning as MjcfWarning, load_mjcf as load_mjcf
+from sim.parameters.parameters import Parameters as Parameters
+from sim.parts import Body as Body, Contact as Contact, Input as Input, Joint as Joint
+from sim.polytope import Polytope as Polytope
+from sim.reactions import Reactions as Reactions
+from sim.results import (
+    Interrupted as Interrupted,
+    Linearization as Linearization,
+    SimulationError as SimulationError,
+    StepResult as StepResult,
+    Trajectory as Trajectory,
+)
+from sim.shapes import (
+    Box as Box,
+    Capsule as Capsule,
+    Cylinder as Cylinder,
+    HalfSpace as HalfSpace,
+    Sphere as Sphere,
+    String as String,
+)
+from sim.simulator import Simulator as Simulator
+from sim.terrain.terrain import Terrain as Terrain
+from sim.urdf.load import load_urdf as load_urdf
+from sim.urdf.report import UrdfMechanism as UrdfMechanism, UrdfWarning as UrdfWarning
+from sim.urdf.xml import UrdfError as UrdfError
+from solvers.status import Status as Status
+
+__all__: list[str]
+__version__: str

@@ -1,0 +1,1 @@
+"""Identification: the parameters of a simulator as one vector, for optimisers that fit them to data."""
