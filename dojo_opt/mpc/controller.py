@@ -20,8 +20,8 @@ from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import StateTerm
+from dojo_opt.plant.monte_carlo import MonteCarlo, Sampler, monte_carlo
 from dojo_opt.plant.plant import Plant
-from dojo_opt.plant.study import MonteCarlo, Sampler, monte_carlo
 from dojo_opt.plant.tick import Tick
 from sim import checks
 from sim.border import whole
@@ -40,18 +40,25 @@ __all__ = ["MPC"]
 class MPC:
     """Model-predictive control: `u = mpc(time, x)`, called at any rate, plans anew once per `period`.
 
-    problem     its simulator is the model; the plant may be another one. Its start and guess are those of the first
-                plan only, which is solved to the end; its references are overwritten where `reference` is given.
-    iterations  of the planner per tick. One is enough for costs, control limits and equalities; an inequality among the
-                constraints is not seen by an iteration that starts on its good side, and takes about three
-    reference   what to track over time, see `mpc.moving.References`; without it, the problem's own at every tick
-    plan        the first plan, at the time of the first call; without it, that of `ilqr` without refinement
-    settings    fields of `dojo_opt.mpc.settings.MPCSettings` by name
-
-    A tick shifts the plan by the time that has passed and keeps its states as the guess, the measured one in front: the
+    A tick shifts the plan by the elapsed time and keeps its states as the guess, the measured one in front: the
     disturbance then sits in the first gap, which the iteration closes. (A rollout of the shifted inputs, instead, falls
     over together with the robot.) A plan that the planner rejects is not used: the one before stays in force.
-    `log` has one `Tick` per plan, of the last 10,000 or as many as the setting `log` says; None keeps all.
+    `log` has one `Tick` per plan.
+
+    Args:
+        problem: its simulator is the model; the plant may be another one. Its start and guess are those of the first
+            plan only, which is solved to the end; `reference` overwrites its references.
+        iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
+            equalities. An iteration that starts on the good side of an inequality does not see it; that takes about 3.
+        reference: what to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
+            problem at every tick).
+        plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
+        **settings: period, kappa, kappa_grad, guess, gain_scale, delay, time_limit, mean_velocity, friction,
+            learn_ground, options, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
+
+    Raises:
+        TypeError: for an unknown setting, or an argument of the wrong kind.
+        ValueError: for a setting out of range, or a reference of the wrong shape.
     """
 
     def __init__(
@@ -86,7 +93,7 @@ class MPC:
         return self._again()
 
     def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> MonteCarlo:
-        """Closed loops under random perturbations; see `dojo_opt.plant.study`."""
+        """Closed loops under random perturbations; see `dojo_opt.plant.monte_carlo`."""
         return monte_carlo(self, plant, sampler, duration, **settings)
 
     def reset(self) -> None:

@@ -17,20 +17,40 @@ __all__ = ["GUESSES", "OPTIONS", "MPCSettings"]
 
 @dataclass(frozen=True)
 class MPCSettings:
-    """Settings of `MPC`."""
+    """Settings of `MPC`.
 
-    period: float | None = None  # between plans [s]; a knot by default
-    kappa: float = 1e-4  # smoothing of the rollouts [N s m]
-    kappa_grad: float | None = None  # of the derivatives; the same by default, which saves a linearisation per tick
-    guess: str = "states"  # "states" keeps the shifted states; "feedback", "open loop" roll out from the measured one
-    gain_scale: float = 1.0  # of the feedback between plans; 0 applies the planned inputs as they are
-    delay: float = 0.0  # from a measurement to the input it causes [s]; plans start that much later
-    time_limit: float = float("inf")  # of a tick [s]; looked at before each iteration
-    mean_velocity: bool = True  # see `dojo_opt.mpc.measurement`
-    friction: float | None = None  # that plans count on, instead of the model's; less than the ground has is safer
-    learn_ground: bool = False  # take the height of the ground from the contacts that stand
-    options: Options | None = None  # of the planner in a tick; its stages are made from kappa and kappa_grad
-    log: int | None = 10_000  # the last ticks that `MPC.log` keeps, about 1 kB each; None keeps all
+    Attributes:
+        period: time between plans [s] (default None: one knot).
+        kappa: smoothing of the contacts in rollouts [N s m] (default 1e-4).
+        kappa_grad: smoothing of the contacts in derivatives [N s m] (default None: that of the rollouts, which saves
+            a linearisation per tick).
+        guess: first trajectory of a tick: "states" keeps the shifted states, "feedback" rolls out from the measured
+            state under the gains, "open loop" without them (default "states").
+        gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
+        delay: time from a measurement to the input that it causes [s]; plans start that much later (default 0).
+        time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
+        mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
+            see `dojo_opt.mpc.measurement`.
+        friction: coefficient of friction that plans count on (default None: that of the model). Less than the ground
+            has is safer.
+        learn_ground: whether to take the height of the ground from the contacts that stand (default False).
+        options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
+            kappa_grad.
+        log: how many of the last ticks `MPC.log` keeps, about 1 kB each; None keeps all (default 10,000).
+    """
+
+    period: float | None = None
+    kappa: float = 1e-4
+    kappa_grad: float | None = None
+    guess: str = "states"
+    gain_scale: float = 1.0
+    delay: float = 0.0
+    time_limit: float = float("inf")
+    mean_velocity: bool = True
+    friction: float | None = None
+    learn_ground: bool = False
+    options: Options | None = None
+    log: int | None = 10_000
 
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:

@@ -38,11 +38,9 @@ __all__ = ["Iteration", "Iterate", "Solver", "ilqr"]
 # ends of an attempt after which another first stage may lead further; all others end the solve
 FAILED = (Status.SIMULATION_FAILED, Status.INFEASIBLE, Status.LINE_SEARCH, Status.MAX_REGULARIZATION, Status.NOT_FINITE)
 
-# attempts and stages
 _LESS = 0.9  # share of the least violation so far that counts as progress
 _STALLED = 5  # multiplier updates of the last stage without progress
 _SOFTEN = 3  # times that a stuck last stage may go back to the one before it
-# one stage
 _GOOD_STEP = 0.5  # a step at least this long lowers the regularisation
 _POOR_STEP = 0.1  # one shorter than this raises it
 _LIGHT = 1.0  # regularisation up to the control weight: a small promise then means an optimum
@@ -54,7 +52,6 @@ _CREEPING = 15  # short or rejected steps in a row: of 116 planned gaits and hop
 _FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
 _FALLEN = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
 _SMALL = 1e-9  # merit below which changes are judged absolutely
-# regularisation
 _FACTOR = 2.0  # of the schedule, growing geometrically with repeated use: Tassa 2012, section II.F
 _USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
 
@@ -488,12 +485,9 @@ class Solver:
                 return Status.STOPPED
             rejected = 0 if alpha > 0.0 else rejected + 1
             short = 0 if alpha >= _POOR_STEP else short + 1
-            helped = False
-            if rejected >= rejections:
-                kappa_grad, helped = self._unstick(stage, kappa_grad)
             patience = _PATIENCE if self.now.gaps is None or last else 1
-            if helped:
-                rejected = 0
+            if rejected >= rejections and (sharper := self._unstick(stage, kappa_grad)) is not None:
+                rejected, kappa_grad = 0, sharper
             elif rejected >= patience * rejections or short >= _CREEPING:
                 return Status.LINE_SEARCH
             if alpha > 0.0:
@@ -536,18 +530,18 @@ class Solver:
         step = {"mu": mu, "alpha": alpha, "promised": promised, "gap": now.gap}
         return self._history.add(**merit, **kappas, **step, violation=self.objective.violation(now.x, now.u))
 
-    def _unstick(self, stage: Stage, kappa_grad: float) -> tuple[float, bool]:
+    def _unstick(self, stage: Stage, kappa_grad: float) -> float | None:
         """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts.
 
-        Returns the smoothing of the derivatives from now on, and whether anything has changed.
+        Returns the smoothing of the derivatives from now on, None when there is nothing to change.
         """
         if self.now.gaps is not None:
-            return kappa_grad, self._close_gaps(stage)
+            return kappa_grad if self._close_gaps(stage) else None
         if kappa_grad <= 1.01 * stage.kappa_eval:  # rounding of the factors is not a level of its own
-            return kappa_grad, False
+            return None
         self._damping.reset()
         self._expanded_at = None
-        return max(_SHARPER * kappa_grad, stage.kappa_eval), True
+        return max(_SHARPER * kappa_grad, stage.kappa_eval)
 
     def _close_gaps(self, stage: Stage) -> bool:
         """Close the gaps by a rollout; False where that falls over, but the last stage must not leave gaps."""
@@ -616,15 +610,13 @@ class Solver:
     def _free_the_start(self, start: FreeStart, model: Quadratic, promise: Promise) -> Promise:
         """Add the step of a free start, once the gaps are closed: before, both together would lead too far."""
         now, mu = self.now, self._damping.mu
+        if now.gaps is None:
+            k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
+            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone may promise more
+                self._k[:] = k
+                return promise._replace(d0=d0, d1=d1)
         start.step[:] = 0.0
-        if now.gaps is not None:
-            return promise
-        k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
-        if not d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone promises more
-            start.step[:] = 0.0
-            return promise
-        self._k[:] = k
-        return promise._replace(d0=d0, d1=d1)
+        return promise
 
     def _fault(self, promise: Promise) -> Status:
         """Why the backward pass at `now` failed with that promise; `_detail` says where."""

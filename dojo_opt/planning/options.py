@@ -15,12 +15,19 @@ __all__ = ["CONTINUATION", "PLANNED", "Options", "Stage"]
 
 
 class Stage(NamedTuple):
-    """One stage of the continuation: smoothing of the rollouts and of the derivatives [N s m], and when to go on."""
+    """One stage of the continuation: its smoothing, and when the next one begins.
+
+    Attributes:
+        kappa_eval: smoothing of the contacts in rollouts [N s m].
+        kappa_grad: smoothing of the contacts in derivatives [N s m].
+        decrease: the stage ends when an iteration promises or brings less than this share of the merit (default 0.03).
+        iterations: the stage ends after this many iterations (default 100).
+    """
 
     kappa_eval: float
     kappa_grad: float
-    decrease: float = 3e-2  # ends when an iteration promises or brings less than this share of the merit
-    iterations: int = 100  # ends after this many
+    decrease: float = 3e-2
+    iterations: int = 100
 
 
 # Contact is discovered at a large kappa, where it acts at a distance, and made true on the way down to the last stage.
@@ -36,33 +43,72 @@ PLANNED = CONTINUATION[-1].kappa_eval  # [N s m] of plans: a simulator of it rep
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of `ilqr`. The last stage is repeated, with multiplier updates, until the constraints hold."""
+    """Settings of `ilqr`. The last stage is repeated, with multiplier updates, until the constraints hold.
+
+    The merit is the cost plus the augmented Lagrangian of the constraints.
+
+    Attributes:
+        stages: the continuation, from smooth to hard contact: `Stage`s, or pairs (kappa_eval, kappa_grad) [N s m]
+            (default 3e-2, 3e-3, 1e-4, 1e-6).
+        reopen: at a change of kappa, "feedback" rolls out with the gains, "gaps" keeps the states and opens the gaps
+            (default "feedback").
+        follow: share of the merit; a rollout at the next kappa that raises the merit by more has lost the trajectory
+            (default 1).
+        bisections: how often a step of kappa is halved, on a logarithmic scale, when its rollout loses the trajectory
+            (default 3).
+        tolerance: share of the merit; the last stage ends when an iteration brings less (default 1e-3).
+        max_iterations: limit of all iterations, rejected ones included (default 300).
+        max_updates: multiplier updates before the constraints count as infeasible (default 20).
+        violation: largest violation of a constraint in a plan that counts as solved [unit of the residual]
+            (default 1e-3).
+        gap: largest gap, an entry of f(x_t, u_t) (-) x_t+1, of a trajectory that counts as consistent [m, rad, m/s,
+            rad/s] (default 1e-8).
+        penalty: first penalty of the constraints [curvature of the costs] (default 100: a goal is worth its effort).
+        penalty_growth: factor of a penalty that grows (default 10).
+        penalty_max: limit of the penalties [1 / square of the residual's unit] (default 1e8).
+        sufficient: the penalty of an entry grows unless its violation fell below this share of the one before
+            (default 0.25).
+        regularization: first regularisation of the backward pass [mean control weight] (default 0).
+        regularization_max: limit of the regularisation [mean control weight] (default 1e6).
+        value_regularization: multiple of the regularisation that is added to the Hessian V_xx of the value (default 0).
+        armijo: share of the predicted decrease that a step must achieve (default 0.01).
+        ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
+        halvings: how often the line search halves the step size (default 6).
+        rejections: failed line searches in a row before gaps are closed by a rollout, or derivatives sharpened
+            (default 2).
+        shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single
+            shooting only (default 1).
+        time_limit: limit of the wall time, looked at before each iteration [s] (default inf).
+        callback: function of the record of each iteration; it may raise StopIteration to end the solve (default None).
+        verbose: whether to print one line per iteration (default False).
+        stream: file for these lines (default None: the standard output).
+    """
 
     stages: tuple[Stage, ...] = CONTINUATION
-    reopen: str = "feedback"  # at a change of kappa: "feedback" rolls out with the gains, "gaps" keeps the states
-    follow: float = 1.0  # a rollout that raises the merit by more than this share of it has lost the trajectory
-    bisections: int = 3  # of a step of kappa in which the rollout loses the trajectory
-    tolerance: float = 1e-3  # the last stage ends when an iteration brings less than this share of the merit
-    max_iterations: int = 300  # all of them, rejected ones included
-    max_updates: int = 20  # multiplier updates before the constraints count as infeasible
-    violation: float = 1e-3  # largest violation of a plan that counts as solved
-    gap: float = 1e-8  # largest gap of a trajectory that counts as consistent
-    penalty: float = 100.0  # first, in units of the curvature of the costs: a goal is worth its effort
+    reopen: str = "feedback"
+    follow: float = 1.0
+    bisections: int = 3
+    tolerance: float = 1e-3
+    max_iterations: int = 300
+    max_updates: int = 20
+    violation: float = 1e-3
+    gap: float = 1e-8
+    penalty: float = 100.0
     penalty_growth: float = 10.0
     penalty_max: float = 1e8
-    sufficient: float = 0.25  # the penalty of an entry grows when its violation fell to more than this share
-    regularization: float = 0.0  # first; in units of the mean control weight
+    sufficient: float = 0.25
+    regularization: float = 0.0
     regularization_max: float = 1e6
-    value_regularization: float = 0.0  # share of the regularisation that goes to V_xx, in units of 1
-    armijo: float = 1e-2  # share of the predicted decrease that a step has to bring
-    ascent: float = 2.0  # with open gaps: allowed multiple of a predicted increase
-    halvings: int = 6  # of the step size
-    rejections: int = 2  # failed line searches in a row before gaps are closed by force or derivatives sharpened
-    shooting: float = 1.0  # with open gaps, a shorter step is compared with one of multiple shooting
-    time_limit: float = float("inf")  # [s]
-    callback: Callable[[dict[str, Any]], None] | None = None  # once per iteration; may raise StopIteration
+    value_regularization: float = 0.0
+    armijo: float = 1e-2
+    ascent: float = 2.0
+    halvings: int = 6
+    rejections: int = 2
+    shooting: float = 1.0
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
     verbose: bool = False
-    stream: Any = None  # where the table goes, standard output by default
+    stream: Any = None
 
     def __post_init__(self) -> None:
         if self.reopen not in ("feedback", "gaps"):

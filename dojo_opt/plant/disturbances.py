@@ -17,20 +17,32 @@ __all__ = ["Disturbances"]
 
 @dataclass(frozen=True)
 class Disturbances:
-    """A sampler: every quantity uniform in its range (low, high), every direction uniform in the horizontal plane.
+    """A sampler of perturbations: uniform in ranges (low, high), and in the horizontal plane for directions.
 
-    Ranges without extent are constants. The push happens once; its impulse has the drawn size.
+    A range without extent is a constant. The push happens once; its impulse has the sampled size.
+
+    Attributes:
+        nv: number of velocities of the robot; the first two are those of its base along x and y.
+        velocity: largest initial velocity of the base along x and along y [m/s] (default 0).
+        push: range of the impulse of the push [N s] (default (0, 0)).
+        push_time: range of the time at which the push begins [s] (default (1, 2)).
+        payload: range of the mass added to the first body [kg] (default (0, 0)).
+        payload_inertia: moment of inertia added per kg of payload [m^2] (default 0).
+        friction: range of the coefficient of friction of all contacts (default None: that of the model).
+        slope: range of the angle of the ground, which rises towards any heading [rad] (default (0, 0)).
+        delay: time from a command to the moment it acts [s] (default 0).
+        noise: standard deviation of the measured state: a number, or (ndx,) [m, rad, m/s, rad/s] (default 0).
     """
 
-    nv: int  # of the robot, whose first two velocities are those of its base along x and y
-    velocity: float = 0.0  # largest initial velocity of the base along x and along y [m/s]
-    push: tuple[float, float] = (0.0, 0.0)  # [N s]
-    push_time: tuple[float, float] = (1.0, 2.0)  # [s]
-    payload: tuple[float, float] = (0.0, 0.0)  # [kg]
-    payload_inertia: float = 0.0  # per kg of payload [m^2]
+    nv: int
+    velocity: float = 0.0
+    push: tuple[float, float] = (0.0, 0.0)
+    push_time: tuple[float, float] = (1.0, 2.0)
+    payload: tuple[float, float] = (0.0, 0.0)
+    payload_inertia: float = 0.0
     friction: tuple[float, float] | None = None
-    slope: tuple[float, float] = (0.0, 0.0)  # [rad], towards any heading
-    delay: float = 0.0  # [s]
+    slope: tuple[float, float] = (0.0, 0.0)
+    delay: float = 0.0
     noise: ArrayLike = 0.0
 
     __repr__ = brief_repr

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.problem import Problem
+from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
-from dojo_opt.plant.study import Sampler
 from sim import checks
 
 try:

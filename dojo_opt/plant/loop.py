@@ -177,15 +177,15 @@ class _LoopRecord:
 
 
 def _drive(
-    run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, lies: Callable[[Vector], bool]
+    run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, has_fallen: Callable[[Vector], bool]
 ) -> None:
     """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
     command = np.zeros(plant.sim.nu)
     own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
         if k % every == 0:
-            asked = controller(plant.time, plant.measure().copy())  # a controller may write into what it gets
-            command = checks.array("closed_loop: controller's u", asked, (plant.sim.nu,))
+            answer = controller(plant.time, plant.measure().copy())  # a controller may write into what it gets
+            command = checks.array("closed_loop: controller's u", answer, (plant.sim.nu,))
             run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
         run.rise.append(0.0 if own is None else own.rise)
         u, result = plant.step(command)
@@ -196,7 +196,7 @@ def _drive(
         run.contacts.append(result.contacts)
         run.x.append(plant.x)
         run.u.append(u)  # last: Ctrl-C may come between two of them, and counts the steps by this one
-        if lies(plant.x.copy()):
+        if has_fallen(plant.x.copy()):
             run.message, run.survived = f"Fell at {plant.time:.3f} s.", False
             break
 

@@ -1,4 +1,4 @@
-"""Perturbation: in what a plant differs from the model that MPC plans with."""
+"""Perturbation: the differences between a plant and the model that MPC plans with."""
 
 from __future__ import annotations
 
@@ -25,9 +25,13 @@ __all__ = ["Perturbation", "Push"]
 
 @dataclass(frozen=True)
 class Push:
-    """A force on a body at its centre of mass for `duration` [s] from `time` [s] on, with the given impulse [N s].
+    """A constant force at the centre of mass of a body, for a short time.
 
-    impulse: (3,) world axes. body: by name; the first one by default.
+    Attributes:
+        time: when it begins [s].
+        impulse: (3,) force times duration, world axes [N s].
+        body: name of the body (default None: the first one).
+        duration: how long it lasts [s] (default 0.02).
     """
 
     time: float
@@ -43,23 +47,41 @@ class Push:
 
 @dataclass(frozen=True)
 class Perturbation:
-    """Differences between plant and model; every field on its own, all zero or None by default."""
+    """Differences between a plant and the model that MPC plans with. Each field acts on its own; by default none does.
 
-    offset: ArrayLike = ()  # (ndx,) change of the initial state; () for none
+    Attributes:
+        offset: (ndx,) change of the initial state [m, rad, m/s, rad/s] (default (): none).
+        pushes: one `Push`, or several (default (): none).
+        payload: mass added to `payload_body` at its centre of mass [kg] (default 0).
+        payload_body: name of that body (default None: the first one).
+        payload_inertia: added to the inertia of that body: a number, or (3,) principal moments [kg m^2] (default 0).
+        friction: coefficient of friction of all contacts (default None: that of the model).
+        damping: factor of the dampers of all joints (default 1).
+        slope: angle of the ground [rad] (default 0).
+        slope_heading: direction in which the ground rises, from x to y [rad] (default 0).
+        ground_height: height of the ground [m] (default 0).
+        terrain: ground under all contacts (default None: that of the model).
+        delay: time from a command to the moment it acts [s] (default 0).
+        noise: standard deviation of the measured state: a number, or (ndx,) [m, rad, m/s, rad/s] (default 0).
+        control_limits: (lower, upper) limits of the actuators, numbers or (nu,) [N, N m] (default None: none).
+        seed: seed of the noise (default 0).
+    """
+
+    offset: ArrayLike = ()
     pushes: Sequence[Push] = ()
-    payload: float = 0.0  # mass added to `payload_body` at its centre of mass [kg]
-    payload_body: str | None = None  # by name; the first body by default
-    payload_inertia: ArrayLike = 0.0  # added likewise: a number or (3,) principal moments [kg m^2]
-    friction: float | None = None  # coefficient of all contacts
-    damping: float = 1.0  # factor of the dampers of all joints
-    slope: float = 0.0  # the ground rises by this angle [rad]
-    slope_heading: float = 0.0  # towards this direction, from x to y [rad]
-    ground_height: float = 0.0  # [m]
-    terrain: Terrain | None = None  # the ground under all contacts, instead of what the model has
-    delay: float = 0.0  # from a command to the moment it acts [s]
-    noise: ArrayLike = 0.0  # standard deviation of the measured state: a number or (ndx,) [m, rad, m/s, rad/s]
-    control_limits: tuple[ArrayLike, ArrayLike] | None = None  # of what the actuators do with a command
-    seed: int = 0  # of the noise
+    payload: float = 0.0
+    payload_body: str | None = None
+    payload_inertia: ArrayLike = 0.0
+    friction: float | None = None
+    damping: float = 1.0
+    slope: float = 0.0
+    slope_heading: float = 0.0
+    ground_height: float = 0.0
+    terrain: Terrain | None = None
+    delay: float = 0.0
+    noise: ArrayLike = 0.0
+    control_limits: tuple[ArrayLike, ArrayLike] | None = None
+    seed: int = 0
 
     __repr__ = brief_repr
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.plant.monte_carlo import MonteCarlo
 from dojo_opt.plant.plant import stands_free
-from dojo_opt.plant.study import MonteCarlo
 from dojo_opt.plant.tick import Tick, milliseconds
 from dojo_opt.plots.axes import finish, plain_ticks, units
 from dojo_opt.plots.trajectory import controls, state, velocities

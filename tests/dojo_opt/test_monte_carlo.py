@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.plant.monte_carlo import wilson_interval
 from dojo_opt.plant.plant import Plant
-from dojo_opt.plant.study import wilson_interval
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), time_step=5e-3, kappa=1e-8)
 

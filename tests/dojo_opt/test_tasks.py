@@ -7,7 +7,7 @@ import pytest
 
 import dojo_opt as dojo
 from dojo_opt.cli import main
-from dojo_opt.plant.study import MonteCarlo, MonteCarloRun
+from dojo_opt.plant.monte_carlo import MonteCarlo, MonteCarloRun
 
 
 @pytest.fixture(scope="module")
