@@ -27,7 +27,7 @@ from dojo_opt.plant.environment import Environment as Environment
 from dojo_opt.plant.loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
 from dojo_opt.plant.perturbation import Perturbation as Perturbation, Push as Push
 from dojo_opt.plant.plant import Plant as Plant
-from dojo_opt.plant.study import monte_carlo as monte_carlo
+from dojo_opt.plant.monte_carlo import monte_carlo as monte_carlo
 from sim.collisions import Collision as Collision
 from sim.gear import Gear as Gear
 from sim.mechanism import Mechanism as Mechanism
