@@ -196,7 +196,8 @@ def _models(args: argparse.Namespace) -> int:
         for entry in entries:
             dojo.plots.thumbnail(entry.build()).savefig(args.thumbnails / f"{entry.name}.png", dpi=100)
     if args.json:
-        print(json.dumps([asdict(entry) for entry in entries]))
+        rows = [asdict(entry) for entry in entries]
+        print(json.dumps([{name: row[name] for name in row if name != "builder"} for row in rows]))
         return 0
     print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  what")
     for e in entries:

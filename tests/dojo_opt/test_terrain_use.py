@@ -30,7 +30,7 @@ def test_figure_and_viewer_show_the_ground(tmp_path):
     page = dojo.viewer.save_html(t, tmp_path / "ball.html").read_text()
     assert len(page) > 1e5
 
-    from dojo_opt.viewer import _surface
+    from dojo_opt.viewer.animation import _surface
     from dojo_opt.viewer.motion import motion
 
     vertices, triangles = _surface(motion(t), WAVES, 0.1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt import viewer
+from dojo_opt.viewer import animation
 from dojo_opt.viewer.motion import motion
 from dojo_opt.viewer.page import page as page_of
 
@@ -75,7 +75,7 @@ def shown(page, path, empty=None, seconds=20.0):
 
 @pytest.mark.slow
 def test_the_robot_is_drawn_and_moves(page, quadruped, tmp_path):
-    path = viewer.save_html(quadruped, tmp_path / "fall.html")
+    path = dojo.viewer.save_html(quadruped, tmp_path / "fall.html")
     (tmp_path / "empty.html").write_text(page_of(motion(quadruped), []))
     shown(page, tmp_path / "empty.html")
     time.sleep(2.0)
@@ -99,7 +99,7 @@ def test_sloping_ground_is_drawn(page, tmp_path):
     for name, slope in (("flat", 0.0), ("slope", 0.2)):
         plant = dojo.Plant(sim, slope=slope)
         loop = dojo.closed_loop(lambda t, x: np.array([0.0, 0.0, 41.0]), plant, 0.05)
-        shown(page, viewer.save_html(loop, tmp_path / f"{name}.html"))
+        shown(page, dojo.viewer.save_html(loop, tmp_path / f"{name}.html"))
         time.sleep(2.0)
         images.append(shot(page))
     assert changed(*images) > 20_000
@@ -108,9 +108,9 @@ def test_sloping_ground_is_drawn(page, tmp_path):
 def test_a_plant_with_short_steps_does_not_make_a_long_file(tmp_path):
     sim = dojo.Simulator(dojo.models.raiberthopper(), time_step=1e-3)
     us = np.tile([0.0, 0.0, 41.0], (400, 1))
-    short = viewer.save_html(sim.rollout(sim.neutral(), us), tmp_path / "a.html").stat().st_size
+    short = dojo.viewer.save_html(sim.rollout(sim.neutral(), us), tmp_path / "a.html").stat().st_size
     coarse = sim.replace(time_step=16e-3)
-    long = viewer.save_html(coarse.rollout(sim.neutral(), us[:25]), tmp_path / "b.html").stat().st_size
+    long = dojo.viewer.save_html(coarse.rollout(sim.neutral(), us[:25]), tmp_path / "b.html").stat().st_size
     assert abs(short - long) < 5_000
 
 
@@ -124,7 +124,7 @@ def test_obstacles_are_drawn():
     sim = dojo.Simulator(mech, time_step=0.01)
     x = sim.neutral()
     x[2] = 1.0
-    commands = viewer._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
+    commands = animation._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
     drawn = [command.path.lower() for command in commands if "obstacles" in command.path.lower()]
     assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
 
@@ -163,7 +163,7 @@ def test_names_of_a_user_are_text_in_the_page(page, tmp_path, names):
     x = sim.neutral()
     x[2] = 1.0
     motion_of = sim.rollout(x, np.zeros((3, sim.nu)))
-    path = viewer.save_html(motion_of, tmp_path / "a.html")
+    path = dojo.viewer.save_html(motion_of, tmp_path / "a.html")
     assert opened(page, path) == []
     assert page.title() == " ".join(names[0].split())
     assert page.locator("#bar b").inner_text() == names[0]
