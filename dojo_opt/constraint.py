@@ -1,4 +1,4 @@
-"""Constraints: what a plan must do, met by an augmented Lagrangian with a multiplier and a penalty per entry."""
+"""Constraints: the hard aims of a plan, met by an augmented Lagrangian with a multiplier and a penalty per entry."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class ResidualConstraint:
 class Periodic:
     """(x_T (-) (x_0 (+) shift))_i = 0 for the chosen tangent components i (default all).
 
-    shift: (ndx,), zero in the rotations: by what a period moves the robot on. For problems whose start is free.
+    shift: (ndx,) displacement over one period, zero in the rotations. For problems whose start is free.
     """
 
     shift: ArrayLike = 0.0

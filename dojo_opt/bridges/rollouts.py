@@ -30,7 +30,7 @@ def _threads(process: int) -> ThreadPoolExecutor:
 
 
 class Functions(NamedTuple):
-    """What a bridge returns: step(x, u, theta=None) -> x (nx,), rollout(x0, us, theta=None) -> xs (T + 1, nx)."""
+    """The functions of a bridge: step(x, u, theta=None) -> x (nx,), rollout(x0, us, theta=None) -> xs (T + 1, nx)."""
 
     step: Callable[..., Any]
     rollout: Callable[..., Any]

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
 
 _GRID = 512  # points of a period on which the sway of the base is integrated
-_ROUND = 1e-9  # of a period: a knot this near to a change of feet belongs to what comes
+_ROUND = 1e-9  # of a period: a knot this near to a change of feet belongs to the next phase
 
 
 @dataclass(frozen=True)

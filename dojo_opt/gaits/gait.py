@@ -48,7 +48,7 @@ class Gait:
         return replace(self, time=time, x=x, feet=feet, contact=contact)
 
     def torques(self, *, iterations: int = 3) -> Array:
-        """(T, nu) inputs by inverse dynamics: what moves the joints as the reference says while its feet carry it.
+        """(T, nu) inputs by inverse dynamics: they move the joints along the reference while the feet carry the robot.
 
         The generalised forces of the motion come from steps of the same mechanism in the air with an input on every
         degree of freedom. Those of the base are balanced, as far as they can be, by small forces inside the friction

@@ -150,7 +150,7 @@ def _jump_path(t: Array, ends: Array, distance: float, crouch: float, height: fl
 
 
 def _check_legs(call: str, sim: Simulator) -> None:
-    """Refuse what has no floating base with joints on it."""
+    """Refuse robots without a floating base that has joints."""
     if not isinstance(sim, Simulator):
         raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
     joints = sim.mechanism.joints
@@ -195,13 +195,13 @@ def _periodic(
     call = f"gaits.{name}"
     checks.keywords(f"{call}(...)", unknown, _KEYWORDS)
     _check_legs(call, sim)
-    for what, value in (("speed", speed), ("lateral", lateral), ("heading_rate", heading_rate)):
-        checks.number(f"{call}({what}=...)", value)
+    for name, value in (("speed", speed), ("lateral", lateral), ("heading_rate", heading_rate)):
+        checks.number(f"{call}({name}=...)", value)
     if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
     whole(f"{call}(cycles=...)", cycles)
-    for what, value in (("step_height", step_height), ("tilt", tilt)):
-        checks.number(f"{call}({what}=...)", value, at_least=0.0)
+    for name, value in (("step_height", step_height), ("tilt", tilt)):
+        checks.number(f"{call}({name}=...)", value, at_least=0.0)
     if height is not None:
         checks.number(f"{call}(height=...)", height)
     steps = _whole(f"{call}(period=...)", period, sim.time_step) * cycles

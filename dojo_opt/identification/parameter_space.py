@@ -1,4 +1,4 @@
-"""ParameterSpace: named parameters of a simulator as one vector, within what mechanisms can have."""
+"""ParameterSpace: named parameters of a simulator as one vector, within their physical bounds."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class ParameterSpace:
     def chain(self, theta: ArrayLike, blocks: Mapping[str, ArrayLike]) -> Floats:
         """(..., n) derivatives by theta, from those by `wrt`: the blocks (..., n_k) of a simulator at theta.
 
-        blocks: what `linearize`, `vjp`, or the `parameters` of `linearize_rollout`, have returned for `wrt`.
+        blocks: derivatives by `wrt`, as `linearize`, `vjp`, or the `parameters` of `linearize_rollout` return them.
         """
         call = "ParameterSpace.chain"
         at = checks.array(f"{call}(theta)", theta, self.values.shape)

@@ -1,1 +1,1 @@
-"""Planning in closed loop: the controller and what it is made of."""
+"""Model-predictive control: the controller, its references, policy and measurements."""

@@ -50,7 +50,7 @@ class MPC:
             plan only, which is solved to the end; `reference` overwrites its references.
         iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
             equalities. An iteration that starts on the good side of an inequality does not see it; that takes about 3.
-        reference: what to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
+        reference: states to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
             problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: period, kappa, kappa_grad, guess, gain_scale, delay, time_limit, mean_velocity, friction,
@@ -71,9 +71,9 @@ class MPC:
         self.settings = MPCSettings(**settings)
         self._again = partial(MPC, problem, iterations, reference=reference, plan=plan, **settings)
         friction = {} if self.settings.friction is None else {"friction": self.settings.friction}
-        self.nominal = problem.sim  # what a plant is made from
+        self.nominal = problem.sim  # the simulator that plants are made from
         self.problem = problem.with_own_terms(**friction)
-        self.sim = self.problem.sim  # what plans are made with
+        self.sim = self.problem.sim  # the model that plans are made with
         self.start = problem.start.copy()  # (nx,) where the problem starts, and a plant may
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(iterations))
@@ -190,7 +190,7 @@ class MPC:
         return Policy(self.sim, now + delay, x, u, K, self.problem.substeps, lead)
 
     def _usable(self, result: Iteration) -> bool:
-        """Whether the result is a trajectory of the model, up to what a short step leaves open."""
+        """Whether the result is a trajectory of the model, up to the gaps that a short step leaves open."""
         ended = result.status in (Status.SOLVED, Status.LINE_SEARCH, Status.TIME_LIMIT)
         return ended and bool(np.isfinite(result.now.merit)) and result.consistent
 

@@ -30,12 +30,12 @@ class Delay:
             self._fine = sim.replace(time_step=length / self._steps)
 
     def forget(self, guess: Vector) -> None:
-        """No input is on its way; guess: (nu,) what acts until the first one arrives [N, N m]."""
+        """No input is on its way; guess: (nu,) the input that acts until the first one arrives [N, N m]."""
         self._issued.clear()
         self._before = guess
 
     def issue(self, now: float, u: Vector) -> None:
-        """Send the input u (nu,) off at `now` [s]; what the first one says is taken to have acted before it, too."""
+        """Send the input u (nu,) off at `now` [s]; the first one is taken to have acted before, too."""
         if self._fine is None:
             return
         self._before = u if not self._issued else self._before

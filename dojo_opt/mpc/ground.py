@@ -1,4 +1,4 @@
-"""Ground: how far contacts are from it, and its height learnt from what stands on it."""
+"""Ground: the distances of the contacts from it, and its height learnt from the contacts that stand."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Ground:
         return tuple(name for name, gap in zip(self.names, gaps, strict=True) if gap < _TOUCHING)
 
     def learn(self, policy: Policy, time: float, x: Vector, before: tuple[float, Vector]) -> None:
-        """Take the heights of what stands at x, measured at `time`; before: an earlier time and its state."""
+        """Take the heights of the contacts that stand at x, measured at `time`; before: an earlier sample."""
         then, x0 = before
         if time <= then:
             return

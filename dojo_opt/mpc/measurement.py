@@ -18,7 +18,7 @@ __all__ = ["Measurement"]
 
 
 class Measurement:
-    """What was measured over the last step of the model.
+    """The measurements over the last step of the model.
 
     The velocity of a state is the mean one over the interval before it. A plant with a step of 1 ms therefore reports
     another velocity than the model with its step of 50 ms means: after half a second of free fall they differ by

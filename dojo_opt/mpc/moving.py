@@ -1,4 +1,4 @@
-"""Moving references: what a receding horizon is to track, as functions of time."""
+"""Moving references: the states and inputs that a receding horizon tracks, as functions of time."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class References:
         return Sampled(self._h * np.arange(len(rows)), rows, self._sim if of_states else None)
 
     def _call_checked(self, time: float) -> None:
-        """Once at the border: every function returns what its cost can use."""
+        """Check once that every function returns rows of the shape of its reference."""
         for term, function in self._moving:
             times = time + self._h * term.knots
             checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)

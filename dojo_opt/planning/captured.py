@@ -1,4 +1,4 @@
-"""What a function of the user was compiled with: its text, and the values it takes from around it."""
+"""Fingerprints of users' functions: their code, and the outside values that Numba compiles into them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PLAIN = (bool, int, float, complex, str, bytes, np.generic, type(None))
 
 
 def fingerprint(func: Callable[..., Any]) -> Hashable:
-    """Equal for functions that compile to the same code: Numba makes constants of what a function sees around it."""
+    """Equal for functions that compile to the same code; Numba makes constants of the outside values they read."""
     text = getattr(func, "py_func", func)
     if not isinstance(text, FunctionType):
         return id(func), _Held(func)
@@ -22,14 +22,14 @@ def fingerprint(func: Callable[..., Any]) -> Hashable:
 
 
 def _outside(text: FunctionType, above: tuple[FunctionType, ...]) -> Hashable:
-    """Names and values of what a function takes from around it, and its defaults."""
+    """Names and values of the globals and closure variables that a function reads, and its defaults."""
     around = getclosurevars(text)
     found = sorted({**around.globals, **around.nonlocals}.items())
     return _value(text.__defaults__, above), tuple((name, _value(value, above)) for name, value in found)
 
 
 def _value(value: Any, above: tuple[FunctionType, ...]) -> Hashable:
-    """A value that compares as what Numba makes of it."""
+    """A value that is equal for values that Numba compiles alike."""
     if isinstance(value, _PLAIN):
         return type(value).__name__, repr(value)
     if isinstance(value, tuple):

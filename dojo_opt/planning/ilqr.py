@@ -486,7 +486,7 @@ class Solver:
             rejected = 0 if alpha > 0.0 else rejected + 1
             short = 0 if alpha >= _POOR_STEP else short + 1
             patience = _PATIENCE if self.now.gaps is None or last else 1
-            if rejected >= rejections and (sharper := self._unstick(stage, kappa_grad)) is not None:
+            if rejected >= rejections and (sharper := self._recover(stage, kappa_grad)) is not None:
                 rejected, kappa_grad = 0, sharper
             elif rejected >= patience * rejections or short >= _CREEPING:
                 return Status.LINE_SEARCH
@@ -530,7 +530,7 @@ class Solver:
         step = {"mu": mu, "alpha": alpha, "promised": promised, "gap": now.gap}
         return self._history.add(**merit, **kappas, **step, violation=self.objective.violation(now.x, now.u))
 
-    def _unstick(self, stage: Stage, kappa_grad: float) -> float | None:
+    def _recover(self, stage: Stage, kappa_grad: float) -> float | None:
         """After several failed searches: close open gaps, else bring the derivatives nearer to the rollouts.
 
         Returns the smoothing of the derivatives from now on, None when there is nothing to change.
@@ -639,7 +639,7 @@ class Solver:
     # ---- the plan ---------------------------------------------------------------------------------------------------
 
     def _finish(self, stage: Stage) -> None:
-        """Close what is open at the last smoothing, and bring the gains to the trajectory that is returned.
+        """Close the gaps at the last smoothing, and compute the gains of the trajectory that is returned.
 
         The gains have the least regularisation that every Q_uu needs: that of the last iterations only shortens their
         steps, and would leave little feedback.

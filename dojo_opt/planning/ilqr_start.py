@@ -84,7 +84,7 @@ class FreeStart:
 
     @property
     def stride(self) -> Array | None:
-        """(ndx,) by what the end is ahead of the start, None unless all of the end is tied to the start."""
+        """(ndx,) displacement over one period, None unless all of the end is tied to the start."""
         return next((term.shift for term in self._terms if term.mask.all()), None)
 
     def solve(

@@ -1,4 +1,4 @@
-"""Which numbers of a state belong to which tangent component, and differences between states in compiled loops."""
+"""The manifold of states: addresses of the tangent components, and differences between states in compiled loops."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
 def tangent_layout(sim: Any, x: Vector) -> Integers:
     """(ndx,) address in x of each scalar tangent component; -(a + 1) for the three of a quaternion that starts at a.
 
-    Found by asking the simulator what its components do: one that moves a single coordinate by itself is a scalar.
+    Found by moving each component in the simulator: one that changes a single coordinate is a scalar.
     """
     layout = np.empty(sim.ndx, dtype=np.int64)
     address, i = 0, 0

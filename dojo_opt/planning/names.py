@@ -50,7 +50,7 @@ def _numbers(call: str, chosen: Any, count: int) -> Integers:
 
 
 def state_weight(call: str, weight: Any, sim: Any) -> Any:
-    """(ndx,) weights from a table by name, zero where none is given; anything else as it is."""
+    """(ndx,) weights from a table by name, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
     out = np.zeros(sim.ndx)
@@ -61,7 +61,7 @@ def state_weight(call: str, weight: Any, sim: Any) -> Any:
 
 
 def input_weight(call: str, weight: Any, sim: Any) -> Any:
-    """(nu,) weights from a table by the names of inputs, zero where none is given; anything else as it is."""
+    """(nu,) weights from a table by the names of inputs, zero where none is given; anything else unchanged."""
     if not isinstance(weight, Mapping):
         return weight
     out = np.zeros(sim.nu)

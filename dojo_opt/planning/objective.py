@@ -15,7 +15,7 @@ from dojo_opt.planning.term import Term
 
 Matrix = NDArray[np.float64]
 
-_LEAST = 1e-3  # of the largest unit: what a component gets at least
+_LEAST = 1e-3  # share of the largest unit: least unit of a component
 
 
 class Objective:

@@ -139,7 +139,7 @@ class Options:
 
     @staticmethod
     def _check_number(name: str, value: Any, *, whole: bool) -> None:
-        """Refuse what is no number >= 0, and fractions where a count is asked for; infinity is allowed."""
+        """Refuse anything but numbers >= 0, and fractions for counts; infinity is allowed."""
         kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
         if isinstance(value, bool) or not isinstance(value, kinds) or not value >= 0:
             what = "a whole number" if whole else "a number"

@@ -65,7 +65,7 @@ class Plan:
     seconds: float  # that the solve took
     time_step: float  # [s]
     substeps: int  # simulation steps per knot
-    stride: Matrix | None = None  # (ndx,) of a motion that repeats itself: by what its end is ahead; K is then periodic
+    stride: Matrix | None = None  # (ndx,) displacement over one period of a periodic motion; K is periodic, too
     history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
     multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
     penalties: list[Matrix] = field(default_factory=list)
@@ -124,7 +124,7 @@ class Plan:
 
     @classmethod
     def load(cls, path: str | Path) -> Plan:
-        """Read what `save` wrote."""
+        """Read a file that `save` wrote."""
         with np.load(path) as data:
             meta = json.loads(str(data["meta"]))
             meta["status"] = Status(meta["status"])
@@ -136,7 +136,7 @@ class Plan:
 
 
 class History:
-    """The record of all iterations of a solve, what is printed of it, and whether the budget is used up."""
+    """The record of all iterations of a solve, its printed table, and its budget."""
 
     def __init__(self, options: Options) -> None:
         self._options = options

@@ -64,15 +64,26 @@ def _terms(given: Any) -> tuple[Spec, ...]:
 class Problem:
     """min sum of costs over x (T + 1, nx), u (T, nu) with x_0 = start, the simulator's motion, constraints and limits.
 
-    A knot spans `substeps` steps of `sim.time_step` with u held. `controls0` (T, nu) and `states0` (T + 1, nx) are the
-    guesses that `ilqr` starts from: with states, the trajectory need not be consistent and its gaps are closed on the
-    way; without, it is the rollout of the controls (zero by default).
+    The attribute `refinement` is 1. Set to more, `ilqr` ends by planning `refined(refinement)` from its first plan.
+    `refined_constraints` are constraints of that problem only, for those that lead nowhere from a distant guess.
 
-    free_start: tangent components of the start that the planner may change, by number or name, or True for all;
-    `start` is then a guess. Together with the constraint `Periodic`, such a plan is a gait that repeats itself.
+    Args:
+        sim: the simulator.
+        start: (nx,) first state.
+        horizon: number T of knots.
+        cost: one cost or several, see `dojo.cost`.
+        constraints: one constraint or several, see `dojo.constraint`.
+        control_limits: (lower, upper), numbers or (nu,) [N, N m], which hold at every iteration (default None: none).
+        substeps: steps of `sim.time_step` per knot, with the input held (default 1).
+        controls0: (T, nu) guess of the inputs [N, N m] (default zero).
+        states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
+            None: the rollout of the inputs).
+        free_start: tangent components of the start that the planner may change, by number or name, or True for all;
+            `start` is then a guess. With the constraint `Periodic`, such a plan is a gait that repeats itself.
 
-    The attribute `refinement` is 1; set to more, `ilqr` ends by planning `refined(refinement)` from what it has found.
-    `refined_constraints` are constraints that only that one has: for what leads nowhere from a guess that is far off.
+    Raises:
+        TypeError: for a `sim` that is no Simulator, or an entry of `cost` or `constraints` that is no term.
+        ValueError: for a wrong shape, a number that is not finite, or a horizon that exceeds the memory.
     """
 
     def __init__(

@@ -29,18 +29,18 @@ _READ_ONLY = re.compile(r"read-?only", re.IGNORECASE)  # of NumPy's and Numba's 
 _WRITES = "writes into x or u, its arguments; only out is to be written to, and a copy, x.copy(), can be"
 _KEPT = 64  # loops
 _NO_ROWS = np.zeros((0, 0, 0))
-_POISON = (3.0e7, -5.0e7)  # what an output holds before it is written
+_POISON = (3.0e7, -5.0e7)  # in outputs before they are written
 
 
 def kernel(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) -> Any:
-    """Compile a residual r(x, u, out), or its Jacobian, or what these call; as a decorator:
+    """Compile a residual r(x, u, out), its Jacobian, or a function that these call; as a decorator:
 
         @dojo.kernel
         def keep_away(x, u, out):
             out[0] = 0.3 - np.hypot(x[0] - 1.0, x[1])
 
     Costs and constraints take plain functions as well, and compile them; other functions that those call have to be
-    kernels. What Numba understands of Python and NumPy is allowed, but for writing into x and u. Compiled once per
+    kernels. All that Numba supports of Python and NumPy is allowed, except writing into x and u. Compiled once per
     process, for all functions with the same text and the same values around it. An index beyond the end of an array is
     an error that names function and knot; `@dojo.kernel(boundscheck=False)` saves the look at it, between a twentieth
     and a quarter of the time of a residual, and reads or writes elsewhere in memory instead. Numba never frees code: a
@@ -67,7 +67,7 @@ def check_residual(call: str, function: Any, dimension: Any, jacobian: Any, sim:
 
 
 def _tried(call: str, function: Any, shape: tuple[int, ...], sim: Any, poison: float) -> NDArray[np.float64]:
-    """What a function of the user makes of an output full of poison, and of arguments that must not be written to."""
+    """Results of a user's function for an output full of poison and arguments that must not be written to."""
     if not callable(function):
         raise ValueError(f"{call}: expected a function of (x, u, out), got {function!r}")
     x, u = (read_only(np.array(a, dtype=np.float64)) for a in (sim.neutral(), np.zeros(sim.nu)))
@@ -136,7 +136,7 @@ def _jacobian_loop(jacobian: Callable[..., Any]) -> Any:
     return evaluate
 
 
-_loops: OrderedDict[Any, Any] = OrderedDict()  # loops by what they were made of, the ones used last behind
+_loops: OrderedDict[Any, Any] = OrderedDict()  # loops by fingerprints, the most recently used last
 
 
 def _loop(make: Callable[[Any], Any], function: Callable[..., Any]) -> Any:
@@ -211,7 +211,7 @@ class ResidualKernels:
 
 
 def _of_the_compiler(error: Exception) -> str:
-    """What the compiler said, without what it says of itself."""
+    """The message of the compiler, without the part about the compiler."""
     if _READ_ONLY.search(str(error)):
         return _WRITES
     why = [line.strip() for line in str(error).splitlines() if line.strip()]

@@ -31,7 +31,7 @@ class Spec(Protocol):
 
 
 class Term:
-    """Residual r (m, d) at `knots` (m,), weight and slope (m, d); see `dojo_opt.planning.penalty` for what it adds.
+    """Residual r (m, d) at `knots` (m,), weight and slope (m, d); `dojo_opt.planning.penalty` has its formula.
 
     A cost keeps its weights; of a constraint, slope is the multiplier and weight half the penalty.
     """
@@ -56,7 +56,7 @@ class Term:
         raise NotImplementedError
 
     def value(self, xs: Matrix, us: Matrix) -> float:
-        """What the term adds to the objective at (xs, us)."""
+        """Contribution of the term to the merit at (xs, us)."""
         self.update(xs, us)
         return float(penalty(self.residual, self.weight, self.slope, self.one_sided))
 

@@ -16,15 +16,23 @@ __all__ = ["tracking_gains"]
 
 
 def tracking_gains(problem: Problem, plan: Any, *, kappa: float | None = None) -> Array:
-    """K (T, nu, ndx) of u_t = plan.u_t + K_t (x_t (-) plan.x_t), by the Riccati recursion along the plan:
+    """Gains of u_t = plan.u_t + K_t (x_t (-) plan.x_t), by the Riccati recursion along the plan:
 
         K = -(R + B^T P B)^-1 (S + B^T P A),      P := Q + A^T P A + (S^T + A^T P B) K
 
-    Q, R, S are the Gauss-Newton Hessians of the costs; constraints and control limits are left out, which a plan's own
-    gains have: stiff where a constraint is, none for an input at its limit. kappa: of the derivatives, by default the
-    simulator's.
+    Q, R, S are the Gauss-Newton Hessians of the costs. Unlike a plan's own gains, these ignore constraints, near which
+    those are stiff, and control limits, at which those are zero.
 
-    ValueError: a step of the plan cannot be linearised.
+    Args:
+        problem: the problem, for its simulator and costs.
+        plan: a plan or trajectory with x (T + 1, nx) and u (T, nu).
+        kappa: smoothing of the contacts in the derivatives [N s m] (default None: that of the simulator).
+
+    Returns:
+        The gains, (T, nu, ndx) [N or N m per unit of the state].
+
+    Raises:
+        ValueError: a step of the plan cannot be linearised.
     """
     sim = problem.sim
     line = sim.linearize_trajectory(plan.x, plan.u, substeps=problem.substeps, kappa=kappa)

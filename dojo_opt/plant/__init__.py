@@ -1,1 +1,1 @@
-"""What a controller meets: a simulator that is not its model, closed loops with it, and many of them."""
+"""Plants: simulators that differ from a controller's model, closed loops with them, and Monte Carlo runs."""

@@ -101,7 +101,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         return self.plant.measure().copy(), reward, "message" in info, over, info
 
     def _cost(self, knot: int) -> float:
-        """What the costs add at one knot."""
+        """Cost of one knot."""
         total = 0.0
         for term in self.problem.costs:
             term.update(self._xs, self._us)

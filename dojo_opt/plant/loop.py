@@ -1,4 +1,4 @@
-"""`closed_loop`: a controller and a plant over time, and what came of it."""
+"""`closed_loop`: a controller and a plant over time, and the record of their motion."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["ClosedLoop", "closed_loop"]
 
 @dataclass(frozen=True, repr=False)
 class ClosedLoop:
-    """What happened, up to the end, a fall, or the first step of the plant that could not be solved."""
+    """The record of a run, up to the end, a fall, or the first step of the plant that could not be solved."""
 
     simulator: Simulator  # of the plant, perturbation included
     time: Vector  # (N + 1,) [s]
@@ -91,15 +91,27 @@ def closed_loop(
     reference: Any = None,
     fallen: Callable[[Vector], bool] | None = None,
 ) -> ClosedLoop:
-    """Run u = controller(time, measured state) on the plant, from the start of both, for `duration` [s].
+    """Run u = controller(time, measured state) on the plant, from the start of both.
 
-    controller    an `MPC`, which is reset, or any function; asked every control_step [s], by default every time step of
-                  the plant, its answer held in between
-    reference     times (n,) -> states (n, nx) for the error; that of the controller by default, moved to the height of
-                  the ground as far as the controller has learnt it by then
-    fallen        state -> whether to stop because the robot has fallen; `plant.fallen` by default
+    Args:
+        controller: an `MPC`, which is reset, or any function of (time [s], state (nx,)) that returns an input (nu,)
+            [N, N m].
+        plant: the plant, which is reset.
+        duration: length of the run [s].
+        control_step: time between calls of the controller, whose answer is held in between [s]; a multiple of the time
+            step of the plant (default None: every time step).
+        reference: function of times (n,) [s] that returns the states (n, nx) of the error (default None: that of the
+            controller, raised by the height of the ground that the controller has learnt by then).
+        fallen: function of a state that tells whether the robot has fallen, which ends the run (default None:
+            `plant.fallen`).
 
-    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
+    Returns:
+        The motion, up to the end, a fall, or the first step of the plant that could not be solved.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a number out of range, or an answer of the controller of the wrong shape.
+        Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
     """
     if not isinstance(plant, Plant):
         raise TypeError(f"closed_loop(plant): expected a Plant, as Plant(simulator), got {plant!r}")
@@ -125,7 +137,7 @@ def closed_loop(
 
 
 def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, reference: Any) -> ClosedLoop:
-    """What was kept of the steps, as arrays."""
+    """The record of the steps, as arrays."""
     h, count = plant.sim.time_step, len(run.u)
     own, tracked = getattr(controller, "references", None), None
     if reference is None and own is not None and own.state is not None:
@@ -147,7 +159,7 @@ def _closed_loop(run: _LoopRecord, controller: Controller, plant: Plant, referen
 
 
 class Raised:
-    """States over time, the third coordinate raised by what was learnt of the ground since the time of each row."""
+    """States over time, the third coordinate raised by the height of the ground learnt until then."""
 
     def __init__(self, level: Any, time: Vector, rise: Vector) -> None:
         self._level, self._time, self._rise = level, time, rise
@@ -164,7 +176,7 @@ class Raised:
 
 @dataclass
 class _LoopRecord:
-    """What is kept of every step."""
+    """The record of the steps so far."""
 
     x: list[Vector]
     u: list[Vector] = field(default_factory=list)
@@ -179,12 +191,12 @@ class _LoopRecord:
 def _drive(
     run: _LoopRecord, controller: Controller, plant: Plant, steps: int, every: int, has_fallen: Callable[[Vector], bool]
 ) -> None:
-    """Ask the controller every so many steps of the plant, until the end, a fall, or a step that is not solved."""
+    """Call the controller at regular steps of the plant, until the end, a fall, or an unsolved step."""
     command = np.zeros(plant.sim.nu)
     own, log = getattr(controller, "references", None), getattr(controller, "log", [])
     for k in range(steps):
         if k % every == 0:
-            answer = controller(plant.time, plant.measure().copy())  # a controller may write into what it gets
+            answer = controller(plant.time, plant.measure().copy())  # a controller may write into its argument
             command = checks.array("closed_loop: controller's u", answer, (plant.sim.nu,))
             run.log += [tick for tick in log[-1:] if not run.log or tick is not run.log[-1]]
         run.rise.append(0.0 if own is None else own.rise)

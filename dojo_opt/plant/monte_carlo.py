@@ -102,18 +102,33 @@ def monte_carlo(
     control_step: float | None = None,
     components: Any = None,
 ) -> MonteCarlo:
-    """Run the closed loop `runs` times for `duration` [s], each under a perturbation drawn by the sampler.
+    """Run a closed loop many times, each time under a perturbation that the sampler draws.
 
-    controller  an `MPC`, or a function of (time, x) without memory
-    sampler     generator -> Perturbation; with an executor that uses processes, a function or object they can import
-    executor    anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
-                context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
-    components  of the `rms` of each run, as in `ClosedLoop.rms`; all that is tracked by default
+    Run i draws from the i-th child of the seed and starts from a fresh controller. States therefore depend neither on
+    the executor nor on the number of its workers; the times of ticks do, and with a `time_limit` whatever depends on
+    them.
 
-    Run i draws from the i-th child of the seed and starts from a fresh controller, so neither the executor nor the
-    number of its workers changes a state; times of ticks, and with a `time_limit` whatever depends on them, do.
+    Args:
+        controller: an `MPC`, or a function of (time, x) without memory.
+        plant: the plant; each run perturbs a copy of it.
+        sampler: generator -> Perturbation, such as `Disturbances`; with an executor that uses processes, a function or
+            object that they can import.
+        duration: length of each run [s].
+        runs: number of runs (default 100).
+        seed: seed of all random numbers (default 0).
+        executor: anything with the interface of `concurrent.futures.Executor`: a ProcessPoolExecutor (use the "spawn"
+            context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
+            (default None: one run after the other).
+        control_step: time between calls of the controller [s] (default None: every time step of the plant).
+        components: coordinates of the `rms` of each run, as in `ClosedLoop.rms` (default None: all that is tracked).
 
-    Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the MonteCarlo of the runs that are done.
+    Returns:
+        All runs, in the order of their numbers.
+
+    Raises:
+        TypeError: for an argument of the wrong kind, or a sampler that returns no Perturbation.
+        ValueError: for a number out of range.
+        Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the MonteCarlo of the finished runs.
     """
     count = whole("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):

@@ -191,7 +191,7 @@ def _array(call: str, value: ArrayLike) -> NDArray[np.float64]:
 
 
 def _check_limits(call: str, limits: Any) -> None:
-    """Refuse what is no (lower, upper) with lower <= upper; infinity is allowed."""
+    """Refuse anything but (lower, upper) with lower <= upper; infinity is allowed."""
     try:
         lo, hi = (checks.floats(call, b) for b in limits)
     except (TypeError, ValueError):

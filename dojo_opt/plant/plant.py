@@ -1,4 +1,4 @@
-"""Plant: what a controller controls, a simulator that differs from the controller's model."""
+"""Plant: a simulator that differs from the controller's model."""
 
 from __future__ import annotations
 
@@ -31,13 +31,19 @@ _LEVEL = 1e-6  # vertical part of a level axis
 class Plant:
     """A robot in the world: measured, commanded, pushed.
 
-    sim           mechanism, time step and smoothing of the plant before the perturbation: usually those of the model
-                  with a time step five to fifty times shorter and kappa=1e-8
-    start         state (nx,) at time zero on level ground; the standing one by default
-    perturbation  what is different; or its fields by name:  Plant(sim, payload=3.0, delay=0.02)
-
     `simulator` is the perturbed one. It has three more inputs for every body that is pushed. A step that it cannot
     solve is tried again with softer contact, up to a thousand times its kappa; `softened` counts those steps.
+
+    Args:
+        sim: mechanism, time step and smoothing of the plant before the perturbation: usually those of the model with a
+            time step five to fifty times shorter and kappa=1e-8.
+        start: (nx,) state at time zero on level ground (default None: the neutral one).
+        perturbation: differences from `sim` (default None: none).
+        **fields: fields of `dojo.Perturbation` by name, instead of one:  Plant(sim, payload=3.0, delay=0.02)
+
+    Raises:
+        TypeError: for an argument of the wrong kind, or an unknown field.
+        ValueError: for a value out of range, or a delay that is no multiple of the time step.
     """
 
     def __init__(
@@ -106,7 +112,7 @@ class Plant:
         if len(self._waiting) > self._late:
             acting = self._waiting.popleft()
         else:
-            acting = self._waiting[0]  # what was commanded first also acted before
+            acting = self._waiting[0]  # the first command also acted before
         u = np.clip(acting, *self._limits)
         if self.perturbation.pushes:
             end = self.time + self.sim.time_step

@@ -1,4 +1,4 @@
-"""Tick: what MPC did at one planning instant, an entry of the log of a closed loop."""
+"""Tick: the record of one planning instant of MPC, an entry of the log of a closed loop."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Tick:
 
     time: float  # of the measurement [s]
     milliseconds: float  # that the tick took, by the clock
-    cpu_milliseconds: float  # by the processor: what is left when others use the machine, too
+    cpu_milliseconds: float  # processor time, which other programs on the machine hardly change
     iterations: int  # of the planner, rejected ones included
     cost: float  # of the plan that is in force, when it was made
     alpha: float  # last step size; 0 when it was rejected

@@ -1,4 +1,4 @@
-"""What all plots do to their axes at the end, and the units on them."""
+"""Axes: the finish that all plots share, and the units on their labels."""
 
 from __future__ import annotations
 

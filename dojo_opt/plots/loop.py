@@ -1,4 +1,4 @@
-"""Figures of closed loops: what happened, how long the ticks took, how many runs survived.
+"""Figures of closed loops: the motion, the times of the ticks, the runs that survived.
 
 As in `dojo_opt.plots`: matplotlib is imported when a figure is made, and nothing is shown.
 """

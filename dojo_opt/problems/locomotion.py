@@ -101,7 +101,7 @@ def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Array
 
 
 def _stride(sim: Simulator, reference: Array) -> Array:
-    """(ndx,) by what the reference moves on: a translation of the base."""
+    """(ndx,) displacement of the reference over its period: a translation of the base."""
     stride = sim.difference(reference[-1], reference[0])
     if np.abs(stride[2:]).max() > 1e-6:
         raise ValueError(

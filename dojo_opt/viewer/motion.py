@@ -1,4 +1,4 @@
-"""Motion: what plots and viewer show of a trajectory or a plan, in world coordinates."""
+"""Motion: a trajectory or a plan in world coordinates, for plots and the viewer."""
 
 from __future__ import annotations
 

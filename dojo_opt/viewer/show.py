@@ -1,4 +1,4 @@
-"""`dojo-opt show`: what a model or a file consists of, and how it moves when it is let go."""
+"""`dojo-opt show`: the parts of a model or a file, and its motion under gravity."""
 
 from __future__ import annotations
 
