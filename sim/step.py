@@ -59,7 +59,7 @@ def step(
 
 @inlined
 def _checked(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], r: Outcome) -> Outcome:
-    """The outcome of a step, refused where the forces of loops gave energy (coupling/loop_work.py), or it gained some.
+    """The outcome of a step, refused where the forces of loops gave energy (loop_work.py), or it gained some.
 
     inputs: (q, v, u). The interior point asks for the latter of every solution it finds.
     """

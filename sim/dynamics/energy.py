@@ -153,7 +153,7 @@ def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
 
 @kernel
 def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
-    """work.dnu = P M^-1 p, P: coupling/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual.
+    """work.dnu = P M^-1 p, P: loops/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual.
 
     NaN, and False, when M is singular.
     """

@@ -72,8 +72,8 @@ class Work(NamedTuple):
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] see choice.py
-    far: Matrix  # (nground, 37) see contact/inactive.py
+    pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] active_features.py
+    far: Matrix  # (nground, 37) see inactive.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts
     cone: Matrix  # (ncontact, 12) cone variables, see contact/ground_contact.py

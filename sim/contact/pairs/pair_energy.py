@@ -7,7 +7,7 @@ that they never had. So no solution is accepted whose impulses do both, over all
     sum f.(u + u')/2 > allowed,    sum f.u' > allowed,    u, u' the relative velocities at P before and after
 
 Of the two the first is the kinetic energy that the impulses add. The second leaves out what other forces do: they may
-press bodies together that were moving apart. Impacts with restitution are looked at by contacts/restitution.py.
+press bodies together that were moving apart. Impacts with restitution are looked at by contact/restitution.py.
 Taut strings pass through nothing.
 
     allowed = share (T + T') + sum of (2 kappa + f_n (overlap where the step began + what may be left at its end))/h

@@ -55,7 +55,7 @@ def add_mass(model: Model, work: Work, h: float, i: int, w: float, col: int) -> 
 
 @kernel
 def _momentum(h: float, c: float, s: Vec3, js: Vec3) -> Vec3:
-    """P = (2/h) (psi (c J s + s x J s) - s.J s psi'/2 s), from J s: see dynamics.py."""
+    """P = (2/h) (psi (c J s + s x J s) - s.J s psi'/2 s), from J s: see momentum_balance.py."""
     psi = 2.0 / 3.0 + 1.0 / (3.0 * c * c)
     dpsi = -2.0 / (3.0 * c * c * c)
     x, y, z = cross(s[0], s[1], s[2], js[0], js[1], js[2])

@@ -1,8 +1,8 @@
-"""Parameters of terrain: the heights of its grid, by the coefficients of its spline (terrain/height_field.py).
+"""Parameters of terrain: the heights of its grid, by the coefficients of its spline (contact/height_field.py).
 
 A contact feels the ground by three numbers, F, F_x and F_y at its place: dphi = -dF/w - (phi/w^2) grad F.dgrad F, and
 the frame turns. Each has a column of dR; the coefficients around the place have shares in the three, so that a step
-costs the same for any number of heights. An impact (contacts/restitution.py) feels F also where the contact was before:
+costs the same for any number of heights. An impact (contact/restitution.py) feels F also where the contact was before:
 
     dgap = -(e dphi1 + (1 - e) dphi2), which stands in the column of F as dF = w (e dphi1 + (1 - e) dphi2)
 

@@ -79,7 +79,7 @@ def element_shift(
 
 @kernel
 def earlier_shift(model: Model, work: Work, j: int, which: int, b: Vector, configuration: int) -> Vec3:
-    """`element_shift` at configuration 1 or 2, from what `look_back` (contacts/restitution.py) has kept of it in b."""
+    """`element_shift` at configuration 1 or 2, from what `look_back` (contact/restitution.py) has kept of it in b."""
     first = configuration == 1
     n = row(b, 2 if first else 8)
     p = row(b, 16 if first else 19)

@@ -22,7 +22,7 @@ _INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 def body_parameters(mech: Mechanism, body: Body) -> list[Parameter]:
     """mass, inertia, com. The centre of mass is the origin of the body: everything else on it moves the other way.
 
-    A body that closing joints have divided (coupling/closing.py) has those of the whole.
+    A body that closing joints have divided (mechanism/closing.py) has those of the whole.
     """
     parts = [mech.body_names.index(name) for name in parts_of(mech.loops, body.name)]
     share = 1.0 / len(parts)
@@ -85,7 +85,7 @@ def geometry_parameters(joint: Joint, i: int, loop: bool) -> list[Parameter]:
 def axis_turns(axis: ArrayLike) -> Floats:
     """(3, 3) rotation of the directions of motion of a joint by its axis, which is kept at unit length.
 
-    The directions across an axis a are laid out by Gram and Schmidt (build.py), so they also spin about it.
+    The directions across an axis a are laid out by Gram and Schmidt (pack.py), so they also spin about it.
     """
     a = np.asarray(axis, dtype=np.float64)
     first, second, _ = translation_axes(2, a)
