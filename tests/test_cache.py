@@ -302,7 +302,7 @@ print(json.dumps(compiled_signatures()))
 """
     kernels = json.loads(python(program))
     assert any(name.startswith("sim.") for name in kernels)
-    hard = "complementarity interior_point inequalities central_path direction step_length merit".split()
+    hard = "complementarity interior_point inequalities globalization direction step_length merit".split()
     foreign = ("solvers.cones", "sim.contact", "sim.dynamics.joints.limits", *(f"sim.solve.{name}" for name in hard))
     assert [name for name in kernels if name.startswith(foreign)] == []
 

@@ -22,7 +22,7 @@ from sim.contact.pyramid import (
 from sim.contact.softening import soften
 from sim.model.data import Work
 from sim.model.model import Law, Model, Vector
-from sim.model.options import LINEAR, SOFT, Goal
+from sim.model.options import LawForm, NewtonTarget
 from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.jit import kernel
 from solvers.rotation import Vec3
@@ -190,33 +190,33 @@ def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, s
     W[0] = -work.cone[c, 1] / work.cone[c, 0]
     law = law_of(model, c)
     if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa, share, form == LINEAR)
+        condense_cone(model, work, c, kappa, share, form == LawForm.LINEAR)
     elif law == _LINEAR:
         condense_pyramid(model, work, c)
-    if form == SOFT:
+    if form == LawForm.SOFT:
         soften(model, work, h, c)
 
 
 @kernel
-def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
-    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the goal.
+def contact_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
+    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the target.
 
-    `goal.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
+    `target.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
     """
     z = work.cone[c]
     d = work.cone_step[c]
     w = work.contact_w[c]
-    r = goal.kappa - z[0] * z[1]
-    if goal.corrected > 0.0:
-        r -= goal.corrected * d[0] * d[1]
-    w[0] = (r - z[1] * goal.share * (work.contact_kin[c, 0] - z[0])) / z[0]
+    r = target.kappa - z[0] * z[1]
+    if target.corrected > 0.0:
+        r -= target.corrected * d[0] * d[1]
+    w[0] = (r - z[1] * target.share * (work.contact_kin[c, 0] - z[0])) / z[0]
     w[1] = 0.0
     w[2] = 0.0
     law = law_of(model, c)
     if law == _NONLINEAR:
         cone_constant(model, work, c)
     elif law == _LINEAR:
-        pyramid_constant(model, work, c, goal)
+        pyramid_constant(model, work, c, target)
 
 
 @kernel

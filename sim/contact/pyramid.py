@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.cones import orthant_step, return_pair
 from solvers.jit import kernel
@@ -150,7 +150,7 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
 
 
 @optional(Slot.PYRAMID_CONSTANT)
-def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
+def pyramid_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
     """Friction part of contact_w, after its normal part."""
     z = work.cone[c]
     d = work.cone_step[c]
@@ -159,15 +159,15 @@ def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     q = work.contact_scale[c]
     total = 0.0
     for e in range(4):
-        r = goal.kappa - z[4 + e] * z[8 + e]
-        if goal.corrected > 0.0:
-            r -= goal.corrected * d[4 + e] * d[8 + e]
-        q[8 + e] = (r - z[4 + e] * goal.share * (side(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
+        r = target.kappa - z[4 + e] * z[8 + e]
+        if target.corrected > 0.0:
+            r -= target.corrected * d[4 + e] * d[8 + e]
+        q[8 + e] = (r - z[4 + e] * target.share * (side(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
         total += q[8 + e]
-    r = goal.kappa - z[2] * z[3]
-    if goal.corrected > 0.0:
-        r -= goal.corrected * d[2] * d[3]
-    q[7] = (r + z[2] * (total - goal.share * cap_error(model, work, c))) * q[6]
+    r = target.kappa - z[2] * z[3]
+    if target.corrected > 0.0:
+        r -= target.corrected * d[2] * d[3]
+    q[7] = (r + z[2] * (total - target.share * cap_error(model, work, c))) * q[6]
     p = q[7] - z[2] * q[6] * model.contact_friction[c] * w[0]
     w[1] = q[8] - q[9] - q[4] * p
     w[2] = q[10] - q[11] - q[5] * p

@@ -39,7 +39,7 @@ from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import AT_EVERY_POSE, AT_START
+from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
@@ -63,9 +63,9 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             work.rot3[i, k] = rot[i, k]
     for m in range(work.counts[0]):
         contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
-    work.pair_free[0] = AT_EVERY_POSE  # what touched there, whatever it is now
+    work.feature_choice[0] = FeatureChoice.EVERY_POSE  # what touched there, whatever it is now
     pair_kinematics(model, work, h)
-    work.pair_free[0] = AT_START
+    work.feature_choice[0] = FeatureChoice.ONCE
     for m in range(work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             b = work.bounce[c]

@@ -71,7 +71,8 @@ class Work(NamedTuple):
     loop_used: Integers  # (nrow,) scratch
     coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] see choice.py
+    feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
+    overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
     far: Matrix  # (nground, 37) see contact/inactive.py
     far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
     # contacts

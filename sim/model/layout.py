@@ -56,8 +56,9 @@ MODEL_FLOATS = _shapes(
 
 WORK_INTS = _shapes(
     """
-    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 2,
-    loop_led 2, loop_used nrow, reach_of nreach, coupling_live ncoupling, couple_live nrow 2
+    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair,
+    feature_choice 1, overlap_allowed 1, loop_led 2, loop_used nrow, reach_of nreach, coupling_live ncoupling,
+    couple_live nrow 2
     """
 )
 

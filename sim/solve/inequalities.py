@@ -46,7 +46,7 @@ from sim.dynamics.loops.closure import keep_loops, move_loops
 from sim.dynamics.pose_jacobians import add_slip_jacobian
 from sim.model.data import Work
 from sim.model.model import Matrix, Model
-from sim.model.options import SOFT, Goal
+from sim.model.options import LawForm, NewtonTarget
 from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
@@ -164,14 +164,14 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
 
     share: of the terms that can make the matrix indefinite, the growth of the friction with the normal impulse and the
     turning of the arms of the impulses; 1 for the derivative.
-    form: PLAIN, LINEAR or SOFT, see `condense_contact`.
+    form: LawForm.PLAIN, LawForm.LINEAR or LawForm.SOFT, see `condense_contact`.
     """
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
             contact_jacobian(model, work, h, c)
             condense_contact(model, work, h, c, kappa, share, form)
             fn, f1, f2 = contact_impulse(model, work, c)
-            if form != SOFT or work.bounce[c, 1] == 0.0:  # for impacts see restitution_gradient.py
+            if form != LawForm.SOFT or work.bounce[c, 1] == 0.0:  # for impacts see restitution_gradient.py
                 add_contact_law(model, work, c, out)
             add_contact_turn(model, work, c, share * fn, share * f1, share * f2, out)
             if model.contact_terrain[c] > 0:
@@ -183,7 +183,7 @@ def condense_into(model: Model, work: Work, h: float, kappa: float, share: float
 def add_stiffness(model: Model, work: Work, h: float, kappa: float) -> None:
     """A3, A2 and joint_block += contacts and limits at the solution of a step, for its derivatives."""
     work.contact_hard[0] = 0.0
-    condense_into(model, work, h, kappa, 1.0, SOFT, work.A3)
+    condense_into(model, work, h, kappa, 1.0, LawForm.SOFT, work.A3)
     add_slip_jacobians(model, work, h)
     add_limit_blocks(model, work, h)
 
@@ -198,21 +198,21 @@ def add_slip_jacobians(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def inequality_rhs(model: Model, work: Work, goal: Goal) -> None:
-    """dnu += S2^T B^T w + limits, for the goal of this Newton step."""
+def inequality_rhs(model: Model, work: Work, target: NewtonTarget) -> None:
+    """dnu += S2^T B^T w + limits, for the target of this Newton step."""
     for i in range(work.wrench.shape[0]):
         for k in range(6):
             work.wrench[i, k] = 0.0
     for m in range(work.counts[0]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            contact_constant(model, work, c, goal)
+            contact_constant(model, work, c, target)
             w = work.contact_w[c]
             add_contact_wrench(model, work, c, w[0], w[1], w[2], work.wrench)
-    pair_constants(model, work, goal)
+    pair_constants(model, work, target)
     subtree_sums(model, work.wrench, work.subtree)
     for d in range(work.dnu.shape[0]):
         work.dnu[d] -= dot_six(work.S2[d], work.subtree[model.dof_body[d]])
-    limit_constants(model, work, goal)
+    limit_constants(model, work, target)
 
 
 @kernel

@@ -21,7 +21,7 @@ from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.residual import residual_scale
-from sim.solve.trial_velocity import NOWHERE, place
+from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
 from solvers.gauss_seidel import gauss_seidel
 from solvers.jit import kernel
 from solvers.rotation import Vec3
@@ -146,7 +146,7 @@ def descend(model: Model, work: Work) -> None:
 
 @kernel
 def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
-    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, NOWHERE where that
+    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, INFEASIBLE where that
     fails.
 
     At nu with the impulses of the step before, whose residual is in work.residual.
@@ -155,11 +155,11 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     h, kappa = options.h, options.kappa
     scale = residual_scale(work)
     if not factor_free(model, work, h, q, v):
-        return NOWHERE
+        return INFEASIBLE
     descend(model, work)
     points, size = choose(model, work, h, kappa)
     if size < 0:
-        return NOWHERE
+        return INFEASIBLE
     delassus(model, work, h, points, size)
     settled = True
     step = 1
@@ -170,8 +170,8 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
             descend(model, work)
         for d in range(v.shape[0]):
             work.dnu[d] += work.nu[d]
-        if not place(model, work, h, q, work.dnu, 1.0):
-            return NOWHERE
+        if not set_trial_velocity(model, work, h, q, work.dnu, 1.0):
+            return INFEASIBLE
         resume_inequalities(model, work, h, kappa, True)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:

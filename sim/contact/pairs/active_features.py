@@ -15,7 +15,7 @@ of a collision with a cylinder is lost so, and has nothing instead, all elements
 beginning.
 
 Shapes may slide from one element to another within a step. The one that they came to was below the other then, is left
-out, and overlaps in the end. Where several attempts end so (pair_free[1] is 1), normals may have turned on the way
+out, and overlaps in the end. Where several attempts end so (`overlap_allowed`), normals may have turned on the way
 (`left_behind`), and a small overlap is left to the next step.
 """
 
@@ -37,7 +37,7 @@ from sim.contact.pairs.previous_features import (
 )
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import ASTRAY, AT_EVERY_POSE, BESIDE_KEPT, OVERLAPPING, PLACED
+from sim.model.options import FeatureChoice, Verdict
 from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
@@ -82,7 +82,7 @@ def distance(model: Model, work: Work, first: int) -> float:
 def choose_shapes(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         remember(model, work, first)
     if on_cylinder(kind):
         choose_cylinders(model, work, first)
@@ -104,7 +104,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, work, first)
         for k in range(first, j):
             sizes = model.pair_sizes[k]
@@ -150,22 +150,22 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     return False
 
 
-@optional(Slot.OVERLAPPING, default=PLACED)
+@optional(Slot.OVERLAPPING, default=Verdict.VALID)
 def overlapping(model: Model, work: Work) -> int:
-    """PLACED, or why the solution at configuration 3 is none: OVERLAPPING in elements that were not chosen, or ASTRAY
-    where a point has passed through the other shape.
+    """The Verdict on the solution at configuration 3: OVERLAPPING in features that were not active, TUNNELLED where a
+    point has passed through the other shape, or VALID.
     """
-    found = PLACED
+    found = Verdict.VALID.value
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
-            if signed and work.pair_free[0] == AT_EVERY_POSE:
+            if signed and work.feature_choice[0] == FeatureChoice.EVERY_POSE:
                 continue
             place_shapes(model, work, j, work.pos3, work.rot3)
             if not signed and passed_through(model, work, j):
-                return ASTRAY
-            lenient = work.pair_free[0] == AT_EVERY_POSE or work.pair_free[1] == 1
+                return Verdict.TUNNELLED.value
+            lenient = work.feature_choice[0] == FeatureChoice.EVERY_POSE or work.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
             if distance(model, work, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
-                found = OVERLAPPING
+                found = Verdict.OVERLAPPING.value
     return found

@@ -13,7 +13,7 @@ from sim.contact.collision.cylinders import (
 from sim.contact.pairs.previous_features import keep, last_point, left_behind
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import BESIDE_KEPT
+from sim.model.options import FeatureChoice
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.model.slots import Slot
 from solvers.jit import inner_kernel
@@ -84,7 +84,7 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
             missing = missing or work.pair_code[j] == 0
     if missing:
         choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, work, first)
     put_all(model, work, first)
 

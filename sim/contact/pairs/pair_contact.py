@@ -22,7 +22,7 @@ from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
 from sim.model.data import Work
 from sim.model.model import Matrix, Model
-from sim.model.options import AT_EVERY_POSE
+from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
@@ -68,14 +68,14 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    if work.pair_free[0] == AT_EVERY_POSE:
+    if work.feature_choice[0] == FeatureChoice.EVERY_POSE:
         choose_shapes(model, work, first)
     elif on_cylinder(kind):
         collide_cylinders(model, work, first)
         return
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        if work.pair_free[0] != AT_EVERY_POSE:
+        if work.feature_choice[0] != FeatureChoice.EVERY_POSE:
             collide_chosen(
                 kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
             )

@@ -16,7 +16,7 @@ from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
 from sim.model.data import Work
 from sim.model.model import Matrix, Model, Vector
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
@@ -110,12 +110,12 @@ def apply_pairs(model: Model, work: Work) -> float:
 
 
 @optional(Slot.PAIR_CONSTANTS)
-def pair_constants(model: Model, work: Work, goal: Goal) -> None:
-    """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
+def pair_constants(model: Model, work: Work, target: NewtonTarget) -> None:
+    """wrench -= constant parts of the impulses of the near pairs, for the target of this Newton step."""
     ground = model.contact_height.shape[0]
     for m in range(work.counts[0], work.counts[2]):
         for c in range(work.near[m, 0], work.near[m, 1]):
-            contact_constant(model, work, c, goal)
+            contact_constant(model, work, c, target)
             w = work.contact_w[c]
             if not is_absent(work, c - ground):
                 add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)

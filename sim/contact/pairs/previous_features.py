@@ -102,7 +102,7 @@ def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector
     the points seem to have been closer than they were by that angle times their motion.
     """
     moved = moved_since(kind, out, pose, before)
-    if work.pair_free[1] == 1:
+    if work.overlap_allowed[0] == 1:
         turn = 0.0
         for k in range(9):
             turn += (pose[k] - before[k]) ** 2

@@ -12,7 +12,7 @@ from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.cones import onto_path, return_pair
 from solvers.jit import kernel
@@ -56,15 +56,15 @@ def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
 
 
 @kernel
-def limit_constants(model: Model, work: Work, goal: Goal) -> None:
+def limit_constants(model: Model, work: Work, target: NewtonTarget) -> None:
     """dnu += (impulse of size w), with d gamma = w - (gamma/s) d gap; w kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
         s = work.bound[k, 0]
         g = work.bound[k, 1]
-        r = goal.kappa - s * g
-        if goal.corrected > 0.0:
-            r -= goal.corrected * work.bound_step[k, 0] * work.bound_step[k, 1]
-        w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
+        r = target.kappa - s * g
+        if target.corrected > 0.0:
+            r -= target.corrected * work.bound_step[k, 0] * work.bound_step[k, 1]
+        w = (r - g * target.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         add_limit_impulse(model, work, k, w, work.dnu)
 
