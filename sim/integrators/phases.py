@@ -78,7 +78,7 @@ def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> flo
     total = 0.0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
-            row, speed = work.far[c], _speed(model, work, c)
+            row, speed = work.inactive[c], _speed(model, work, c)
             gap = cluster_gap(model, work, c, highest(model, c), False)
             g = _least(gap, speed, row[0], row[1], h)
             row[0], row[1] = gap, speed
@@ -134,11 +134,11 @@ def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
         t[0], t[1], t[2], t[3] = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
         for k in range(3):
             work.move[i, k] = work.pos3[i, k] - work.pos2[i, k]
-    work.counts[1] = 0
+    work.inactive_count[0] = 0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0:
-            work.far_first[work.counts[1]] = c
-            work.counts[1] += 1
+            work.inactive_first[work.inactive_count[0]] = c
+            work.inactive_count[0] += 1
         work.bounce[c, 0] = 0.0
         for k in range(work.cone.shape[1]):
             work.cone[c, k] = 0.0

@@ -22,7 +22,7 @@ from sim.model.options import Guess, Options
 from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
 from solvers.clock import seconds
-from solvers.dense import copy_vector
+from solvers.dense import clear, copy_vector
 from solvers.jit import kernel
 from solvers.parallel import parallel_kernel, prange
 from solvers.record import Table
@@ -56,17 +56,15 @@ def options_of(work: Work, settings: Vector, begins: bool) -> Options:
 
 @kernel
 def begin(work: Work) -> None:
-    """Forget the motion before."""
-    work.counts[3] = 0
-    # what is known of far contacts (contact/inactive.py), forces of loops and last directions belong to another motion
-    work.far_law[0] = 0.0
+    """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
+    work.carried_steps[0] = 0
+    work.inactive_kappa[0] = 0.0
+    clear(work.cone_step)
+    clear(work.bound_step)
     for row in range(work.couple_force.shape[0]):
         work.couple_force[row] = 0.0
-    for c in range(work.cone_step.shape[0]):
-        for k in range(work.cone_step.shape[1]):
-            work.cone_step[c, k] = 0.0
-    for k in range(work.bound_step.shape[0]):
-        work.bound_step[k, 0] = work.bound_step[k, 1] = 0.0
+    for k in range(work.couple_rank.shape[0]):
+        work.couple_rank[k] = 0.0
 
 
 @kernel

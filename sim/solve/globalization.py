@@ -157,12 +157,14 @@ def known_start(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    if work.counts[2] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
+    if work.active_count[0] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
         if set_trial_velocity(model, work, h, q, guess.velocity, 1.0):
             return KnownStart(True, kappa, residuals(model, work, h, q, v, u))
         return KnownStart(False, kappa, INFEASIBLE)
     keep_inequalities(model, work)
-    if guess.impulses and work.counts[2] == work.counts[0]:  # pairs of points may be others than in the step before
+    if (
+        guess.impulses and work.active_count[0] == work.active_ground_count[0]
+    ):  # pairs may have other points than before
         if predictable(model, work):
             start = warm_or_predicted(model, work, options, inputs, guess.velocity)
             if start.found:

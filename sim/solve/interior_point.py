@@ -22,7 +22,7 @@ It differs in these points (60,000 random extreme states, `benchmarks/robustness
 from __future__ import annotations
 
 from sim.contact.contact_law import slip_noise
-from sim.contact.inactive import came_near, choose_far, sunk_contact
+from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.pairs.active_features import overlapping
 from sim.contact.pairs.inactive_pairs import begin_pairs
 from sim.contact.pairs.pair_energy import pairs_gained
@@ -223,11 +223,11 @@ def interior_point(
         return Outcome(Status.CONTACT_SUNK.value, 1, 1e300, 0.0)
     work.overlap_allowed[0] = 0  # `find_impacts` chooses features, too
     begin_pairs(model, work, options)
-    choose_far(model, work, options)
+    choose_active(model, work, options)
     find_impacts(model, work, options.h)
     while True:
         out = solve_active(model, work, options, (q, v, u), guess, out)
-        if came_near(model, work):
+        if has_activated(model, work):
             continue
         if out.status != Status.SOLVED or not impacts_gained(model, work, options.h):
             break

@@ -35,6 +35,7 @@ from sim.contact.pairs.previous_features import (
     remember,
     rounding_of_rims,
 )
+from sim.model.columns import Cone, RelativePose, Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import FeatureChoice, Verdict
@@ -54,9 +55,9 @@ def open_pairs(model: Model, work: Work, j: int) -> float:
     for k in range(12):
         work.pair_before[j, k] = work.pair_relative[j, k]
     pose = work.pair_before[j]
-    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:12])
+    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP])
     apart = distance(model, work, j)
-    work.pair_before[j, 12] = min(apart, 0.0) - overlap_before(model, j)
+    work.pair_before[j, RelativePose.GAP] = min(apart, 0.0) - overlap_before(model, j)
     return apart
 
 
@@ -73,7 +74,7 @@ def distance(model: Model, work: Work, first: int) -> float:
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         choose(kind, j - first, faces, model.pair_sizes[j], model.hull, pose[:9], pose[9:], g)
-        least = min(least, g[0])
+        least = min(least, g[Witness.GAP])
         j += 1
     return least
 
@@ -96,11 +97,13 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
         sizes = model.pair_sizes[j]
         code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         if code > 1 or code < 0:  # a choice
-            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-            if g[0] < before[12] and left_behind(work, kind, work.pair_out[j], pose, before, before[12]):
-                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-                code = code if g[0] >= before[12] else 0
+            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+            if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
+                work, kind, work.pair_out[j], pose, before, before[RelativePose.GAP]
+            ):
+                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9 : RelativePose.GAP])
+                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+                code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
@@ -115,7 +118,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
 def choose_pairs(model: Model, work: Work) -> None:
     """`choose_shapes` of the near collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
+        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
             place_shapes(model, work, j, work.pos3, work.rot3)
             choose_shapes(model, work, j)
 
@@ -130,20 +133,25 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     before = work.pair_before[first]
     g = work.pair_trial[0]
     close = NEAR * least_size(model, first)
-    least = before[12] - _LAST_RESORT * least_size(model, first)
+    least = before[RelativePose.GAP] - _LAST_RESORT * least_size(model, first)
     ground = model.contact_height.shape[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         code = work.pair_code[j]
-        if code != 0 and work.cone[ground + j, 0] < close:
+        if code != 0 and work.cone[ground + j, Cone.SLACK] < close:
             if on_cylinder(kind):
                 cylinder_before(model, work, first, j)
             else:
                 sizes = model.pair_sizes[first]
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
+                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
             now = work.pair_out[j]
-            turned = now[1] * g[1] + now[2] * g[2] + now[3] * g[3] < 0.0
-            doubtful = turned or g[0] < least
+            turned = (
+                now[Witness.NORMAL] * g[Witness.NORMAL]
+                + now[Witness.NORMAL + 1] * g[Witness.NORMAL + 1]
+                + now[Witness.NORMAL + 2] * g[Witness.NORMAL + 2]
+                < 0.0
+            )
+            doubtful = turned or g[Witness.GAP] < least
             if doubtful and left_behind(work, kind, now, work.pair_relative[first], before, least):
                 return True
         j += 1
@@ -157,7 +165,7 @@ def overlapping(model: Model, work: Work) -> int:
     """
     found = Verdict.VALID.value
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
+        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
             if signed and work.feature_choice[0] == FeatureChoice.EVERY_POSE:
                 continue

@@ -22,7 +22,6 @@ from solvers.jit import kernel
 from solvers.optional import optional
 from solvers.rotation import Vec3, cross, rotate
 
-_STRING = int(Pair.STRING)
 _TAUT = 1e-3  # of the length: less slack than this
 _TURN = 0.2  # [rad] of the string and of its bodies in the step before: more is too fast to follow
 
@@ -53,7 +52,7 @@ def string_before(model: Model, work: Work, j: int) -> tuple[float, Vec3]:
 @optional(Slot.IS_TAUT, default=False)
 def is_taut(model: Model, work: Work, j: int) -> bool:
     """Whether pair j is a string that is taut at configuration 2, and turns slowly enough to pull as joints do."""
-    if model.pair_kind[j] % SWAPPED != _STRING:
+    if model.pair_kind[j] % SWAPPED != Pair.STRING:
         return False
     d, _ = string_before(model, work, j)
     length = model.pair_sizes[j, 0]

@@ -14,8 +14,6 @@ from sim.model.data import Work
 from sim.model.model import InputKind, Model, Vector
 from solvers.jit import kernel
 
-_JOINT = int(InputKind.JOINT)
-
 
 @kernel
 def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> None:
@@ -38,7 +36,7 @@ def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: 
                 r += h * model.dof_spring[e] * mid
             work.residual[e] += r
     for j in range(u.shape[0]):
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             work.residual[model.input_index[j]] -= h * u[j]
 
 
