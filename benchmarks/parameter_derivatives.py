@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> Report:
     """The standing quadruped, over 50 steps (5 quick)."""
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
     x, u = sim.neutral(), np.zeros(sim.nu)
-    calls = sim._calls
+    calls = sim._engine
     every, plan = select("benchmark", all_parameters(sim.mechanism, sim.time_step), sim.parameters().names)
     T = 5 if args.quick else 50
     us = np.zeros((T, sim.nu))

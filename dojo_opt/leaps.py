@@ -15,7 +15,7 @@ from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
 from sim.mechanism import checks
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ def leap(
     duration = checks.number(f"{call}(duration=...)", duration, above=0.0)
     crouch = checks.number(f"{call}(crouch=...)", crouch, at_least=0.0)
     step = checks.number(f"{call}(time_step=...)", time_step, above=0.0)
-    refinement = whole(f"{call}(refinement=...)", refinement)
+    refinement = whole_number(f"{call}(refinement=...)", refinement)
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=step, kappa=PLANNED)
     start, _ = equilibrium(sim)
     still, torques = standing(sim)

@@ -18,7 +18,7 @@ from dojo_opt.periodic import Periodic
 from dojo_opt.problem import Problem
 from dojo_opt.rest import equilibrium
 from sim.mechanism import checks
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ def follow(
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
-    substeps = whole("problems.follow(substeps=...)", substeps)
+    substeps = whole_number("problems.follow(substeps=...)", substeps)
     if (len(gait.x) - 1) % substeps:
         raise ValueError(f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are no multiple of {substeps}")
     reference = gait.x[::substeps]
@@ -190,7 +190,7 @@ def jump(
     assert isinstance(tracking, Tracking)
     path = np.asarray(tracking.reference)
     top = int(path[:, 2].argmax())
-    problem.refinement = whole("problems.jump(refinement=...)", refinement)
+    problem.refinement = whole_number("problems.jump(refinement=...)", refinement)
     problem.refined_constraints = (Goal(path[top], components=[2], knots=top),)
     return problem
 
@@ -206,6 +206,6 @@ def _quadruped(gait: Any, time_step: float, damping: float, settings: dict[str, 
     model = {key: settings[key] for key in ("friction", "contacts") if key in settings}
     if follows.get("periodic") and gait is not gaits.jump:
         rest.setdefault("cycles", 1)
-    h = time_step / whole("problems.follow(substeps=...)", follows.get("substeps", 1))
+    h = time_step / whole_number("problems.follow(substeps=...)", follows.get("substeps", 1))
     sim = Simulator(models.quadruped(damper=damping, **model), time_step=h, kappa=PLANNED)
     return follow(gait(sim, **keywords, **rest), **follows)

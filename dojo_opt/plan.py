@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.brief import brief_table
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Plan:
         fun is that of all cycles; multipliers, penalties and history stay behind. ValueError for a plan that does not
         repeat itself, or that was loaded from a file and knows no simulator.
         """
-        n = whole("Plan.repeated(count)", count)
+        n = whole_number("Plan.repeated(count)", count)
         if self.stride is None or self.problem is None:
             why = "its end is not its start (Periodic)" if self.stride is None else "it has no problem"
             raise ValueError(f"Plan.repeated: this plan cannot be repeated, {why}")

@@ -14,7 +14,7 @@ from dojo_opt.cost import Spec
 from dojo_opt.manifold import tangent_layout
 from dojo_opt.names import chosen_components
 from dojo_opt.term import numbers, state_table, table
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -93,8 +93,8 @@ class Problem:
         if not all(hasattr(sim, name) for name in ("nx", "ndx", "nu", "integrate", "horizon")):
             raise TypeError(f"Problem(sim): expected a Simulator, got {sim!r}")
         self.sim = sim
-        self.horizon = whole("Problem(horizon=...)", horizon)
-        self.substeps = whole("Problem(substeps=...)", substeps)
+        self.horizon = whole_number("Problem(horizon=...)", horizon)
+        self.substeps = whole_number("Problem(substeps=...)", substeps)
         self.refinement = 1
         self.refined_constraints: tuple[Spec, ...] = ()
         self._check_memory()
@@ -137,7 +137,7 @@ class Problem:
         A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
         shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
         """
-        count = whole("Problem.refined(count)", count)
+        count = whole_number("Problem.refined(count)", count)
         finer = copy.copy(self)
         finer.sim = self.sim.replace(time_step=self.sim.time_step / count)
         finer.substeps = self.substeps * count

@@ -15,8 +15,7 @@ from dojo_opt.locomotion import bound, follow, jump, pace, trot, turn, walk
 from dojo_opt.options import PLANNED
 from dojo_opt.problem import Problem
 from sim.mechanism import checks
-from sim.mechanism.checks import nearest
-from sim.simulator.border import whole
+from sim.mechanism.checks import nearest, whole_number
 from sim.simulator.simulator import Simulator
 
 __all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
@@ -33,7 +32,7 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
     knot, horizon = 0.05, 20
     place = np.array(checks.vector("problems.hop(target=...)", target, 2))
     height = checks.number("problems.hop(height=...)", height)
-    substeps = whole("problems.hop(substeps=...)", substeps)
+    substeps = whole_number("problems.hop(substeps=...)", substeps)
     sim = Simulator(models.raiberthopper(**model), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     goal, apex = start.copy(), start.copy()

@@ -18,9 +18,8 @@ from dojo_opt.options import PLANNED
 from dojo_opt.plant.plant import Plant
 from dojo_opt.problem import Problem
 from sim.mechanism import checks
-from sim.mechanism.checks import nearest
+from sim.mechanism.checks import nearest, whole_number
 from sim.mechanism.terrain import Terrain
-from sim.simulator.border import whole
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
@@ -107,7 +106,7 @@ def hopper_mpc(
     as much, beside positions that weigh a tenth, are spared at the top of the hop: it is 40 mm too low then.
     """
     knot, horizon = 0.05, 20
-    substeps = whole("tasks.hopper_mpc(substeps=...)", substeps)
+    substeps = whole_number("tasks.hopper_mpc(substeps=...)", substeps)
     sim = Simulator(models.raiberthopper(), time_step=knot / substeps, kappa=PLANNED)
     start = sim.neutral()
     weight = np.array([100.0, 100.0, 100.0, 20.0, 20.0, 1.0, 15.0, 4.0, 4.0] + [0.01] * 5)
@@ -145,7 +144,7 @@ def quadruped_mpc(
     friction of .4 where the robot's feet have .8: what they ask for is there on slippery ground, too.
     """
     knot, horizon, limit = 0.04, 20, 33.5
-    substeps = whole("tasks.quadruped_mpc(substeps=...)", substeps)
+    substeps = whole_number("tasks.quadruped_mpc(substeps=...)", substeps)
     sim = level = Simulator(models.quadruped(damper=damper), time_step=knot / substeps, kappa=PLANNED)
     fine = gaits.trot(level.replace(time_step=knot / 8), speed=speed, period=period, cycles=1, step_height=step_height)
     advance = sim.difference(fine.x[-1], fine.x[0])

@@ -142,6 +142,8 @@ class Rollouts:
     def _gradient(self, xs: Floats, us: Floats, theta: Floats, loss: Floats) -> tuple[Floats, Floats, Floats]:
         """Gradients by dx_0 (ndx,), the inputs (T, nu) and theta (n,) of one rollout; loss: (T + 1, ndx) that by dx."""
         names = self._space.wrt if self._space is not None and theta.size else ()
-        blocks = self._simulator(theta).vjp((xs, us), loss, wrt=("state", "input", *names), kappa=self._kappa)
+        blocks = self._simulator(theta).vjp(
+            (xs, us), loss, wrt=("state", "input", *names), kappa=self._kappa, throw=True
+        )
         by_theta = self._space.chain(theta, blocks) if self._space is not None and theta.size else theta
         return blocks["state"], blocks["input"], by_theta

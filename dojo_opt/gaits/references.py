@@ -16,7 +16,7 @@ from dojo_opt.feet import Feet
 from dojo_opt.gaits.footfall import Footfall
 from dojo_opt.gaits.gait import Gait, assemble
 from sim.mechanism import checks
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -199,7 +199,7 @@ def _periodic(
         checks.number(f"{call}({what}=...)", value)
     if not 0.0 < checks.number(f"{call}(duty=...)", duty) < 1.0:
         raise ValueError(f"{call}(duty=...): expected a share of the period between 0 and 1, got {duty}")
-    whole(f"{call}(cycles=...)", cycles)
+    whole_number(f"{call}(cycles=...)", cycles)
     for what, value in (("step_height", step_height), ("tilt", tilt)):
         checks.number(f"{call}({what}=...)", value, at_least=0.0)
     if height is not None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
-from sim.simulator.border import whole
 
 Point = tuple[float, float, float]
 
@@ -17,7 +17,7 @@ def box_chain(
     joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
     each joint. ValueError: n is no whole number of boxes; the message names `call`.
     """
-    n = whole(f"{call}(n)", n)
+    n = whole_number(f"{call}(n)", n)
     links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]
     front, rear = (size[0] / 2, 0.0, 0.0), (-size[0] / 2, 0.0, 0.0)
     joints = [Joint("floating", None, "link_0", name="base")]

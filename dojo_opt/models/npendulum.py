@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
-from sim.simulator.border import whole
 
 
 def npendulum(
@@ -31,7 +31,7 @@ def npendulum(
     mass [kg] and length [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. `joint` may be any kind
     without translation, e.g. "spherical"; its coordinates are then quaternions, and u three torques per joint.
     """
-    n = whole("npendulum(n)", n)
+    n = whole_number("npendulum(n)", n)
     half = (0.0, 0.0, length / 2)
     below = (0.0, 0.0, -length / 2)
     pivot = (0.0, 0.0, 1.1 * n * length)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Cylinder
-from sim.simulator.border import whole
 
 
 def nslider(
@@ -28,7 +28,7 @@ def nslider(
 
     mass [kg], length and radius [m] of one rod; spring [N/m] and damper [N s/m] of each rail.
     """
-    n = whole("nslider(n)", n)
+    n = whole_number("nslider(n)", n)
     rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]
     top = (0.0, 0.0, length / 2)
     rails = [

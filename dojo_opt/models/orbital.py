@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
-from sim.simulator.border import whole
 
 
 def orbital(
@@ -29,7 +29,7 @@ def orbital(
     mass [kg], length and width [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. All coordinates
     zero is hanging straight down.
     """
-    n = whole("orbital(n)", n, 2)
+    n = whole_number("orbital(n)", n, 2)
     upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
     links = [Body(f"link_{i}", mass, shape=Box(width, width, length)) for i in range(n)]
     joints = [Joint("fixed", None, "link_0", name="joint_0", child_point=upper)]

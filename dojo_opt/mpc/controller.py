@@ -24,7 +24,7 @@ from dojo_opt.plant.study import Sampler, Study, monte_carlo
 from dojo_opt.problem import Problem
 from dojo_opt.term import StateTerm
 from sim.mechanism import checks
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -57,7 +57,7 @@ class MPC:
     def __init__(
         self, problem: Problem, iterations: int = 1, *, reference: Any = None, plan: Plan | None = None, **settings: Any
     ) -> None:
-        iterations = whole("MPC(iterations=...)", iterations)
+        iterations = whole_number("MPC(iterations=...)", iterations)
         if not isinstance(problem, Problem):
             raise TypeError(f"MPC(problem): expected a Problem, got {problem!r}")
         checks.keywords("MPC(...)", settings, Settings.__dataclass_fields__)

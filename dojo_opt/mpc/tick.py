@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dojo_opt.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Settings:
         for name in ("gain_scale", "delay"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
         if self.log is not None:
-            whole("MPC(log=...)", self.log)
+            whole_number("MPC(log=...)", self.log)
         if self.friction is not None:
             checks.number("MPC(friction=...)", self.friction, at_least=0.0)
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.plant.perturbation import Perturbation, Push
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 
 __all__ = ["Disturbances"]
 
@@ -37,7 +37,7 @@ class Disturbances:
 
     def __post_init__(self) -> None:
         call = "Disturbances"
-        whole(f"{call}(nv)", self.nv)
+        whole_number(f"{call}(nv)", self.nv)
         checks.number(f"{call}(velocity=...)", self.velocity, at_least=0.0)
         for name in ("push", "push_time", "payload", "friction", "slope"):
             if (given := getattr(self, name)) is not None:

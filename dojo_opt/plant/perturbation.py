@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
+from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Input
 from sim.mechanism.terrain import Terrain
-from sim.simulator.border import whole
 from sim.simulator.contact_settings import with_contacts
 
 Vector = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Perturbation:
         _array(f"{call}(offset=...)", self.offset)
         if self.control_limits is not None:
             _check_limits(f"{call}(control_limits=...)", self.control_limits)
-        whole(f"{call}(seed=...)", self.seed, 0)
+        whole_number(f"{call}(seed=...)", self.seed, 0)
         if self.friction is not None:
             checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
         if not abs(checks.number(f"{call}(slope=...)", self.slope)) < 0.5 * np.pi:

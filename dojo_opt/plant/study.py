@@ -18,7 +18,7 @@ from dojo_opt.plant.perturbation import Perturbation
 from dojo_opt.plant.plant import Plant
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr, brief_table
-from sim.simulator.border import whole
+from sim.mechanism.checks import whole_number
 from sim.simulator.results import Interrupted
 
 Vector = NDArray[np.float64]
@@ -115,7 +115,7 @@ def monte_carlo(
 
     Ctrl-C raises `Interrupted`, a KeyboardInterrupt; its `result` is the Study of the runs that are done.
     """
-    count = whole("monte_carlo(runs=...)", runs)
+    count = whole_number("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):
         raise TypeError(f"monte_carlo(plant): expected a Plant, as Plant(simulator), got {plant!r}")
     for name, function in (("controller", controller), ("sampler", sampler)):
@@ -123,7 +123,7 @@ def monte_carlo(
             raise TypeError(f"monte_carlo({name}): expected a function, got {function!r}")
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"monte_carlo(executor=...): expected an Executor, with submit(), got {executor!r}")
-    whole("monte_carlo(seed=...)", seed, 0)
+    whole_number("monte_carlo(seed=...)", seed, 0)
     checks.number("monte_carlo(duration)", duration, above=0.0)
     children = np.random.SeedSequence(seed).spawn(count)
     tasks = [(controller, plant, sampler, float(duration), (control_step, components), child) for child in children]

@@ -1,13 +1,20 @@
-"""Wrenches from outside on a tree, gravity and inputs, and their derivatives; about O, in world axes."""
+"""Gravity, inputs and external wrenches on a tree, and their derivatives; about O, in world axes."""
 
 from __future__ import annotations
 
 from sim.dynamics.elimination import add_children
 from sim.model.data import Work
-from sim.model.model import InputKind, Integers, Matrix, Model, Vector
-from solvers.dense import dot
+from sim.model.model import Cube, InputKind, Integers, Matrix, Model, Vector
+from solvers.dense import copy, dot
 from solvers.jit import kernel
 from solvers.rotation import cross, rotate
+
+
+@kernel
+def set_external(work: Work, wrenches: Cube, t: int) -> None:
+    """work.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
+    if wrenches.shape[0] > 0:
+        copy(wrenches[t], work.external)
 
 
 @kernel
@@ -30,15 +37,17 @@ def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
 
 @kernel
 def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
-    """out[i] = wrench of gravity and of WORLD and BODY inputs on the subtree of body i.   (nbody, 6)"""
+    """out[i] = wrench of gravity, external wrenches and WORLD and BODY inputs on the subtree of body i.   (nbody, 6)"""
     n = model.body_parent.shape[0]
     o, g = work.origin, model.gravity
     for i in range(n):
         m = model.body_mass[i]
         F = out[i]
-        F[0], F[1], F[2] = m * g[0], m * g[1], m * g[2]
+        e = work.external[i]
+        F[0], F[1], F[2] = m * g[0] + e[0], m * g[1] + e[1], m * g[2] + e[2]
         x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
-        F[3], F[4], F[5] = cross(x, y, z, F[0], F[1], F[2])
+        t = cross(x, y, z, F[0], F[1], F[2])
+        F[3], F[4], F[5] = t[0] + e[3], t[1] + e[4], t[2] + e[5]
     for j in range(u.shape[0]):
         if model.input_kind[j] != InputKind.JOINT:
             w = work.wrench[0]
@@ -64,13 +73,13 @@ def _add_force_slope(f: Vector, x: float, y: float, z: float, out: Vector) -> No
 
 @kernel
 def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
-    """out[i] = N of the subtree of body i, (nbody, 36): gravity, WORLD inputs, and BODY inputs, which turn along."""
+    """out[i] = N of the subtree of body i, (nbody, 36): of `outer_wrenches`; BODY inputs turn along."""
     n, o, w = model.body_parent.shape[0], work.origin, work.wrench[0]
     for i in range(n):
         for k in range(36):
             out[i, k] = 0.0
         for k in range(3):
-            w[k] = model.body_mass[i] * model.gravity[k]
+            w[k] = model.body_mass[i] * model.gravity[k] + work.external[i, k]
         _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], out[i])
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:

@@ -69,7 +69,8 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
     for i in range(model.body_parent.shape[0]):
         m = h * model.body_mass[i]
         for k in range(3):
-            work.momentum_in[i, k] += m * model.gravity[k]
+            work.momentum_in[i, k] += m * model.gravity[k] + h * work.external[i, k]
+            work.momentum_in[i, 3 + k] += h * work.external[i, 3 + k]
             work.body_impulse[i, k] = 0.0
             work.body_impulse[i, 3 + k] = 0.0
     representable = turns_below_half(model, work, h, v)

@@ -74,21 +74,29 @@ def state_differences(model_at: Table, x0s: Matrix, x1s: Matrix, out: Matrix) ->
 
 
 @kernel
+def normalise_state(model: Model, x: Vector, tolerance: float) -> int:
+    """`normalise_quaternions` of one state: -1, or the body."""
+    for i in range(model.body_parent.shape[0]):
+        if model.joint_nrot[i] == 3:
+            a = model.body_qadr[i] + model.joint_ntrans[i]
+            s = (x[a] ** 2 + x[a + 1] ** 2 + x[a + 2] ** 2 + x[a + 3] ** 2) ** 0.5
+            if not abs(s - 1.0) <= tolerance:
+                return i
+            if abs(s - 1.0) > 1e-12:
+                for k in range(4):
+                    x[a + k] /= s
+    return -1
+
+
+@kernel
 def normalise_quaternions(model_at: Table, xs: Matrix, tolerance: float) -> int:
     """Scale the quaternions of every row to length one, in place, unless they are so to 1e-12 already.
 
     Returns -1, or row * nbody + body of the first one that is off by more than the tolerance.   xs: (n, nx).
     """
     model = model_view(model_at)
-    n = model.body_parent.shape[0]
     for t in range(xs.shape[0]):
-        for i in range(n):
-            if model.joint_nrot[i] == 3:
-                a = model.body_qadr[i] + model.joint_ntrans[i]
-                s = (xs[t, a] ** 2 + xs[t, a + 1] ** 2 + xs[t, a + 2] ** 2 + xs[t, a + 3] ** 2) ** 0.5
-                if not abs(s - 1.0) <= tolerance:
-                    return t * n + i
-                if abs(s - 1.0) > 1e-12:
-                    for k in range(4):
-                        xs[t, a + k] /= s
+        body = normalise_state(model, xs[t], tolerance)
+        if body >= 0:
+            return t * model.body_parent.shape[0] + body
     return -1

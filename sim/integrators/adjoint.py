@@ -16,10 +16,10 @@ from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.parameters.height_columns import add_height_gradient
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
-from sim.integrators.rollout import Cube, Linearized, linearize
+from sim.integrators.rollout import Linearized, linearize
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import IntegerMatrix, Matrix, Model, Vector
+from sim.model.model import Cube, IntegerMatrix, Matrix, Model, Vector
 from sim.model.pace import DEADLINE
 from solvers.clock import seconds
 from solvers.jit import kernel
@@ -36,6 +36,7 @@ class Sweep(NamedTuple):
 
     xs: Matrix  # (T + 1, nx)
     us: Matrix  # (T, nu)
+    wrenches: Cube  # (T, nbody, 6) external ones, or (0, nbody, 6)
     loss: Matrix  # (T + 1, ndx) dL/dx_t
     A: Cube  # (1, ndx, ndx) of one step
     B: Cube  # (1, ndx, nu)
@@ -74,7 +75,8 @@ def sweep(
     for t in range(left - 1, -1, -1):
         for k in range(line.xs.shape[1]):
             line.x_next[0, k] = line.xs[t + 1, k]
-        one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], line.A, line.B, line.x_next, line.report)
+        wrenches = line.wrenches[t : t + 1]
+        one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], wrenches, line.A, line.B, line.x_next, line.report)
         linearize(model_at, work_at, settings, (0, 0, 1), 1, one)
         if line.report[0, 0] != _SOLVED:
             return t + 1

@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.contact.inactive import cluster_gap, highest
-from sim.integrators.rollout import Cube
+from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import Scheme, advance, begin
 from sim.mechanism.confined import IDLE
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Model, Vector
+from sim.model.model import Cube, Matrix, Model, Vector
 from sim.model.pace import is_due, start_pace
 from solvers.dense import copy, copy_vector
 from solvers.jit import kernel
@@ -151,6 +151,7 @@ class Flight(NamedTuple):
     """Steps while all is far."""
 
     us: Matrix  # (T, nu) in
+    wrenches: Cube  # (T, nbody, 6) in, or (0, nbody, 6)
     xs: Matrix  # (T + 1, nx), of which xs[0] is given
     reports: Matrix  # (T, 5)
     contacts: Cube  # (T, ncontact, 11)
@@ -180,6 +181,7 @@ def roll_far(
         if left_out(model, work, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
         _leave(work)
+        set_external(work, flight.wrenches, t)
         status = advance(model, work, scheme, h, us[t], x, None)
         reports[t, 0], reports[t, 1], reports[t, 4] = status, scheme.b.shape[0], -1.0
         if status != _SOLVED:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import integrate_state, state_difference
-from sim.integrators.rollout import Cube, options_of
+from sim.integrators.rollout import options_of
 from sim.model.layout import model_view, work_view
-from sim.model.model import Matrix, Vector
+from sim.model.model import Cube, Matrix, Vector
 from sim.model.options import Guess
 from sim.model.pace import is_due
 from sim.step import step
@@ -29,6 +30,7 @@ class Policy(NamedTuple):
 
     xs: Matrix  # (T + 1, nx)
     us: Matrix  # (T, nu)
+    wrenches: Cube  # (T, nbody, 6) external ones, held over a knot, or (0, nbody, 6)
     ks: Matrix  # (T, nu)
     Ks: Cube  # (T, nu, ndx)
     gaps: Matrix  # (T + 1, ndx)  f(xs_t, us_t) (-) xs_t+1
@@ -108,6 +110,7 @@ def closed_loop(
         due = False
         for s in range(before, substeps):
             copy_vector(b, work.step_x[0])
+            set_external(work, policy.wrenches, t)
             guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
             if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t * substeps + s

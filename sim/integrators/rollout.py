@@ -15,9 +15,11 @@ from typing import NamedTuple
 
 from sim.contact.contact_report import report_contacts
 from sim.derivatives.step_gradient import gradient
+from sim.dynamics.external_forces import set_external
+from sim.dynamics.state import normalise_state
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
-from sim.model.model import Integers, Matrix, Vector
+from sim.model.model import Cube, Integers, Matrix, Model, Vector
 from sim.model.options import Guess, Options
 from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
@@ -30,8 +32,10 @@ from solvers.status import Status
 
 _SOLVED = int(Status.SOLVED)
 _SINGULAR = int(Status.SINGULAR)
+_NOT_FINITE = int(Status.NOT_FINITE)
+UNIT = 1e-6  # by how much the length of a quaternion may be off
+REFUSED = -1  # in place of a Status: no state, or no inputs
 ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over inertia (contacts/softening.py)
-Cube = Matrix  # (n, rows, columns)
 
 
 class Linearized(NamedTuple):
@@ -39,10 +43,23 @@ class Linearized(NamedTuple):
 
     xs: Matrix  # (T, nx) or (T + 1, nx) states, in
     us: Matrix  # (T, nu) inputs, in
+    wrenches: Cube  # (T, nbody, 6) external ones, in, or (0, nbody, 6)
     A: Cube  # (T, ndx, ndx)
     B: Cube  # (T, ndx, nu)
     x_next: Matrix  # (T, nx), in: where the steps of one-step knots start to look for their velocities
     reports: Matrix  # (T, 6)
+
+
+class Motion(NamedTuple):
+    """A motion and what a loop over time fills in; what is not asked for has no rows."""
+
+    xs: Matrix  # (T + 1, nx), of which the first row is given
+    us: Matrix  # (T, nu) inputs, in
+    wrenches: Cube  # (T, nbody, 6) external ones, in, or (0, nbody, 6)
+    reports: Matrix  # (T, 6), or (1, 6) for that of the last step
+    contacts: Cube  # (T, ncontact, 11), or (0, ncontact, 11)
+    A: Cube  # (T, ndx, ndx) derivatives of the steps, or (0, ndx, ndx)
+    B: Cube  # (T, ndx, nu)
 
 
 @kernel
@@ -61,6 +78,7 @@ def begin(work: Work) -> None:
     work.inactive_kappa[0] = 0.0
     clear(work.cone_step)
     clear(work.bound_step)
+    clear(work.external)
     for row in range(work.couple_force.shape[0]):
         work.couple_force[row] = 0.0
     for k in range(work.couple_rank.shape[0]):
@@ -68,31 +86,61 @@ def begin(work: Work) -> None:
 
 
 @kernel
-def roll(
-    model_at: Table,
-    work_at: Table,
-    settings: Vector,
-    us: Matrix,
-    xs: Matrix,
-    reports: Matrix,
-    contacts: Cube,
-    first: int,
-) -> int:
+def is_finite(row: Vector) -> bool:
+    """Whether all numbers are."""
+    total = 0.0
+    for k in range(row.shape[0]):
+        total += 0.0 * row[k]
+    return total == 0.0
+
+
+@kernel
+def accept(model: Model, motion: Motion) -> bool:
+    """Whether a motion begins at a state, with quaternions of length one to UNIT, under inputs that are numbers."""
+    if not is_finite(motion.xs[0]) or normalise_state(model, motion.xs[0], UNIT) >= 0:
+        return False
+    for t in range(motion.us.shape[0]):
+        if not is_finite(motion.us[t]):
+            return False
+    return True
+
+
+@kernel
+def roll(model_at: Table, work_at: Table, settings: Vector, motion: Motion, first: int) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
-    us: (T, nu); xs: (T + 1, nx), of which xs[0] is given; reports: (T, 6); contacts: (T, ncontact, 11).
+    A step is solved once, and differentiated where it ends. What nobody may begin with has the status REFUSED.
     """
     model = model_view(model_at)
     work = work_view(work_at)
+    if first == 0 and not accept(model, motion):
+        motion.reports[0, 0] = REFUSED
+        return 0
     options = options_of(work, settings, first == 0)
     nq = work.theta1.shape[0]
-    for t in range(first, us.shape[0]):
-        if step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], reports[t]) != _SOLVED:
+    steps = motion.us.shape[0]
+    for t in range(first, steps):
+        x = motion.xs[t]
+        report = motion.reports[min(t, motion.reports.shape[0] - 1)]
+        set_external(work, motion.wrenches, t)
+        if step(model, work, options, x, motion.us[t], Guess(x[nq:], t > 0), motion.xs[t + 1], report) != _SOLVED:
             return t
-        report_contacts(model, work, options.h, contacts[t])
-        if is_due(work, reports[t, 1]):
+        done = report[1]
+        if motion.contacts.shape[0] > 0:
+            report_contacts(model, work, options.h, motion.contacts[t])
+            for c in range(motion.contacts.shape[1]):
+                if not is_finite(motion.contacts[t, c]):
+                    report[0] = _NOT_FINITE
+                    return t
+        if motion.A.shape[0] > 0:
+            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
+                report[0] = _SINGULAR
+                return t
+            report[5] = ACCURACY * work.contact_hard[0]
+            done += motion.A.shape[1]
+        if is_due(work, done):
             return t + 1
-    return us.shape[0]
+    return steps
 
 
 @kernel
@@ -154,6 +202,7 @@ def linearize(
         for s in range(before, substeps):
             copy_vector(x_next, x)
             guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
+            set_external(work, line.wrenches, t)
             if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break
             Js = A if s == 0 else work.step_A
@@ -189,63 +238,40 @@ def linearize_knots(
             done[c] = linearize(model_at, work_ats[c], settings, knots, substeps, line)
 
 
-@kernel
-def _roll_one(
-    model_at: Table,
-    work_at: Table,
-    settings: Vector,
-    us: Matrix,
-    xs: Matrix,
-    first: int,
-) -> tuple[int, int]:
-    """As `roll`, but keeps its states only: (status, number of solved steps)."""
-    model = model_view(model_at)
-    work = work_view(work_at)
-    options = options_of(work, settings, first == 0)
-    nq = work.theta1.shape[0]
-    for t in range(first, us.shape[0]):
-        status = step(model, work, options, xs[t], us[t], Guess(xs[t, nq:], t > 0), xs[t + 1], work.report)
-        if status != _SOLVED:
-            return status, t
-        if is_due(work, work.report[1]):
-            return _SOLVED, t + 1
-    return _SOLVED, us.shape[0]
+class Motions(NamedTuple):
+    """Motions from several states, kept as their states only."""
+
+    xs: Cube  # (n, T + 1, nx), of which the first rows are given
+    us: Cube  # (n, T, nu)
+    reports: Cube  # (n, 1, 6) of the last step of each, zeros
+    knots: Integers  # (n,) number of solved steps, zeros
+    wrenches: Cube  # these without rows: they are not kept
+    contacts: Cube
+    A: Cube
+    B: Cube
 
 
 @kernel
-def _roll_rows(
-    model_at: Table,
-    work_at: Table,
-    settings: Vector,
-    rows: tuple[int, int],
-    us: Cube,
-    xs: Cube,
-    status: Integers,
-    knots: Integers,
-) -> None:
-    """Rollouts rows[0] up to rows[1], as far as they are not done, until the deadline."""
+def _roll_rows(model_at: Table, work_at: Table, settings: Vector, rows: tuple[int, int], motions: Motions) -> None:
+    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
+    steps = motions.us.shape[1]
     for i in range(rows[0], rows[1]):
-        if status[i] == _SOLVED and knots[i] < us.shape[1]:
+        report = motions.reports[i]
+        if report[0, 0] == _SOLVED and motions.knots[i] < steps:
             if seconds() > settings[DEADLINE]:
                 return
-            status[i], knots[i] = _roll_one(model_at, work_at, settings, us[i], xs[i], knots[i])
-            if status[i] == _SOLVED and knots[i] < us.shape[1]:
+            x, u = motions.xs[i], motions.us[i]
+            one = Motion(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
+            motions.knots[i] = roll(model_at, work_at, settings, one, motions.knots[i])
+            if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return
 
 
 @parallel_kernel
-def roll_batch(
-    model_at: Table,
-    work_ats: Table,
-    settings: Vector,
-    us: Cube,
-    xs: Cube,
-    status: Integers,
-    knots: Integers,
-) -> None:
-    """Rollouts from xs[i, 0] under us[i], spread over the threads.  xs: (n, T + 1, nx); status, knots: (n,), zeros."""
-    n = us.shape[0]
+def roll_batch(model_at: Table, work_ats: Table, settings: Vector, motions: Motions) -> None:
+    """All motions, spread over the threads."""
+    n = motions.us.shape[0]
     chunks = work_ats.shape[0]
     for c in prange(chunks):
         rows = (c * n // chunks, (c + 1) * n // chunks)
-        _roll_rows(model_at, work_ats[c], settings, rows, us, xs, status, knots)
+        _roll_rows(model_at, work_ats[c], settings, rows, motions)

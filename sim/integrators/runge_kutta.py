@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.dynamics.external_forces import set_external
 from sim.dynamics.kinematics import displace
 from sim.dynamics.momentum_balance import joints_below_turn
 from sim.dynamics.state import integrate_state, state_difference
@@ -27,7 +28,7 @@ from sim.integrators.hamilton import (
     velocity_of_momenta,
 )
 from sim.integrators.policy import Path, Policy
-from sim.integrators.rollout import Linearized
+from sim.integrators.rollout import Linearized, Motion
 from sim.integrators.tangents import (
     Tangents,
     first_tangents,
@@ -41,7 +42,7 @@ from sim.model.layout import model_view, work_view
 from sim.model.model import Integers, Matrix, Model, Vector
 from sim.model.pace import is_due, start_pace
 from sim.solve.energy_balance import LARGEST_GAIN
-from solvers.dense import copy_vector, dot
+from solvers.dense import clear, copy_vector, dot
 from solvers.jit import kernel
 from solvers.record import Table
 from solvers.status import Status
@@ -68,7 +69,8 @@ class Scheme(NamedTuple):
 
 @kernel
 def begin(model: Model, work: Work, scheme: Scheme, x: Vector) -> None:
-    """Momenta and poses of the state x, about the place of its first body."""
+    """Momenta and poses of the state x, about the place of its first body; no external wrenches."""
+    clear(work.external)
     nq = work.theta1.shape[0]
     for k in range(3):
         work.origin[k] = x[k] if model.joint_ntrans[0] == 3 else model.joint_parent_point[0, k]
@@ -154,31 +156,25 @@ def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Ve
 
 
 @kernel
-def roll(
-    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, us: Matrix, xs: Matrix, reports: Matrix,
-    first: int,
-) -> int:  # fmt: skip
-    """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of steps that were possible.
-
-    us: (T, nu); xs: (T + 1, nx); reports: (T, 6).
-    """
+def roll(model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, motion: Motion, first: int) -> int:
+    """As rollout.py, without contacts and derivatives."""
     model = model_view(model_at)
     work = work_view(work_at)
     start_pace(work, settings)
     if first == 0:
-        begin(model, work, scheme, xs[0])
-    for t in range(first, us.shape[0]):
-        for k in range(xs.shape[1]):
-            xs[t + 1, k] = xs[t, k]
-        status = advance(model, work, scheme, settings[0], us[t], xs[t + 1], None)
-        reports[t, 0] = status
-        reports[t, 1] = scheme.b.shape[0]
-        reports[t, 4] = -1.0
+        begin(model, work, scheme, motion.xs[0])
+    steps = motion.us.shape[0]
+    for t in range(first, steps):
+        x, report = motion.xs[t + 1], motion.reports[t]
+        copy_vector(motion.xs[t], x)
+        set_external(work, motion.wrenches, t)
+        status = advance(model, work, scheme, settings[0], motion.us[t], x, None)
+        report[0], report[1], report[4] = status, scheme.b.shape[0], -1.0
         if status != _SOLVED:
             return t
-        if is_due(work, reports[t, 1]):
+        if is_due(work, report[1]):
             return t + 1
-    return us.shape[0]
+    return steps
 
 
 @kernel
@@ -198,6 +194,7 @@ def linearize(
         if before == 0:
             copy_vector(line.xs[t], x)
             begin(model, work, scheme, x)
+            set_external(work, line.wrenches, t)
             status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
         due = False
         for s in range(before, substeps):
@@ -242,6 +239,7 @@ def closed_loop(
         if before == 0:
             copy_vector(path.xs[t], b)
             begin(model, work, scheme, b)
+        set_external(work, policy.wrenches, t)
         for s in range(before, substeps):
             if due:
                 return t * substeps + s

@@ -9,9 +9,8 @@ from math import cos, sqrt
 from typing import NamedTuple
 
 from sim.integrators.hamilton_gradient import Slopes, slopes_at, velocity_slopes
-from sim.integrators.rollout import Cube
 from sim.model.data import Work
-from sim.model.model import Integers, Matrix, Model, Vector
+from sim.model.model import Cube, Integers, Matrix, Model, Vector
 from solvers.jit import kernel
 from solvers.rotation import (
     cross,

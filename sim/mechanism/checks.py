@@ -135,3 +135,10 @@ def share(call: str, value: Any) -> float:
     if share > 1.0:
         raise ValueError(f"{call}: expected a number from 0 to 1, got {share:g}")
     return share
+
+
+def whole_number(call: str, value: Any, least: int = 1) -> int:
+    """`value` as a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
+    return int(value)

@@ -17,6 +17,7 @@ class Work(NamedTuple):
 
     # state between steps
     carried_steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
+    external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
     cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
     bound_step: Matrix  # (nlimit, 2) and of limits

@@ -58,7 +58,7 @@ MODEL_FLOATS = _shapes(
 CARRY_INTS = _shapes("carried_steps 1")
 CARRY_FLOATS = _shapes(
     """
-    inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, couple_force nrow, couple_rank 4
+    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, couple_force nrow, couple_rank 4
     """
 )
 CARRY = (*CARRY_INTS, *CARRY_FLOATS)

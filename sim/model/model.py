@@ -24,6 +24,7 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Integers = NDArray[np.int64]
 IntegerMatrix = NDArray[np.int64]
+Cube = NDArray[np.float64]  # (n, rows, columns)
 
 
 class Law(IntEnum):

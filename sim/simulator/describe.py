@@ -1,8 +1,6 @@
-"""describe: what a scene consists of, what a step has to compute for it, and what is left out."""
+"""describe: the parts of a scene, the work of a step, and its omitted terms."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,29 +9,29 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes
 from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.shapes import Solid
+from sim.model.model import Model
 from sim.simulator.omitted_contacts import reach
-
-if TYPE_CHECKING:
-    from sim.simulator.simulator import Simulator
+from sim.simulator.settings import Settings
 
 
-def describe(sim: Simulator) -> str:
-    """A page of text."""
-    mech = sim.mechanism
+def describe(mech: Mechanism, model: Model, settings: Settings, rank: str) -> str:
+    """A page of text; rank: of the loop constraints, where there are any."""
     lines = [
-        f"{mech.name}: {_count(sim.nbody, 'body', 'bodies')}, {_count(sim.nv, 'degree', 'degrees')} of freedom, "
+        f"{mech.name}: {_count(mech.nbody, 'body', 'bodies')}, {_count(mech.nv, 'degree', 'degrees')} of freedom, "
         f"{_total_mass(mech):.4g} kg",
-        f"  state x ({sim.nx},) = q ({sim.nq},), v ({sim.nv},);  perturbation dx ({sim.ndx},);  input u ({sim.nu},)",
-        f"  time step {sim.time_step:g} s, kappa {sim.kappa:g} N s m, tolerance {sim.tolerance:g}, order {sim.order}",
+        f"  state x ({mech.nq + mech.nv},) = q ({mech.nq},), v ({mech.nv},);  perturbation dx ({2 * mech.nv},);  "
+        f"input u ({len(mech.input_names)},)",
+        f"  time step {settings.time_step:g} s, kappa {settings.kappa:g} N s m, tolerance {settings.tolerance:g}, "
+        f"order {settings.order}",
         "joints",
         *(_joint_line(mech, j) for j in mech.joints),
-        *_loop_lines(sim),
+        *_loop_lines(mech, rank),
         *_titled("inputs", [f"  u[{k}]  {name}" for k, name in enumerate(mech.input_names)]),
         *_contact_lines(mech),
         *_collision_lines(mech),
         "a step",
-        *(f"  {what:<18}{state}" for what, state in _parts(mech, sim.order)),
-        *_far_lines(sim),
+        *(f"  {what:<18}{state}" for what, state in _parts(mech, settings.order)),
+        *_far_lines(mech, model, settings),
     ]
     return "\n".join(lines)
 
@@ -65,14 +63,14 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
     return f"  {joint.name:<18}{joint.kind:<16}{joint.parent} -> {joint.child}:  {at}{tail}"
 
 
-def _loop_lines(sim: Simulator) -> list[str]:
+def _loop_lines(mech: Mechanism, rank: str) -> list[str]:
     """What closes loops, and how many of its constraints say something new."""
-    loops, gears = sim.mechanism.loops, sim.mechanism.gears
+    loops, gears = mech.loops, mech.gears
     if not loops and not gears:
         return []
     lines = [f"  {j.name:<18}{j.kind:<16}{j.parent} -> {j.child}:  {6 - j.nv} constraints" for j in loops]
     lines += [f"  {g.name:<18}{'gear':<16}{g.joint} = {g.ratio:g} {g.other} + {g.offset:g}" for g in gears]
-    return ["loops", *lines, f"  {sim.loop_rank()}"]
+    return ["loops", *lines, f"  {rank}"]
 
 
 def _contact_lines(mech: Mechanism) -> list[str]:
@@ -117,14 +115,14 @@ def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def _far_lines(sim: Simulator) -> list[str]:
+def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
     """From how far on contacts are left out of the solver at this kappa and tolerance."""
-    if not sim.ncontact:
+    if not len(model.contact_body):
         return []
-    distances = reach(sim.model, sim.time_step, sim.kappa, sim.tolerance)
+    distances = reach(model, settings.time_step, settings.kappa, settings.tolerance)
     last = int(np.argmax(distances))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
-    span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {sim.mechanism.contact_names[last]} {farthest} m"
+    span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {mech.contact_names[last]} {farthest} m"
     return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators.policy import Policy
-from sim.simulator.border import Border
-from sim.simulator.calls import Calls
+from sim.simulator.arguments import Arguments
+from sim.simulator.engine import Engine
 from sim.simulator.results import Linearization
 from solvers.status import Status
 
@@ -45,15 +45,17 @@ class Horizon:
     Arrays are float64, C-contiguous and finite, states have unit quaternions: `states` makes them so.
     """
 
-    def __init__(self, calls: Calls, border: Border, knots: int, substeps: int, limits: tuple[Floats, Floats]) -> None:
-        self._calls, self._border, self._substeps, self._limits = calls, border, substeps, limits
-        self._k = np.zeros((knots, calls.nu))
-        self._K = np.zeros((knots, calls.nu, calls.ndx))
-        self._gaps = np.zeros((knots + 1, calls.ndx))
+    def __init__(
+        self, engine: Engine, arguments: Arguments, knots: int, substeps: int, limits: tuple[Floats, Floats]
+    ) -> None:
+        self._engine, self._arguments, self._substeps, self._limits = engine, arguments, substeps, limits
+        self._k = np.zeros((knots, engine.nu))
+        self._K = np.zeros((knots, engine.nu, engine.ndx))
+        self._gaps = np.zeros((knots + 1, engine.ndx))
 
     def states(self, call: str, xs: Floats) -> Floats:
         """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
-        return self._border.states(call, xs)
+        return self._arguments.states(call, xs)
 
     def roll(
         self,
@@ -73,11 +75,12 @@ class Horizon:
 
         linear: derivatives at (xs, us), steps: those of the rollout (xs, us); they tell where a step may look first.
         """
-        derivatives = self._calls.unknown[:2] if linear is None else (linear.A, linear.B)
-        cones = self._calls.unknown[2:] if steps is None else steps
+        derivatives = self._engine.unknown[:2] if linear is None else (linear.A, linear.B)
+        cones = self._engine.unknown[2:] if steps is None else steps
         policy = Policy(
             xs,
             us,
+            self._engine.no_wrenches,
             self._k if k is None else k,
             self._K if K is None else K,
             self._gaps if gaps is None else gaps,
@@ -85,7 +88,7 @@ class Horizon:
             *cones,
         )
         keep = self._substeps == 1
-        knot, path = self._calls.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
+        knot, path = self._engine.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
         kept = Steps(path.cones, path.bounds) if keep else None
         return Trial(path.xs, path.us, Status(int(path.report[0])), knot, kept)
 
@@ -94,11 +97,11 @@ class Horizon:
 
         guess: (T, nx) where the velocities after each knot are looked for first; by default in the later rows of xs.
         """
-        A, B, x_next, reports = self._calls.linearize(xs, us, self._substeps, kappa, guess)
+        A, B, x_next, reports = self._engine.linearize(xs, us, self._substeps, kappa, guess)
         return Linearization(A, B, x_next, reports[:, 0].astype(np.int64), accuracy=reports[:, 5])
 
     def gaps(self, linear: Linearization, xs: Floats) -> Floats:
         """(T + 1, ndx) f(x_t, u_t) (-) x_t+1, in the rows of the later knots; zero in the first."""
         gaps = np.zeros_like(self._gaps)
-        gaps[1:] = self._calls.difference(xs[1:], linear.x_next)
+        gaps[1:] = self._engine.difference(xs[1:], linear.x_next)
         return gaps

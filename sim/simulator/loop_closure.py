@@ -15,7 +15,7 @@ from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrices, rotation_matrix
-from sim.simulator.calls import Calls
+from sim.simulator.engine import Engine
 
 Floats = NDArray[np.float64]
 
@@ -43,10 +43,10 @@ class _Frame(NamedTuple):
 class Closure:
     """The loop constraints of a mechanism, as sim/dynamics/loops/closure.py has them, for Python."""
 
-    def __init__(self, mechanism: Mechanism, calls: Calls) -> None:
-        self._mechanism, self._calls = mechanism, calls
+    def __init__(self, mechanism: Mechanism, engine: Engine) -> None:
+        self._mechanism, self._engine = mechanism, engine
         self._nq = mechanism.nq
-        self._h = calls.settings.time_step
+        self._h = engine.settings.time_step
         self._frames = {
             j.name: _Frame(rotation_matrix(j.orientation), fixed_axes(j), contact_frame(j.axis))
             for j in mechanism.loops
@@ -62,7 +62,7 @@ class Closure:
     def _gaps(self, xs: Floats, only: str = "") -> dict[str, Floats]:
         """`gaps` of every row, or one of them."""
         mech = self._mechanism
-        z = self._calls.maximal(xs, mech.nbody)
+        z = self._engine.maximal(xs, mech.nbody)
         out = {joint.name: self._gap(joint, z) for joint in mech.loops if only in ("", joint.name)}
         for gear in mech.gears:
             if only in ("", name := f"gear {gear.name}"):
@@ -102,7 +102,7 @@ class Closure:
 
         def before(dv: Floats) -> Floats:
             back = np.concatenate([-self._h * (x[self._nq :] + dv), np.zeros((len(dv), nv))], axis=1)
-            return self._calls.integrate(np.tile(x, (len(dv), 1)), back)
+            return self._engine.integrate(np.tile(x, (len(dv), 1)), back)
 
         x[self._nq :] += self._solve(before)
         return x
@@ -118,11 +118,11 @@ class Closure:
         Closing the interval before the node changes the velocity by O(h), which is made up for by repetition.
         """
         q = self._reachable(q)
-        wanted = self._calls.node_velocities(self._calls.started(q, v)[None])[0]
+        wanted = self._engine.node_velocities(self._engine.started(q, v)[None])[0]
         given, best, x = wanted.copy(), np.inf, q
         for _ in range(_STARTS):
-            state = self.close(self._calls.started(q, given))
-            off = wanted - self._calls.node_velocities(state[None])[0]
+            state = self.close(self._engine.started(q, given))
+            off = wanted - self._engine.node_velocities(state[None])[0]
             if not np.abs(off).max() < 0.5 * best:
                 break
             x, best = state, np.abs(off).max()
@@ -145,11 +145,11 @@ class Closure:
         x = x.copy()
         names = self._mechanism.body_names
         for weld in far:
-            z = self._calls.maximal(x[None], self._mechanism.nbody)
+            z = self._engine.maximal(x[None], self._mechanism.nbody)
             z[0, names.index(weld.child)] = z[0, names.index(weld.parent or "")]
             joint = self._mechanism.joints[names.index(weld.child)]
             for at in (self._mechanism.q_slice(joint.name), self._v_slice(joint.name)):
-                x[at] = self._calls.minimal(z)[0][at]
+                x[at] = self._engine.minimal(z)[0][at]
         return x
 
     def _v_slice(self, joint: str) -> slice:
@@ -211,7 +211,7 @@ class Closure:
 
     def _around(self, x: Floats) -> Callable[[Floats], Floats]:
         """The states (m, nx) whose configurations are d (m, nv) away from that of x."""
-        return lambda d: self._calls.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
+        return lambda d: self._engine.integrate(np.tile(x, (len(d), 1)), np.concatenate([d, np.zeros_like(d)], axis=1))
 
     def _error(self, place: Callable[[Floats], Floats], name: str = "") -> Callable[[Floats], Floats]:
         """The gaps (m, n) at the states place(d), of all loops and gears or of one."""

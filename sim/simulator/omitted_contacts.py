@@ -2,26 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.model import Model
-from sim.simulator.results import SimulationError
-from solvers.status import MESSAGES
-
-if TYPE_CHECKING:
-    from sim.simulator.simulator import Simulator
-
-
-def left_out(sim: Simulator, x: ArrayLike, u: ArrayLike | None) -> tuple[str, ...]:
-    """Names of the contacts that the step from x under u leaves out.  SimulationError: the step cannot be solved."""
-    result = sim.step(x, u)
-    if not result.success:
-        raise SimulationError(f"Simulator.left_out: {MESSAGES[result.status]}", result.status)
-    return tuple(name for name, far in zip(sim.mechanism.contact_names, sim._calls.far(), strict=True) if far)
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:

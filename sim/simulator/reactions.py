@@ -15,11 +15,12 @@ and the rest the constraint's, which does no work.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
@@ -29,10 +30,9 @@ from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.simulator.results import check_finite
-
-if TYPE_CHECKING:
-    from sim.simulator.simulator import Simulator
+from sim.simulator.engine import Engine
+from sim.simulator.results import Result
+from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ FRAMES = ("world", "joint", "body")
 
 
 @dataclass(frozen=True)
-class Reactions:
+class Reactions(Result):
     """Wrenches of the joints on their children, means over a step; what acts on the parents is the opposite.
 
     Torques are about the joint point of the child where the step begins, whose place in the world is `point`. Axes are
@@ -55,6 +55,8 @@ class Reactions:
     torque: Floats  # (..., n, 3) [N m]
     constraint_force: Floats  # (..., n, 3) of which the constraint gives [N]
     constraint_torque: Floats  # (..., n, 3) [N m]
+    status: Status  # of the first unsolved step, whose rows are NaN
+    detail: str = ""
 
     __repr__ = brief_repr
 
@@ -72,7 +74,16 @@ class Reactions:
         """Those of one joint, (..., 3)."""
         k = self.names.index(checks.one_of("Reactions[...]: joint", joint, self.names))
         parts = (self.point, self.force, self.torque, self.constraint_force, self.constraint_torque)
-        return Reactions((joint,), self.frame, *(part[..., k, :] for part in parts))
+        point, force, torque, held_force, held_torque = (part[..., k, :] for part in parts)
+        return replace(
+            self,
+            names=(joint,),
+            point=point,
+            force=force,
+            torque=torque,
+            constraint_force=held_force,
+            constraint_torque=held_torque,
+        )
 
 
 class _Row(NamedTuple):
@@ -84,29 +95,42 @@ class _Row(NamedTuple):
     axes: Floats  # (3, 3) of the frame asked for, as columns
 
 
-def reactions(sim: Simulator, x: ArrayLike, u: ArrayLike | None, frame: str) -> Reactions:
-    """The reactions of the steps from x (..., nx) under u (..., nu), see `Simulator.reactions`."""
+def reactions(
+    mech: Mechanism,
+    engine: Engine,
+    steps: tuple[Floats, Floats, Floats | None],
+    lead: tuple[int, ...],
+    frame: str,
+    explain: Callable[[str, Floats, Floats], str],
+) -> Reactions:
+    """The reactions of steps (states, inputs, external wrenches), each in rows; see `Simulator.reactions`.
+
+    lead: leading axes of the result. explain: the sentence about an unsolved step, of (call, report, state).
+    """
     call = "Simulator.reactions"
     checks.one_of(f"{call}(frame=...)", frame, FRAMES)
-    if sim.order != 2:
-        raise ValueError(f"{call}: steps of order 2 have them, got order {sim.order}")
-    states, lead = sim._border.stacked("reactions", "x", x)
-    given = np.zeros((*lead, sim.nu)) if u is None else u
-    us = sim._border.inputs("reactions", "u", given, (*lead, sim.nu)).reshape(len(states), sim.nu)
-    loops = [(m, loop) for m, loop in enumerate(sim.mechanism.loops) if not is_weld(loop)]
-    names = (*sim.mechanism.joint_names, *(loop.name for _, loop in loops))
-    out = np.zeros((5, len(states), len(names), 3))
+    if engine.settings.order != 2:
+        raise ValueError(f"{call}: steps of order 2 have them, got order {engine.settings.order}")
+    states, us, wrenches = steps
+    loops = [(m, loop) for m, loop in enumerate(mech.loops) if not is_weld(loop)]
+    names = (*mech.joint_names, *(loop.name for _, loop in loops))
+    out = np.full((5, len(states), len(names), 3), np.nan)
+    status, detail, h = Status.SOLVED, "", engine.settings.time_step
     for k, (state, control) in enumerate(zip(states, us, strict=True)):
-        knot, _, reports, _ = sim._calls.roll(state, control[None])
-        if knot == 0:
-            raise sim._error(call, reports[0], state)
-        work, h = sim._calls.last(), sim.time_step
-        rows = [_tree_joint(joint, i, sim.model, work, h, frame) for i, joint in enumerate(sim.mechanism.joints)]
-        rows += [_loop_joint(sim.mechanism, loop, m, sim.model, work, h, frame) for m, loop in loops]
+        rolled = engine.roll(state, control[None], None if wrenches is None else wrenches[k : k + 1])
+        if rolled.knot == 0:
+            if status == Status.SOLVED:
+                status, detail = Status(int(rolled.reports[0, 0])), explain(call, rolled.reports[0], state)
+            continue
+        work = engine.last()
+        rows = [_tree_joint(joint, i, engine.model, work, h, frame) for i, joint in enumerate(mech.joints)]
+        rows += [_loop_joint(mech, loop, m, engine.model, work, h, frame) for m, loop in loops]
         for n, row in enumerate(rows):
             out[:, k, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
-    check_finite(call, out)
-    return Reactions(names, frame, *out.reshape(5, *lead, len(names), 3))
+        if status == Status.SOLVED and not np.isfinite(out[:, k]).all():
+            status, detail = Status.NOT_FINITE, f"{call}: {MESSAGES[Status.NOT_FINITE]}"
+    point, force, torque, held_force, held_torque = out.reshape(5, *lead, len(names), 3)
+    return Reactions(names, frame, point, force, torque, held_force, held_torque, status, detail)
 
 
 def _tree_joint(joint: Joint, i: int, model: Model, work: Work, h: float, frame: str) -> _Row:

@@ -1,10 +1,15 @@
-"""What Simulator returns: frozen dataclasses of arrays."""
+"""What Simulator returns: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
+
+No method raises because a step was not solved, unless it is asked to by throw=True: the result says so. Derivatives of
+an unsolved step are zero; taking them out of their result, by unpacking or by name, raises SimulationError.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +19,11 @@ from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from solvers.status import MESSAGES, Status
 
-if TYPE_CHECKING:
-    from sim.simulator.simulator import Simulator
-
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 
 
 class SimulationError(RuntimeError):
@@ -43,6 +48,45 @@ class Interrupted(KeyboardInterrupt):
 
     def __str__(self) -> str:
         return "" if self.result is None else f"so far: {self.result!r}"
+
+
+class Result:
+    """How a call ended. `status` is one Status, or an array with that of each knot or rollout."""
+
+    status: Any
+    detail: str = ""  # the sentence about an unsolved step, with its numbers
+
+    @property
+    def success(self) -> bool:
+        """Whether all steps reached their tolerance."""
+        return self._end() == Status.SOLVED
+
+    @property
+    def message(self) -> str:
+        """The first status that is not SOLVED, or SOLVED, as a sentence."""
+        return self.detail or MESSAGES[self._end()]
+
+    def check(self) -> None:
+        """SimulationError unless all steps were solved."""
+        if not self.success:
+            raise SimulationError(self.message, self._end())
+
+    def _end(self) -> Status:
+        """The first status that is not SOLVED, or SOLVED."""
+        if isinstance(self.status, Status):
+            return self.status
+        unsolved = self.status[self.status != Status.SOLVED]
+        return Status(int(unsolved[0])) if len(unsolved) else Status.SOLVED
+
+
+Ended = TypeVar("Ended", bound=Result)
+
+
+def ended(result: Ended, throw: bool) -> Ended:
+    """The result; with `throw`, SimulationError instead of one that was not a success."""
+    if throw:
+        result.check()
+    return result
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,7 +125,7 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class StepResult:
+class StepResult(Result):
     """One time step. When it was not solved, x is the state before it."""
 
     x: Floats  # (nx,)
@@ -89,26 +133,22 @@ class StepResult:
     iterations: int  # of Newton's method; where loops have the step solved again, of all its solves
     residual: float  # largest error of a balance or gap equation [N s, m]
     violation: float  # largest |product - kappa| of the complementary pairs
-    contacts: Contacts
+    scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
+    detail: str = ""
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """Its contacts, (ncontact, ...)."""
+        return contacts_of(*self.scene)
 
     __repr__ = brief_repr
 
-    @property
-    def success(self) -> bool:
-        """Whether the step reached its tolerance."""
-        return self.status == Status.SOLVED
-
-    @property
-    def message(self) -> str:
-        """The status as a sentence."""
-        return MESSAGES[self.status]
-
 
 @dataclass(frozen=True, repr=False)
-class Trajectory:
+class Trajectory(Result):
     """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows."""
 
-    simulator: Simulator
+    simulator: Any  # the Simulator that made it
     x: Floats  # (T + 1, nx)
     u: Floats  # (T, nu) [N, N m]
     time: Floats  # (T + 1,) [s]
@@ -117,7 +157,7 @@ class Trajectory:
     residual: float  # of the last step that was tried
     iterations: Integers  # (T,)
     contacts: Contacts
-    message: str
+    detail: str = ""
     wrenches: Floats | None = None  # (T, nbody, 6) external ones, if there were any [N, N m]
 
     def __repr__(self) -> str:
@@ -125,14 +165,9 @@ class Trajectory:
         steps = f"{self.knot} steps of {sim.time_step:g} s"
         return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
 
-    @property
-    def success(self) -> bool:
-        """Whether all steps reached their tolerance."""
-        return self.status == Status.SOLVED
-
 
 @dataclass(frozen=True)
-class Shot:
+class Shot(Result):
     """A closed-loop rollout; x and u end at the first knot that was not solved."""
 
     x: Floats  # (T + 1, nx)
@@ -140,6 +175,7 @@ class Shot:
     status: Status
     knot: int  # number of solved knots
     residual: float  # of the last step that was tried
+    detail: str = ""
 
     __repr__ = brief_repr
 
@@ -151,27 +187,104 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class Linearization:
+class Jacobian(Result):
+    """Derivatives of one step: `A, B = jacobian`, and jacobian["mass"] by a name of wrt=...
+
+    Both raise SimulationError where the step was not solved.
+    """
+
+    blocks: Mapping[str, Floats]  # "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n)
+    x_next: Floats  # (nx,)
+    status: Status
+    accuracy: float = 0.0  # estimate of the error, relative to the largest entry
+    detail: str = ""
+
+    __repr__ = brief_repr
+
+    @property
+    def A(self) -> Floats:
+        """(ndx, ndx) d(next state)/d(state)."""
+        return self["state"]
+
+    @property
+    def B(self) -> Floats:
+        """(ndx, nu) d(next state)/d(input)."""
+        return self["input"]
+
+    def __iter__(self) -> Iterator[Floats]:
+        return iter((self.A, self.B))
+
+    def __len__(self) -> int:
+        return 2
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.blocks
+
+    def __getitem__(self, name: str | int) -> Floats:
+        self.check()
+        return self.blocks[("state", "input")[name] if isinstance(name, int) else name]
+
+    def keys(self) -> Iterable[str]:
+        """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them."""
+        self.check()
+        return self.blocks.keys()
+
+    def values(self) -> Iterable[Floats]:
+        """The blocks."""
+        self.check()
+        return self.blocks.values()
+
+    def items(self) -> Iterable[tuple[str, Floats]]:
+        """Names and blocks."""
+        self.check()
+        return self.blocks.items()
+
+
+@dataclass(frozen=True)
+class Linearization(Result):
     """Derivatives of every knot at its state and input, in tangent coordinates."""
 
     A: Floats  # (T, ndx, ndx)
     B: Floats  # (T, ndx, nu)
     x_next: Floats  # (T, nx)
-    status: Integers  # (T,) Status of each knot; what belongs to an unsolved knot is zero
+    status: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
     parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
     # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
+    detail: str = ""
 
     __repr__ = brief_repr
 
 
 @dataclass(frozen=True)
-class Batch:
+class Gradient(Result, Mapping[str, Floats]):
+    """Gradient of a scalar of a rollout, by the names of wrt=...; SimulationError where a step was not solved."""
+
+    blocks: Mapping[str, Floats]
+    status: Status
+    detail: str = ""
+
+    __repr__ = brief_repr
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.blocks)
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    def __getitem__(self, name: str) -> Floats:
+        self.check()
+        return self.blocks[name]
+
+
+@dataclass(frozen=True)
+class Batch(Result):
     """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state."""
 
     x: Floats  # (n, T + 1, nx)
-    status: Integers  # (n,) Status
+    status: Integers  # (n,) Status of each rollout
     knot: Integers  # (n,) number of solved steps
+    detail: str = ""
 
     __repr__ = brief_repr
 
@@ -208,9 +321,9 @@ def path_of(call: str, trajectory: Any) -> tuple[Any, Any]:
     raise TypeError(f"{call}: expected a Trajectory or (states, inputs), got {trajectory!r}")
 
 
-def error_of(
+def sentence(
     mech: Mechanism, where: str, report: Floats, tolerance: float, loop: tuple[float, str] | None = None
-) -> SimulationError:
+) -> str:
     """The sentence of a status, with the numbers of the report of a kernel.
 
     loop: by how much the one that is furthest open is, and which it is.
@@ -227,13 +340,7 @@ def error_of(
             text += f" Contact {mech.contact_names[int(contact)]!r} is worst."
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
-    return SimulationError(text, reason)
-
-
-def check_finite(where: str, *arrays: Floats) -> None:
-    """SimulationError unless all numbers are finite."""
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise SimulationError(f"{where}: {MESSAGES[Status.NOT_FINITE]}", Status.NOT_FINITE)
+    return text
 
 
 def fastest(mech: Mechanism, z: Floats) -> str:

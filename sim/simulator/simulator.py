@@ -2,46 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace as changed
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.integrators.rollout import REFUSED
 from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator import wrenches as pushed
-from sim.simulator.border import whole
-from sim.simulator.calls import REPORT
+from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
-from sim.simulator.derivatives import Derivatives
 from sim.simulator.describe import describe
+from sim.simulator.engine import REPORT, Rolled, interrupted
 from sim.simulator.horizon import Horizon
-from sim.simulator.omitted_contacts import left_out
-from sim.simulator.policies import Feedback, Rolled, roll
-from sim.simulator.reactions import Reactions
+from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
+    STATUSES,
     Batch,
+    Gradient,
+    Interrupted,
+    Jacobian,
+    Linearization,
     Shot,
-    SimulationError,
     StepResult,
     Trajectory,
     carried,
     contacts_of,
-    error_of,
+    ended,
     fastest,
+    path_of,
+    sentence,
 )
 from sim.simulator.settings import Settings, default_kappa
-from sim.simulator.wrenches import Wrenches
-from solvers.status import MESSAGES, Status
+from sim.simulator.state_space import StateSpace
+from solvers.status import Status
+
+if TYPE_CHECKING:
+    from sim.derivatives.parameters.parameters import Parameters
+    from sim.simulator.parameter_engine import ParameterEngine
 
 Floats = NDArray[np.float64]
+Wrenches = ArrayLike | Mapping[str, ArrayLike]
+Feedback = Callable[[float, Floats], ArrayLike]
 
 _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order")
 _ORDERS = (2, 4, 6, 8)
 
 
-class Simulator(Derivatives):
+class Simulator(StateSpace):
     """A mechanism, a time step [s], and how exactly a step is solved.
 
     kappa           central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa over
@@ -56,6 +68,10 @@ class Simulator(Derivatives):
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
     With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
     before what the ground does in the step to come: standing still, g h/2.
+
+    Every method that steps returns a result with `success`, `status` and `message`, and raises SimulationError for an
+    unsolved step only with throw=True. External wrenches are (nbody, 6), with steps in front (T, nbody, 6), or
+    {body: (6,) or (T, 6)}: a force at the centre of mass [N], then a torque [N m], in world axes, constant over a step.
     """
 
     def __init__(
@@ -84,10 +100,10 @@ class Simulator(Derivatives):
 
     def _given(self) -> dict[str, Any]:
         """The settings as they were given: kappa None where it is the default."""
-        return {**self._calls.settings._asdict(), "kappa": self._kappa}
+        return {**self._engine.settings._asdict(), "kappa": self._kappa}
 
     def __repr__(self) -> str:
-        numbers = ", ".join(f"{name}={value:g}" for name, value in self._calls.settings._asdict().items())
+        numbers = ", ".join(f"{name}={value:g}" for name, value in self._engine.settings._asdict().items())
         return f"Simulator({self.mechanism.name}, {numbers})"
 
     def replace(self, **settings: Any) -> Simulator:
@@ -107,70 +123,112 @@ class Simulator(Derivatives):
         return Simulator(mech, **{**self._given(), **settings})
 
     def describe(self) -> str:
-        """What the scene consists of, what a step computes, and what is left out because nothing needs it."""
-        return describe(self)
+        """The parts of the scene, the work of a step, and its omitted terms, as text."""
+        rank = str(self.loop_rank()) if self._closes else ""
+        return describe(self.mechanism, self.model, self._engine.settings, rank)
 
-    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
-        """Names of the contacts that the step from x is solved without, because they are far.
-
-        Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
-        """
-        return left_out(self, x, u)
+    # -- motions -------------------------------------------------------------------------------------------------------
 
     def step(
         self, x: ArrayLike, u: ArrayLike | None = None, *, throw: bool = False, wrenches: Wrenches | None = None
     ) -> StepResult:
-        """One time step from x under the input u (zero when left out); wrenches (nbody, 6) as in `rollout`."""
-        if wrenches is not None:
-            return pushed.step(self, x, u, wrenches, throw)
-        state = self._border.state("step", x)
-        us = self._border.inputs("step", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
-        knot, xs, reports, contacts = self._calls.roll(state, us[None])
-        status, iterations, residual, violation = reports[0, :4]
-        if knot == 0 and throw:
-            raise self._error("Simulator.step", reports[0], state)
-        return StepResult(
-            xs[knot] if knot else state,
-            Status(int(status)),
-            int(iterations),
-            float(residual),
-            float(violation),
-            contacts_of(self.mechanism, self.time_step, contacts[0]),
-        )
+        """One time step.
+
+        Args:
+            x: (nx,) state.
+            u: (nu,) input [N, N m]; zero by default.
+            throw: raise SimulationError where the step is not solved.
+            wrenches: external ones, (nbody, 6) or by body.
+
+        Returns:
+            StepResult with the state after the step, or the one before where it was not solved.
+        """
+        check = self._arguments
+        control = self._no_input if u is None else u
+        plain = self.order == 2 and is_plain(x, (self.nx,)) and is_plain(control, (self.nu,))
+        state: Any = x if plain else check.state("step", x)
+        us: Any = control if plain else check.inputs("step", "u", control, (self.nu,))
+        external = None if wrenches is None else check.wrenches("step", wrenches, 1)
+        rolled = self._engine.roll(state, us[None], external)
+        status, iterations, residual, violation, _, _ = rolled.reports[0].tolist()
+        if status == REFUSED:
+            check.state("step", x)
+            check.inputs("step", "u", control, (self.nu,))
+        detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], rolled.xs[0])
+        scene = (self.mechanism, self.time_step, rolled.contacts[0])
+        end = rolled.xs[1 if rolled.knot else 0]
+        found = StepResult(end, STATUSES[int(status)], int(iterations), residual, violation, scene, detail)
+        return ended(found, throw) if throw else found
 
     def rollout(
         self,
         x: ArrayLike,
-        us: ArrayLike | Feedback,
+        us: ArrayLike | Feedback | None = None,
         *,
         steps: int | None = None,
         throw: bool = False,
         wrenches: Wrenches | None = None,
     ) -> Trajectory:
-        """Steps from x under the inputs us (T, nu); stops at the first step that cannot be solved, and says so.
+        """Steps from x; the rollout ends at the first step that cannot be solved.
 
-        us may be a function instead, u = us(time, x), asked before each of so many `steps`.
-        wrenches: external ones, (T, nbody, 6), or {body: (6,) or (T, 6)}; a force at the centre of mass [N], then a
-        torque [N m], both in world axes and constant over a step.
+        Args:
+            x: (nx,) state.
+            us: (T, nu) inputs [N, N m]; or a function u = us(time, x), asked before each step; zero by default.
+            steps: number of steps where `us` does not say it.
+            throw: raise SimulationError where a step is not solved.
+            wrenches: external ones, (T, nbody, 6) or by body.
+
+        Returns:
+            Trajectory of the solved steps.
         """
-        if wrenches is not None:
-            return pushed.rollout(self, x, us, wrenches, throw, steps)
-        state = self._border.state("rollout", x)
+        state = self._arguments.state("rollout", x)
         if callable(us):
-            found = carried(lambda: roll(self, state, us, steps), lambda pair: self._trajectory(*pair))
+            count = whole_number("Simulator.rollout(steps=...)", steps)
+            external = self._arguments.wrenches("rollout", wrenches, count)
+            policy = us
+            asked = carried(
+                lambda: self._roll_policy(state, policy, count, external),
+                lambda found: self._trajectory(found[0], found[1], external),
+            )
+            return ended(asked, throw)
+        if us is None:
+            inputs = np.zeros((whole_number("Simulator.rollout(steps=...)", steps), self.nu))
         else:
-            inputs = self._border.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
-            found = carried(lambda: self._calls.roll(state, inputs), lambda rolled: self._trajectory(inputs, rolled))
-        if throw and not found.success:
-            raise SimulationError(found.message, found.status)
-        return found
+            inputs = self._arguments.inputs("rollout", "us", us, ("T" if steps is None else steps, self.nu))
+        external = self._arguments.wrenches("rollout", wrenches, len(inputs))
+        found = carried(
+            lambda: self._engine.roll(state, inputs, external),
+            lambda rolled: self._trajectory(inputs, rolled, external),
+        )
+        return ended(found, throw)
 
-    def _trajectory(self, inputs: Floats, rolled: Rolled) -> Trajectory:
-        """What came of a rollout under the inputs (T, nu)."""
-        knot, xs, reports, contacts = rolled
+    def _roll_policy(self, x: Floats, policy: Feedback, count: int, wrenches: Floats | None) -> tuple[Floats, Rolled]:
+        """Inputs of a policy and their rollout; every step is solved afresh, so it equals others to the tolerance."""
+        us = np.zeros((count, self.nu))
+        xs, reports = np.zeros((count + 1, self.nx)), np.zeros((count, REPORT))
+        contacts: list[Floats] = []
+        xs[0], knot = x, 0
+        try:
+            for k in range(count):
+                name = f"Simulator.rollout: u of the policy at step {k}"
+                us[k] = checks.array(name, policy(k * self.time_step, xs[k].copy()), (self.nu,))
+                one = self._engine.roll(xs[k], us[k : k + 1], None if wrenches is None else wrenches[k : k + 1])
+                reports[k], xs[k + 1] = one.reports[0], one.xs[1]
+                contacts.append(one.contacts[0])
+                if one.knot == 0:
+                    break
+                knot = k + 1
+        except KeyboardInterrupt:
+            reports = interrupted(reports, knot)
+            done = Rolled(knot, xs, reports, np.array(contacts), *self._engine.unknown[:2])
+            raise Interrupted((us, done) if knot else None) from None
+        return us, Rolled(knot, xs, reports, np.array(contacts), *self._engine.unknown[:2])
+
+    def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
+        """A rollout under the inputs (T, nu)."""
+        knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
         status = Status(int(last[0]))
-        error = None if status == Status.SOLVED else self._error(f"Simulator.rollout: step {knot}", last, xs[knot])
         return Trajectory(
             simulator=self,
             x=xs[: knot + 1],
@@ -180,26 +238,27 @@ class Simulator(Derivatives):
             knot=knot,
             residual=float(last[2]),
             iterations=reports[:knot, 1].astype(np.int64),
-            contacts=contacts_of(self.mechanism, self.time_step, contacts[:knot]),
-            message=str(error) if error else MESSAGES[status],
+            contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
+            detail="" if status == Status.SOLVED else self._sentence(f"Simulator.rollout: step {knot}", last, xs[knot]),
+            wrenches=None if wrenches is None else wrenches[:knot],
         )
 
-    def _error(self, where: str, report: Floats, x: Floats | None = None) -> SimulationError:
+    def _sentence(self, where: str, report: Floats, x: Floats | None = None) -> str:
         """Why the last step of this thread was not solved; x (nx,): the state it began from."""
         mech = self.mechanism
         names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
-        gaps = zip(self._calls.open_loops(), names, strict=True) if names else ()
-        error = error_of(mech, where, report, self.tolerance, max(gaps, default=None))
-        if error.status == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
-            return SimulationError(f"{error} {fastest(mech, self.replace(time_step=1e-6).maximal(x))}", error.status)
-        return error
+        gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
+        text = sentence(mech, where, report, self.tolerance, max(gaps, default=None))
+        if report[0] == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
+            text += f" {fastest(mech, self.replace(time_step=1e-6).maximal(x))}"
+        return text
 
-    def rollout_batch(self, x0s: ArrayLike, us: ArrayLike) -> Batch:
+    def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Batch:
         """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
         call = "Simulator.rollout_batch"
-        inputs = self._border.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
-        starts = self._border.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
-        return carried(lambda: self._calls.roll_batch(starts, inputs), Batch.of)
+        inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
+        starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
+        return ended(carried(lambda: self._engine.roll_batch(starts, inputs), Batch.of), throw)
 
     def closed_loop(  # noqa: PLR0913
         self,
@@ -214,45 +273,315 @@ class Simulator(Derivatives):
         substeps: int = 1,
         kappa: float | None = None,
         wrenches: Wrenches | None = None,
+        *,
+        throw: bool = False,
     ) -> Shot:
-        """Rollout under a policy, each knot `substeps` steps with u held:
+        """Rollout under a feedback law, each knot `substeps` steps with u held:
 
             u_t     = clamp(us_t + alpha ks_t + Ks_t (x_t (-) xs_t))
             x_t+1   = f(x_t, u_t) (+) (alpha - 1) gaps_t+1
 
-        us (T, nu), xs (T + 1, nx), ks (T, nu), Ks (T, nu, ndx), gaps (T + 1, ndx), limits (lower, upper)
-        of u; wrenches (T, nbody, 6) as in `rollout`, held over a knot. Stops at the first knot that cannot be solved.
+        Args:
+            x0: (nx,) state.
+            us: (T, nu) inputs [N, N m].
+            xs: (T + 1, nx) states that the gains are about.
+            ks: (T, nu) steps of the inputs.
+            Ks: (T, nu, ndx) gains.
+            gaps: (T + 1, ndx) f(xs_t, us_t) (-) xs_t+1, in the rows of the later knots.
+            alpha: share of ks and of the gaps that is taken.
+            limits: (lower, upper) of u, each (nu,).
+            substeps: time steps per knot.
+            kappa: central-path parameter instead of that of the simulator.
+            wrenches: external ones, (T, nbody, 6) or by body, held over a knot.
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            Shot with the solved knots.
         """
-        if wrenches is not None:
-            gains: dict[str, Any] = {"xs": xs, "ks": ks, "Ks": Ks, "gaps": gaps, "alpha": alpha, "limits": limits}
-            return pushed.closed_loop(self, x0, us, wrenches, substeps=substeps, kappa=kappa, **gains)
         call = "closed_loop"
-        state, inputs = self._border.state(call, x0, "x0"), self._border.inputs(call, "us", us, ("T", self.nu))
+        state, inputs = self._arguments.state(call, x0, "x0"), self._arguments.inputs(call, "us", us, ("T", self.nu))
         name = f"Simulator.{call}"
         factor = checks.number(f"{name}(alpha=...)", alpha)
-        bounds = self._border.limits(name, limits)
-        policy = self._border.policy(name, state, inputs, (xs, ks, Ks, gaps))
-        count, level = whole(f"{name}(substeps=...)", substeps), self._border.kappa(call, kappa)
-        return carried(lambda: self._calls.closed_loop(state, policy, factor, bounds, count, level), Shot.of)
+        bounds = self._arguments.limits(name, limits)
+        external = self._arguments.wrenches(call, wrenches, len(inputs))
+        policy = self._arguments.policy(name, state, inputs, external, (xs, ks, Ks, gaps))
+        count, level = whole_number(f"{name}(substeps=...)", substeps), self._arguments.kappa(call, kappa)
+        found = carried(lambda: self._engine.closed_loop(state, policy, factor, bounds, count, level), Shot.of)
+        return ended(found, throw)
 
     def reactions(
-        self, x: ArrayLike, u: ArrayLike | None = None, *, frame: str = "world", wrenches: Wrenches | None = None
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        *,
+        frame: str = "world",
+        wrenches: Wrenches | None = None,
+        throw: bool = False,
     ) -> Reactions:
         """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
 
-        x (..., nx) and u (..., nu), zero when left out, with the same leading axes: `sim.reactions(t.x[:-1], t.u)` has
-        those of a whole trajectory. frame: axes of the "world", of the "joint" frame on the parent, or of the child
-        ("body"); wrenches as in `rollout`. See `Reactions` for points. An unsolved step raises SimulationError.
+        Args:
+            x: (..., nx) states; `sim.reactions(t.x[:-1], t.u)` has the reactions of a whole trajectory.
+            u: (..., nu) inputs with the same leading axes; zero by default.
+            frame: axes of the "world", of the "joint" frame on the parent, or of the child ("body").
+            wrenches: external ones, (nbody, 6) or (T, nbody, 6).
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            Reactions; NaN in the rows of unsolved steps.
         """
-        return pushed.reactions(self, x, u, wrenches, frame)
+        states, lead = self._arguments.stacked("reactions", "x", x)
+        given = np.zeros((*lead, self.nu)) if u is None else u
+        us = self._arguments.inputs("reactions", "u", given, (*lead, self.nu)).reshape(len(states), self.nu)
+        if wrenches is not None and len(lead) > 1:
+            raise ValueError(
+                f"Simulator.reactions(wrenches=...): expected x of shape (nx,) or (T, nx), got {np.shape(x)}"
+            )
+        external = self._arguments.wrenches("reactions", wrenches, len(states))
+        found = reactions(self.mechanism, self._engine, (states, us, external), lead, frame, self._sentence)
+        return ended(found, throw)
+
+    def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
+        """Names of the contacts that the step from x is solved without, because they are far.
+
+        Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
+        An unsolved step raises SimulationError.
+        """
+        self.step(x, u, throw=True)
+        return tuple(name for name, far in zip(self.mechanism.contact_names, self._engine.far(), strict=True) if far)
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
-        """Rollouts and derivatives of trajectories of so many knots, for a planner: see `sim.horizon`."""
+        """Rollouts and derivatives of trajectories of so many knots, for a planner: see horizon.py."""
         call = "Simulator.horizon"
         return Horizon(
-            self._calls,
-            self._border,
-            whole(f"{call}(knots=...)", knots),
-            whole(f"{call}(substeps=...)", substeps),
-            self._border.limits(call, limits),
+            self._engine,
+            self._arguments,
+            whole_number(f"{call}(knots=...)", knots),
+            whole_number(f"{call}(substeps=...)", substeps),
+            self._arguments.limits(call, limits),
         )
+
+    # -- derivatives ---------------------------------------------------------------------------------------------------
+
+    def linearize(
+        self,
+        x: ArrayLike,
+        u: ArrayLike | None = None,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        wrt: Sequence[str] | None = None,
+        *,
+        throw: bool = False,
+    ) -> Jacobian:
+        """Derivatives of one step, by the implicit function theorem, in tangent coordinates.
+
+        Args:
+            x: (nx,) state.
+            u: (nu,) input; zero by default.
+            kappa: central-path parameter at which the step is solved; that of the simulator by default.
+            wrenches: external ones, (nbody, 6) or by body, constants.
+            wrt: "state", "input" and parameters, as in `parameters`. x and u are held fixed, so the poses and momenta
+                that belong to x move with a parameter.
+            throw: raise SimulationError where the step is not solved.
+
+        Returns:
+            Jacobian: `A, B = sim.linearize(x, u)`, (ndx, ndx) and (ndx, nu), or by name, each (ndx, n).
+        """
+        call = "Simulator.linearize"
+        state = self._arguments.state("linearize", x)
+        us = self._arguments.inputs("linearize", "u", np.zeros(self.nu) if u is None else u, (self.nu,))
+        level = self._arguments.kappa("linearize", kappa)
+        external = self._arguments.wrenches("linearize", wrenches, 1)
+        selected = None if wrt is None else self._by_parameters.select(f"{call}(wrt=...)", wrt)
+        A, B, x_next, report = self._engine.linearize_one(state, us, level, external)
+        blocks = {"state": A, "input": B}
+        if selected is not None and report[0] == Status.SOLVED:
+            asked, found, plan = selected
+            J = self._by_parameters.columns((state, us), A, plan)
+            if not np.isfinite(J).all():
+                report[0] = Status.NOT_FINITE
+            blocks = {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
+        detail = "" if report[0] == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
+        return ended(Jacobian(blocks, x_next, Status(int(report[0])), float(report[5]), detail), throw)
+
+    def linearize_rollout(
+        self,
+        x: ArrayLike,
+        us: ArrayLike,
+        kappa: float | None = None,
+        wrt: Sequence[str] = (),
+        wrenches: Wrenches | None = None,
+        *,
+        throw: bool = False,
+    ) -> tuple[Floats, Linearization]:
+        """A rollout and its derivatives in one pass: as `rollout` and `linearize_trajectory`, each step solved once.
+
+        Args:
+            x: (nx,) state.
+            us: (T, nu) inputs.
+            kappa: central-path parameter; that of the simulator by default.
+            wrt: parameters, whose derivatives (T, ndx, n) are then in `Linearization.parameters`, by name.
+            wrenches: external ones, (T, nbody, 6) or by body.
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            States (T + 1, nx) and Linearization; from an unsolved step on, states repeat and derivatives are zero.
+        """
+        call = "linearize_rollout"
+        state, inputs = self._arguments.state(call, x), self._arguments.inputs(call, "us", us, ("T", self.nu))
+        level, external = self._arguments.kappa(call, kappa), self._arguments.wrenches(call, wrenches, len(inputs))
+        blocks: dict[str, Floats] = {}
+        if wrt and (selected := self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt))[1].names:
+            _, found, plan = selected
+            rolled, J = self._by_parameters.roll(state, inputs, plan, level, external)
+            blocks = {name: J[:, :, rows] for name, rows in found.rows.items()}
+        else:
+            rolled = self._engine.roll(state, inputs, external, kappa=level, derivatives=True)
+        knot, reports, detail = rolled.knot, rolled.reports, ""
+        if knot < len(inputs):
+            detail = sentence(self.mechanism, f"Simulator.{call}: step {knot}", reports[knot], self.tolerance)
+            reports[knot:, 0] = reports[knot, 0]
+            rolled.xs[knot + 1 :] = rolled.xs[knot]
+            for array in (rolled.A, rolled.B, *blocks.values()):
+                array[knot:] = 0.0
+        statuses = reports[:, 0].astype(np.int64)
+        linear = Linearization(rolled.A, rolled.B, rolled.xs[1:], statuses, blocks, reports[:, 5], detail)
+        return rolled.xs, ended(linear, throw)
+
+    def linearize_trajectory(
+        self,
+        xs: ArrayLike,
+        us: ArrayLike,
+        substeps: int = 1,
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        *,
+        throw: bool = False,
+    ) -> Linearization:
+        """`linearize` at the knots (xs_t, us_t), in parallel; each knot spans `substeps` steps with u held.
+
+        Args:
+            xs: (T, nx) or (T + 1, nx) states; the last of T + 1 is not used.
+            us: (T, nu) inputs.
+            substeps: time steps per knot.
+            kappa: central-path parameter; that of the simulator by default.
+            wrenches: external ones, (T, nbody, 6) or by body.
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            Linearization; the derivatives of unsolved knots are zero.
+        """
+        call = "Simulator.linearize_trajectory"
+        inputs = self._arguments.inputs("linearize_trajectory", "us", us, ("T", self.nu))
+        states = self._arguments.states(f"{call}(xs)", checks.array(f"{call}(xs)", xs, ("T", self.nx)))
+        if len(states) - len(inputs) not in (0, 1):
+            raise ValueError(
+                f"{call}(xs): expected {len(inputs)} or {len(inputs) + 1} states, as us, got {len(states)}"
+            )
+        steps = whole_number(f"{call}(substeps=...)", substeps)
+        level = self._arguments.kappa("linearize_trajectory", kappa)
+        external = self._arguments.wrenches("linearize_trajectory", wrenches, len(inputs))
+        A, B, x_next, reports = self._engine.linearize(states, inputs, steps, level, None, external)
+        statuses, detail = reports[:, 0].astype(np.int64), ""
+        if statuses.any():
+            t = int(np.flatnonzero(statuses)[0])
+            detail = sentence(self.mechanism, f"{call}: knot {t}", reports[t], self.tolerance)
+        return ended(Linearization(A, B, x_next, statuses, accuracy=reports[:, 5], detail=detail), throw)
+
+    def linearize_maximal(
+        self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, *, throw: bool = False
+    ) -> Jacobian:
+        """d(next maximal state)/d(z, u), (12 nbody, 12 nbody) and (12 nbody, nu).
+
+        Tangent coordinates per body: position, velocity (world), rotation (right perturbation of the quaternion),
+        angular velocity (body). The step sees z through minimal(z): what leaves the joints has no effect, so A is the
+        derivative of maximal(step(minimal(z))).
+        """
+        bodies = checks.array("Simulator.linearize_maximal(z)", z, (self.nbody, 13))
+        found = self.linearize(self.minimal(bodies), u, kappa, throw=throw)
+        if not found.success:
+            return found
+        out = self.maximal_jacobian(found.x_next)
+        blocks = {"state": out @ found.A @ self.minimal_jacobian(bodies), "input": out @ found.B}
+        return changed(found, blocks=blocks)
+
+    def vjp(
+        self,
+        trajectory: Trajectory | tuple[ArrayLike, ArrayLike],
+        dL_dx: ArrayLike,
+        wrt: Sequence[str] = ("state", "input"),
+        kappa: float | None = None,
+        wrenches: Wrenches | None = None,
+        *,
+        throw: bool = False,
+    ) -> Gradient:
+        """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
+
+        The steps are solved anew at `kappa`; nothing but one step is kept, so the memory is that of the trajectory.
+
+        Args:
+            trajectory: of `rollout`, or (states (T + 1, nx), inputs (T, nu)).
+            dL_dx: (T + 1, ndx) in tangent coordinates.
+            wrt: "state", "input" and parameters, as in `parameters`.
+            kappa: central-path parameter; that of the simulator by default.
+            wrenches: external ones, (T, nbody, 6) or by body; those of the trajectory by default.
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            Gradient by the names of `wrt`: "state" (ndx,), of the first state; "input" (T, nu); parameters (n,).
+        """
+        call = "Simulator.vjp"
+        xs, us = path_of(f"{call}(trajectory)", trajectory)
+        if wrenches is None and isinstance(trajectory, Trajectory):
+            wrenches = trajectory.wrenches
+        inputs = self._arguments.inputs("vjp", "trajectory", us, ("T", self.nu))
+        rows = checks.array(f"{call}(trajectory)", xs, (len(inputs) + 1, self.nx))
+        loss = checks.array(f"{call}(dL_dx)", dL_dx, (len(inputs) + 1, self.ndx))
+        asked, found, plan = self._by_parameters.select(f"{call}(wrt=...)", wrt)
+        path = (self._arguments.states(f"{call}(trajectory)", rows), inputs)
+        external = self._arguments.wrenches("vjp", wrenches, len(inputs))
+        level = self._arguments.kappa("vjp", kappa)
+        knot, line = self._by_parameters.sweep(path, loss, plan, level, external)
+        blocks = {"state": line.costate[0], "input": line.inputs}
+        blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
+        if knot >= 0:
+            report = line.report[0]
+            detail = sentence(self.mechanism, f"{call}: step {knot}", report, self.tolerance)
+            return ended(Gradient(blocks, Status(int(report[0])), detail), throw)
+        finite = all(np.isfinite(block).all() for block in blocks.values())
+        return ended(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
+
+    def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
+        """Names and values of parameters: of all, or of the given names, in their order.
+
+            kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
+
+        A name without a component stands for all of them, one without a part for all parts; `kind:*` is a single one
+        that adds the same to all parts, at the mean of their values. Kinds (units: parameter.py):
+
+            mass, inertia, com          of bodies; a mass changes alone; com is a displacement from where it is, and
+                                        joints, contacts and shapes stay where they are on the body
+            parent_point, child_point   of joints, also of those that close loops
+            orientation, axis           rotation vector of the joint frame, from where it is; direction
+            spring, damper, rest, armature, lower, upper, cone       of joints; gear_ratio, gear_offset
+            input_force, input_torque   of a unit of an input on a body; gravity, time_step
+            friction, restitution       of contacts and collisions
+            contact_point, contact_radius, contact_height, contact_normal; terrain, heights of its grid
+            shape_a, shape_b            centres of the shapes of collisions in their bodies
+            size_a, size_b              their [radius], [length], [x], [y], [z]; of a polytope its [scale], 1 as it is;
+                                        a body's inertia is that of its own shape, and stays
+        """
+        call = "Simulator.parameters(wrt)"
+        return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
+
+    def with_parameters(self, values: Mapping[str, ArrayLike]) -> Simulator:
+        """The same, also its kappa, with other values of parameters; a ValueError names what nothing can have."""
+        mech, time_step = self._by_parameters.with_values("Simulator.with_parameters(...)", values)
+        return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
+
+    @cached_property
+    def _by_parameters(self) -> ParameterEngine:
+        """Calls by parameters, and sweeps; their modules are imported by those who ask for them."""
+        from sim.simulator.parameter_engine import ParameterEngine
+
+        return ParameterEngine(self._engine, self.mechanism, self.time_step)

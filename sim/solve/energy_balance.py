@@ -137,7 +137,7 @@ def input_work(model: Model, work: Work, j: int, u: float) -> float:
 
 @kernel
 def work_at_node(model: Model, work: Work, h: float, v: Vector, u: Vector) -> tuple[float, float]:
-    """Work of gravity, springs and inputs at configuration 2, and the sum of its parts but gravity [J].
+    """Work of gravity, springs, inputs and external wrenches at configuration 2, and its size without gravity [J].
 
     S2^T (subtree sums of w) is what springs, inputs, dampers and limits of a coordinate leave of -I (v' - v).
     """
@@ -156,6 +156,12 @@ def work_at_node(model: Model, work: Work, h: float, v: Vector, u: Vector) -> tu
         if model.input_kind[j] != InputKind.JOINT:
             part = input_work(model, work, j, u[j])
             total, size = total + part, size + abs(part)
+    for i in range(model.body_parent.shape[0]):
+        part, f = 0.0, work.external[i]
+        for k in range(3):
+            part += 0.5 * f[k] * (work.move_in[i, k] + work.move[i, k])
+            part += f[3 + k] * (work.turn_in[i, 1 + k] + work.turn[i, 1 + k])
+        total, size = total + part, size + abs(part)
     return total, size
 
 

@@ -13,7 +13,7 @@ from scenes import random_state
 import dojo_opt as dojo
 from sim.mechanism.confined import IDLE, SUNK
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator.calls import REPORT, refuse
+from sim.simulator.engine import REPORT, refuse
 
 SUNKEN = dojo.Status.CONTACT_SUNK
 CUBE = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
@@ -61,7 +61,8 @@ def test_below_the_ground_it_is_refused_by_name() -> None:
     with pytest.raises(dojo.SimulationError, match=r"below the ground.*It is 'foot'\."):
         sim.step(sim.neutral(), throw=True)
     with pytest.raises(dojo.SimulationError, match="'foot'"):
-        sim.linearize(sim.neutral())
+        _ = sim.linearize(sim.neutral()).A
+    assert "'foot'" in sim.linearize(sim.neutral()).message
     t = sim.rollout(sim.neutral(), np.zeros((2, sim.nu)))
     assert (t.status, t.knot) == (SUNKEN, 0) and "'foot'" in t.message
 
@@ -216,7 +217,7 @@ def test_numbers_are_finite_or_the_status_says_not(seed: int) -> None:
     assert _numbers(linear)
     if not r.success or linear.status[0] != 0:
         with pytest.raises(dojo.SimulationError):
-            sim.linearize(x, u)
+            _, _ = sim.linearize(x, u)
         return
     for block in sim.linearize(x, u, wrt=("state", "input", "mass", "com")).values():
         assert np.isfinite(block).all()
@@ -241,7 +242,7 @@ def test_a_mechanism_spoilt_afterwards_gets_a_status() -> None:
     """Whatever a kernel makes of it, no number that is not finite is called solved."""
     for field in ("contact_friction", "contact_radius", "body_mass", "contact_point"):
         sim = dojo.Simulator(hinged(1.0), 0.01)
-        getattr(sim._calls.model, field)[...] = np.nan
+        getattr(sim._engine.model, field)[...] = np.nan
         t = sim.rollout(sim.neutral(), np.zeros((3, 1)))
         linear = sim.linearize_trajectory(np.tile(sim.neutral(), (3, 1)), np.zeros((3, 1)))
         assert np.isfinite(t.contacts.impulse).all() and np.isfinite(t.contacts.gap).all()

@@ -42,7 +42,7 @@ def both_ways(model_at, work_at, columns, by_one):
 def test_columns_are_solved_as_one_by_one(build, deep, rng):
     sim = dojo.Simulator(build(), time_step=0.01)
     sim.linearize(sim.neutral(), rng.normal(size=sim.nu))  # leaves factors
-    model_at, work_at = sim._calls.tables()
+    model_at, work_at = sim._engine.tables()
     bound = sim.model.optional[Slot.SOLVE_DEEP_PANEL]
     assert (bound != 0) == deep
     columns = rng.normal(size=work_view(work_at).columns.shape)

@@ -30,7 +30,7 @@ def given(model_at, work_at, h, v, u):
 
 
 def tables(sim):
-    return sim._calls.tables(link_step)
+    return sim._engine.tables(link_step)
 
 
 def work_in_step(sim, x):

@@ -22,17 +22,17 @@ def gains():
 
 def counted(horizon, *given, **named):
     """A rollout, and the Newton iterations that it took."""
-    calls, seen = horizon._calls.closed_loop, []
+    calls, seen = horizon._engine.closed_loop, []
 
     def count(*args, **more):
         seen.append(calls(*args, **more))
         return seen[-1]
 
-    horizon._calls.closed_loop = count
+    horizon._engine.closed_loop = count
     try:
         return horizon.roll(*given, **named), seen[0][1].report[1]
     finally:
-        del horizon._calls.closed_loop
+        del horizon._engine.closed_loop
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.5])
@@ -118,4 +118,4 @@ def test_linearize_rollout_is_rollout_and_linearization():
     assert line.status.tolist() == [0] * T
     np.testing.assert_array_equal(line.x_next, xs[1:])
     with pytest.raises(dojo.SimulationError, match=r"Simulator\.linearize_rollout: step 0"):
-        HOPPER.replace(max_iterations=1).linearize_rollout(x + 0.1 * np.eye(HOPPER.nx)[2], us)
+        HOPPER.replace(max_iterations=1).linearize_rollout(x + 0.1 * np.eye(HOPPER.nx)[2], us, throw=True)

@@ -237,4 +237,4 @@ def test_bad_values_and_shapes() -> None:
     fast = t.x.copy()
     fast[:, sim.nq :] += 20.0
     with pytest.raises(dojo.SimulationError, match=r"Simulator.vjp: step 3"):
-        sim.replace(max_iterations=1).vjp((fast, t.u), loss)
+        sim.replace(max_iterations=1).vjp((fast, t.u), loss, throw=True)

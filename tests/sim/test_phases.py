@@ -33,7 +33,7 @@ def inputs(sim: dojo.Simulator, steps: int) -> np.ndarray:
 
 def near(sim: dojo.Simulator, x: np.ndarray, us: np.ndarray) -> np.ndarray:
     """Which steps are of order 2."""
-    return np.asarray(sim._calls.march(x, us).near)
+    return np.asarray(sim._engine.march(x, us).near)
 
 
 def test_flight_has_the_higher_order_and_lands() -> None:

@@ -50,7 +50,7 @@ def test_the_delassus_matrix_is_that_of_whole_solves():
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
     us = np.random.default_rng(0).uniform(-5.0, 5.0, (3, sim.nu))
     sim.rollout(sim.neutral(), us, throw=True)  # leaves factors and Jacobians of a step
-    model_at, work_at = sim._calls.tables(link_step)
+    model_at, work_at = sim._engine.tables(link_step)
     work = work_view(work_at)
     stops = [0, 3, 9]
     size = 3 * FEET + len(stops)

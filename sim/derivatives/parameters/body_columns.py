@@ -217,7 +217,7 @@ def add_input(model: Model, work: Work, at: At, j: int, k: int, w: float, col: i
 def add_time_step(model: Model, work: Work, at: At, w: float, col: int) -> None:
     """dR/dh where h v15 and h v25 stay, without contacts:
 
-    body     -(balance + h (m g + f))/h - (m g + f),   f the inputs
+    body     -(balance + h (m g + f))/h - (m g + f),   f the inputs and external wrenches
     joint    spring impulse/h - u,   -I (nu - v)/h of an armature
     """
     h, g = at.h, model.gravity
@@ -225,8 +225,9 @@ def add_time_step(model: Model, work: Work, at: At, w: float, col: int) -> None:
     for i in range(model.body_parent.shape[0]):
         m = -2.0 * model.body_mass[i]
         b = work.balance[i]
-        f = (m * g[0], m * g[1], m * g[2])
-        t = moment(work, i, f, (0.0, 0.0, 0.0))
+        e = work.external[i]
+        f = (m * g[0] - 2.0 * e[0], m * g[1] - 2.0 * e[1], m * g[2] - 2.0 * e[2])
+        t = moment(work, i, f, (-2.0 * e[3], -2.0 * e[4], -2.0 * e[5]))
         f = (f[0] - b[0] / h, f[1] - b[1] / h, f[2] - b[2] / h)
         t = (t[0] - b[3] / h, t[1] - b[4] / h, t[2] - b[5] / h)
         add_wrench(model, work, i, f, t, w, col)

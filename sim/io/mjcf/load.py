@@ -19,10 +19,10 @@ from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.urdf.report import Frame, Notes
 from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Body, Joint
 from sim.mechanism.pose import Pose
 from sim.mechanism.stance import gaps, lifted
-from sim.simulator.border import whole
 
 
 def load_mjcf(
@@ -90,7 +90,7 @@ def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float 
     return (
         None if friction is None else checks.number("load_mjcf(friction=...)", friction, at_least=0.0),
         checks.one_of("load_mjcf(law=...)", law, LAWS),
-        whole("load_mjcf(rim_points=...)", rim_points, 3),
+        whole_number("load_mjcf(rim_points=...)", rim_points, 3),
     )
 
 

@@ -13,8 +13,8 @@ from sim.io.urdf.report import Notes, UrdfMechanism
 from sim.io.urdf.robot import Robot, read_robot
 from sim.io.urdf.xml import parse
 from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Contact
-from sim.simulator.border import whole
 
 MIMIC = ("free", "locked", "gear")
 
@@ -84,7 +84,7 @@ def load_urdf(
         contacts=(contacts if ground else ()),
         friction=None if friction is None else checks.number("load_urdf(friction=...)", friction, at_least=0.0),
         law=checks.one_of("load_urdf(law=...)", law, LAWS),
-        rim_points=whole("load_urdf(rim_points=...)", rim_points, 3),
+        rim_points=whole_number("load_urdf(rim_points=...)", rim_points, 3),
         gravity=checks.vector("load_urdf(gravity=...)", gravity, 3),
     )
     return assemble(robot, loops, choices, notes)

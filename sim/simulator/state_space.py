@@ -1,4 +1,4 @@
-"""States: what can be said about a state without moving it. The half of Simulator that is not about motion."""
+"""StateSpace: the states of one mechanism on their manifold, and other views of them. Nothing here moves."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.model.model import Model
-from sim.simulator.border import Border, shaped
-from sim.simulator.calls import Calls
+from sim.simulator.arguments import Arguments, shaped
+from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
 from sim.simulator.settings import Settings
 
 Floats = NDArray[np.float64]
 
 
-def _high_order(model: Model, mechanism: Mechanism, settings: Settings) -> Calls:
-    """Calls of a higher order; their module is imported by those who ask for it."""
-    from sim.simulator.high_order_calls import HighOrder, check
+def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine:
+    """The engine of an order; the modules of higher orders are imported by simulators that have one."""
+    if settings.order == 2:
+        return Engine(model, settings)
+    from sim.simulator.high_order_engine import HighOrderEngine, check
 
     check(mechanism, settings)
-    calls = HighOrder(model, settings)
+    engine = HighOrderEngine(model, settings)
     if len(model.contact_body) + len(model.limit_dof):
-        from sim.simulator.phased_calls import Phased
+        from sim.simulator.phased_engine import PhasedEngine
 
-        calls = Phased(model, settings)
-    calls.check_stiffness(mechanism)
-    return calls
+        engine = PhasedEngine(model, settings)
+    engine.check_stiffness(mechanism)
+    return engine
 
 
-class States:
-    """Sizes and settings of a simulator, its states on their manifold, and other views of them."""
+class StateSpace:
+    """Sizes and settings, states on their manifold, and other views of them."""
 
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
@@ -44,11 +46,12 @@ class States:
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
         self.nx, self.ndx = self.nq + self.nv, 2 * self.nv
-        self._calls = Calls(self.model, settings) if self.order == 2 else _high_order(self.model, mechanism, settings)
-        self._border = Border(mechanism, self._calls)
+        self._engine = _engine_of(self.model, mechanism, settings)
+        self._no_input = np.zeros(self.nu)
+        self._arguments = Arguments(mechanism, self._engine)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if hasattr(self, "_border"):
+        if hasattr(self, "_arguments"):
             raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
         super().__setattr__(name, value)
 
@@ -66,13 +69,13 @@ class States:
         Trees: x itself. ValueError: no such state is found; which loop joint or gear stays open, and by how much.
         """
         state = self._placed("close", x)
-        return Closure(self.mechanism, self._calls).close(state) if self._closes else state
+        return Closure(self.mechanism, self._engine).close(state) if self._closes else state
 
     def _placed(self, method: str, x: ArrayLike) -> Floats:
         """A state whose bodies have poses and velocities that are finite."""
-        state = self._border.state(method, x)
+        state = self._arguments.state(method, x)
         if self._closes:
-            self._border.finite(f"{method}(x)", self._calls.maximal(state[None], self.nbody), state[None])
+            self._arguments.finite(f"{method}(x)", self._engine.maximal(state[None], self.nbody), state[None])
         return state
 
     @property
@@ -82,7 +85,7 @@ class States:
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
         """By loop joint, and "gear NAME", how far it is open: distances [m], then angles [rad]."""
-        return Closure(self.mechanism, self._calls).gaps(self._placed("loop_gaps", x))
+        return Closure(self.mechanism, self._engine).gaps(self._placed("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
         """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
@@ -91,7 +94,7 @@ class States:
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
             )
         state = self.neutral() if x is None else self._placed("loop_rank", x)
-        return Closure(self.mechanism, self._calls).rank(state)
+        return Closure(self.mechanism, self._engine).rank(state)
 
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
@@ -106,11 +109,11 @@ class States:
         """
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
-        q0 = self._border.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
+        q0 = self._arguments.states("Simulator.start(q)", np.concatenate([q0, v0]))[: self.nq]
         x0 = np.concatenate([q0, v0])
         if self._closes and self.order == 2:
-            return Closure(self.mechanism, self._calls).start(self._placed("start", x0)[: self.nq], v0)
-        return self._border.finite("start", self._calls.started(q0, v0), x0[None])
+            return Closure(self.mechanism, self._engine).start(self._placed("start", x0)[: self.nq], v0)
+        return self._arguments.finite("start", self._engine.started(q0, v0), x0[None])
 
     def velocity(self, x: ArrayLike) -> Floats:
         """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
@@ -118,8 +121,8 @@ class States:
         They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node, and of that the part
         along closed loops, whose forces act before and after the node.
         """
-        xs, lead = self._border.stacked("velocity", "x", x)
-        return self._border.finite("velocity(x)", self._calls.node_velocities(xs), xs).reshape(*lead, self.nv)
+        xs, lead = self._arguments.stacked("velocity", "x", x)
+        return self._arguments.finite("velocity(x)", self._engine.node_velocities(xs), xs).reshape(*lead, self.nv)
 
     def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """(nbody, 13) per body [position, velocity (world), quaternion, omega (body)] where the joints have the
@@ -127,26 +130,28 @@ class States:
 
         `maximal` has mean velocities over the last interval instead.
         """
-        qs, vs, lead = self._border.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
-        xs = self._border.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
-        return self._border.finite("bodies", self._calls.bodies(xs), xs).reshape(*lead, self.nbody, 13)
+        qs, vs, lead = self._arguments.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
+        xs = self._arguments.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
+        return self._arguments.finite("bodies", self._engine.bodies(xs), xs).reshape(*lead, self.nbody, 13)
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
-        xs, dxs, lead = self._border.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
-        xs = self._border.states("Simulator.integrate(x)", xs)
-        return self._border.finite("integrate", self._calls.integrate(xs, dxs), xs, dxs).reshape(*lead, self.nx)
+        xs, dxs, lead = self._arguments.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
+        xs = self._arguments.states("Simulator.integrate(x)", xs)
+        return self._arguments.finite("integrate", self._engine.integrate(xs, dxs), xs, dxs).reshape(*lead, self.nx)
 
     def difference(self, x1: ArrayLike, x0: ArrayLike) -> Floats:
         """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
-        x1s, x0s, lead = self._border.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
-        x1s, x0s = (self._border.states(f"Simulator.difference({n})", x) for n, x in (("x1", x1s), ("x0", x0s)))
-        return self._border.finite("difference", self._calls.difference(x0s, x1s), x1s, x0s).reshape(*lead, self.ndx)
+        x1s, x0s, lead = self._arguments.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
+        x1s, x0s = (self._arguments.states(f"Simulator.difference({n})", x) for n, x in (("x1", x1s), ("x0", x0s)))
+        return self._arguments.finite("difference", self._engine.difference(x0s, x1s), x1s, x0s).reshape(
+            *lead, self.ndx
+        )
 
     def maximal(self, x: ArrayLike) -> Floats:
         """z (nbody, 13) per body [position, velocity (world), quaternion, omega (body)]; leading axes allowed."""
-        xs, lead = self._border.stacked("maximal", "x", x)
-        zs = self._border.finite("maximal(x)", self._calls.maximal(xs, self.nbody), xs)
+        xs, lead = self._arguments.stacked("maximal", "x", x)
+        zs = self._arguments.finite("maximal(x)", self._engine.maximal(xs, self.nbody), xs)
         return zs.reshape(*lead, self.nbody, 13)
 
     def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
@@ -158,47 +163,47 @@ class States:
         zs = np.array(shaped("Simulator.minimal(z)", z, (self.nbody, 13)))
         lead = zs.shape[:-2]
         zs = zs.reshape(-1, self.nbody, 13)
-        self._border.check_maximal("minimal", zs)
-        xs = self._border.finite("minimal(z)", self._calls.minimal(zs), zs)
+        self._arguments.check_maximal("minimal", zs)
+        xs = self._arguments.finite("minimal(z)", self._engine.minimal(zs), zs)
         if joint_tolerance < np.inf:
-            self._border.check_joints(zs, self._calls.maximal(xs, self.nbody), joint_tolerance)
+            self._arguments.check_joints(zs, self._engine.maximal(xs, self.nbody), joint_tolerance)
         return xs.reshape(*lead, self.nx)
 
     def maximal_jacobian(self, x: ArrayLike) -> Floats:
         """dz/dx (12 nbody, ndx), per body [position, velocity, rotation, omega], in tangent coordinates."""
-        state = self._border.state("maximal_jacobian", x)
-        return self._border.finite(
-            "maximal_jacobian(x)", self._calls.maximal_jacobian(state, self.nbody)[None], state[None]
+        state = self._arguments.state("maximal_jacobian", x)
+        return self._arguments.finite(
+            "maximal_jacobian(x)", self._engine.maximal_jacobian(state, self.nbody)[None], state[None]
         )[0]
 
     def minimal_jacobian(self, z: ArrayLike) -> Floats:
         """dx/dz (ndx, 12 nbody), the inverse of `maximal_jacobian` along the joints."""
         zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
-        self._border.check_maximal("minimal_jacobian", zs[None])
-        return self._border.finite("minimal_jacobian(z)", self._calls.minimal_jacobian(zs)[None], zs[None])[0]
+        self._arguments.check_maximal("minimal_jacobian", zs[None])
+        return self._arguments.finite("minimal_jacobian(z)", self._engine.minimal_jacobian(zs)[None], zs[None])[0]
 
     def energy(self, x: ArrayLike) -> Any:
         """Kinetic and potential energy at the node [J]; leading axes allowed."""
-        xs, lead = self._border.stacked("energy", "x", x)
+        xs, lead = self._arguments.stacked("energy", "x", x)
         total = self._energies("energy", xs, [0, 1]).reshape(lead)
         return total if lead else float(total)
 
     def kinetic_energy(self, x: ArrayLike) -> Any:
         """Kinetic energy at the node [J]; leading axes allowed."""
-        xs, lead = self._border.stacked("kinetic_energy", "x", x)
+        xs, lead = self._arguments.stacked("kinetic_energy", "x", x)
         kinetic = self._energies("kinetic_energy", xs, [0]).reshape(lead)
         return kinetic if lead else float(kinetic)
 
     def _energies(self, method: str, xs: Floats, parts: list[int]) -> Floats:
         """Sum of these of the (kinetic, potential) energy of every row."""
         with np.errstate(all="ignore"):
-            total = self._calls.energies(xs)[:, parts].sum(axis=1)
-        return self._border.finite(f"{method}(x)", total, xs)
+            total = self._engine.energies(xs)[:, parts].sum(axis=1)
+        return self._arguments.finite(f"{method}(x)", total, xs)
 
     def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
         """(linear [N s], angular about the world's origin [N m s]) momentum at the node; leading axes allowed."""
-        xs, lead = self._border.stacked("momentum", "x", x)
+        xs, lead = self._arguments.stacked("momentum", "x", x)
         with np.errstate(all="ignore"):
-            momenta = self._calls.momenta(xs)
-        p = self._border.finite("momentum(x)", momenta, xs).reshape(*lead, 6)
+            momenta = self._engine.momenta(xs)
+        p = self._arguments.finite("momentum(x)", momenta, xs).reshape(*lead, 6)
         return p[..., :3].copy(), p[..., 3:].copy()

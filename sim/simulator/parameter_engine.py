@@ -1,4 +1,4 @@
-"""Calls by parameters: what a simulator says of its parameters by name, and derivatives by them."""
+"""ParameterEngine: parameters of a simulator by name, and derivatives by them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import Vector
-from sim.simulator.calls import Calls
+from sim.simulator.engine import Engine, Rolled
 from sim.simulator.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
 
 Floats = NDArray[np.float64]
 _VARIABLES = ("state", "input")
 
 
-class ParameterCalls:
+class ParameterEngine:
     """Derivatives by the parameters of one simulator; selections of parameters are those of `select`."""
 
-    def __init__(self, calls: Calls, mechanism: Mechanism, time_step: float) -> None:
-        self._calls, self._mechanism, self._time_step = calls, mechanism, time_step
+    def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
+        self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
         self._known = all_parameters(mechanism, time_step)
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, Plan]] = {}
@@ -38,8 +38,8 @@ class ParameterCalls:
         """The names, one or several; those of them that are parameters, and the terms of their columns."""
         asked = _different_names(call, wrt)
         names = tuple(name for name in asked if name not in _VARIABLES)
-        if names and self._calls.settings.order != 2:
-            raise ValueError(f"{call}: expected a simulator of order 2, got order {self._calls.settings.order}")
+        if names and self._engine.settings.order != 2:
+            raise ValueError(f"{call}: expected a simulator of order 2, got order {self._engine.settings.order}")
         return asked, *self._selection(call, names)
 
     def values(self, call: str, wrt: Sequence[str]) -> Parameters:
@@ -57,17 +57,24 @@ class ParameterCalls:
 
     def columns(self, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
         """See `parameter_columns`."""
-        return parameter_columns(self._calls, self._mechanism, step, A, plan)
+        return parameter_columns(self._engine, self._mechanism, step, A, plan)
 
     def roll(
-        self, x: Vector, us: Floats, plan: Plan, kappa: float | None
-    ) -> tuple[int, Floats, Floats, Floats, Floats, Floats]:
+        self, x: Vector, us: Floats, plan: Plan, kappa: float | None, wrenches: Floats | None
+    ) -> tuple[Rolled, Floats]:
         """See `roll_parameters`."""
-        return roll_parameters(self._calls, self._mechanism, x, us, plan, kappa)
+        return roll_parameters(self._engine, self._mechanism, (x, us, wrenches), plan, kappa)
 
-    def sweep(self, path: tuple[Floats, Floats], loss: Floats, plan: Plan, kappa: float | None) -> tuple[int, Sweep]:
+    def sweep(
+        self,
+        path: tuple[Floats, Floats],
+        loss: Floats,
+        plan: Plan,
+        kappa: float | None,
+        wrenches: Floats | None,
+    ) -> tuple[int, Sweep]:
         """See `adjoint_sweep`."""
-        return adjoint_sweep(self._calls, self._mechanism, path, loss, plan, kappa)
+        return adjoint_sweep(self._engine, self._mechanism, (*path, wrenches), loss, plan, kappa)
 
 
 def _different_names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:

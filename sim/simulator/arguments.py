@@ -1,35 +1,42 @@
-"""Border: what Simulator's methods accept; each message names the method, the argument, and what is wrong with it."""
+"""Arguments: checks of what Simulator's methods are given; messages name the method, the argument and the error."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.integrators.policy import Policy
+from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
-from sim.simulator.calls import Calls
+from sim.simulator.engine import Engine
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
-_UNIT = 1e-6  # by how much the length of a quaternion may be off
+_FLOAT = np.dtype(np.float64)
 
 
-class Border:
+def is_plain(value: Any, shape: tuple[int, ...]) -> bool:
+    """Whether kernels take an array as it is; `accept` of rollout.py looks at its numbers."""
+    return type(value) is np.ndarray and value.dtype is _FLOAT and value.shape == shape and value.flags.carray
+
+
+class Arguments:
     """Checks of states, inputs and maximal states of one mechanism."""
 
-    def __init__(self, mechanism: Mechanism, calls: Calls) -> None:
-        self.mechanism, self._calls = mechanism, calls
-        self.nbody, self.nx, self.nu = mechanism.nbody, calls.nx, calls.nu
-        self.time_step = calls.settings.time_step
+    def __init__(self, mechanism: Mechanism, engine: Engine) -> None:
+        self.mechanism, self._engine = mechanism, engine
+        self.nbody, self.nx, self.nu = mechanism.nbody, engine.nx, engine.nu
+        self.time_step = engine.settings.time_step
 
     def states(self, call: str, xs: Floats) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
         out = np.array(xs, dtype=np.float64)
-        bad = self._calls.normalise(out.reshape(-1, self.nx), _UNIT)
+        bad = self._engine.normalise(out.reshape(-1, self.nx), UNIT)
         if bad >= 0:
             row, body = divmod(bad, self.nbody)
             at = f" in row {row}" if out.ndim > 1 else ""
@@ -74,9 +81,27 @@ class Border:
         """A positive kappa, or None for that of the simulator."""
         return None if kappa is None else checks.number(f"Simulator.{method}(kappa=...)", kappa, above=0.0)
 
-    def policy(self, call: str, start: Floats, us: Floats, parts: tuple[ArrayLike | None, ...]) -> Policy:
+    def wrenches(self, method: str, wrenches: Any, steps: int) -> Floats | None:
+        """External wrenches (steps, nbody, 6), from (nbody, 6), (steps, nbody, 6) or {body: (6,) or (steps, 6)}."""
+        if wrenches is None:
+            return None
+        call = f"Simulator.{method}(wrenches=...)"
+        names, out = self.mechanism.body_names, np.zeros((steps, self.nbody, 6))
+        if isinstance(wrenches, Mapping):
+            for name, value in wrenches.items():
+                checks.one_of(f"{call}: body", name, names)
+                lead = (steps,) if np.ndim(value) == 2 else ()
+                out[:, names.index(name)] = checks.array(f"{call}: body {name!r}", value, (*lead, 6))
+        else:
+            lead = (steps,) if np.ndim(wrenches) == 3 else ()
+            out[:] = checks.array(call, wrenches, (*lead, self.nbody, 6))
+        return out
+
+    def policy(
+        self, call: str, start: Floats, us: Floats, wrenches: Floats | None, parts: tuple[ArrayLike | None, ...]
+    ) -> Policy:
         """Policy around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
-        ndx, knots = self._calls.ndx, len(us)
+        ndx, knots = self._engine.ndx, len(us)
         shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
         xs, ks, Ks, gaps = (
             np.zeros(shape) if part is None else checks.array(f"{call}({name}=...)", part, shape)
@@ -86,7 +111,8 @@ class Border:
             if parts[2] is not None:
                 raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
             xs[:] = start
-        return Policy(self.states(f"{call}(xs=...)", xs), us, ks, Ks, gaps, *self._calls.unknown)
+        external = self._engine.no_wrenches if wrenches is None else wrenches
+        return Policy(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)
 
     def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
         """(lower, upper) of every input, infinite where free."""
@@ -129,7 +155,7 @@ class Border:
             length = np.linalg.norm(zs[..., 6:10], axis=-1)
             turn = np.linalg.norm(zs[..., 10:], axis=-1) * self.time_step
         for bad, what in (
-            (np.abs(length - 1.0) > _UNIT, "expected a unit quaternion"),
+            (np.abs(length - 1.0) > UNIT, "expected a unit quaternion"),
             (turn >= np.pi, MESSAGES[Status.ANGULAR_STEP]),
         ):
             if bad.any():
@@ -165,10 +191,3 @@ def shaped(call: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
             tail = ", ".join(map(str, shape))
             text = f"{call}: expected shape (..., {tail}), got {np.shape(value)}"
         raise ValueError(text) from None
-
-
-def whole(call: str, value: Any, least: int = 1) -> int:
-    """`value` as a whole number of at least `least`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"{call}: expected a whole number >= {least}, got {value!r}")
-    return int(value)

@@ -1,4 +1,4 @@
-"""Calls of a simulator of higher order: states with the velocity of the node, steps of explicit Runge-Kutta methods."""
+"""Engine of a higher order: states with the velocity of the node, steps of explicit Runge-Kutta methods."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from sim.dynamics import bodies, coordinates
 from sim.integrators import runge_kutta
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.policy import Path, Policy
-from sim.integrators.rollout import Linearized
+from sim.integrators.rollout import Linearized, Motion
 from sim.integrators.tableau import stable, tableau
 from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
-from sim.model.model import InputKind, Integers, Model, Vector
+from sim.model.model import Cube, InputKind, Integers, Model, Vector
 from sim.model.pace import pieces
-from sim.simulator.calls import CONTACT, REPORT, Calls, Floats, follow, interrupted
+from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, follow, interrupted
 from sim.simulator.link import link_smooth
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -32,7 +32,7 @@ def free_roots(model: Model) -> Integers:
     return free.astype(np.int64)
 
 
-class HighOrder(Calls):
+class HighOrderEngine(Engine):
     """The kernels of one packed mechanism without contacts and limits, with steps of the order of its settings."""
 
     def _scheme(self) -> runge_kutta.Scheme:
@@ -44,40 +44,54 @@ class HighOrder(Calls):
 
     def _tables(self) -> tuple[Integers, Integers, Vector]:
         """Tables of the Model and of this thread's first Work, and settings."""
-        return self._table(link_smooth), self._scratch.table(), self.settings.array()
+        return self.linked(link_smooth), self._scratch.table(), self.settings.array()
 
-    def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
-        """As Calls.roll; without contacts."""
+    def roll(
+        self,
+        x: Vector,
+        us: Floats,
+        wrenches: Cube | None = None,
+        *,
+        kappa: float | None = None,
+        derivatives: bool = False,
+    ) -> Rolled:
+        """As Engine.roll; without contacts and without a kappa; derivatives take a second pass."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        contacts = np.zeros((steps, 0, CONTACT))
         xs[0] = x
+        external = self.no_wrenches if wrenches is None else wrenches
+        A, B = self.unknown[:2]
+        contacts = np.zeros((steps, 0, CONTACT))
+        motion = Motion(xs, us, external, reports, contacts, A, B)
         model, work, settings, scheme = *self._tables(), self._scheme()
         knot = 0
         try:
             for _ in pieces(settings, steps):
-                knot = int(runge_kutta.roll(model, work, settings, scheme, us, xs, reports, knot))
+                knot = int(runge_kutta.roll(model, work, settings, scheme, motion, knot))
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted((knot, xs, interrupted(reports, knot), contacts)) from None
-        return knot, xs, reports, contacts
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
+        if derivatives:
+            A, B, *_ = self.linearize(xs[:-1], us, 1, kappa, None, wrenches)
+        return Rolled(knot, xs, reports, contacts, A, B)
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
-        """As Calls.roll_batch, on one core."""
+        """As Engine.roll_batch, on one core."""
         n, steps = us.shape[:2]
         xs = np.zeros((n, steps + 1, self.nx))
         status, knots = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         xs[:, 0] = x0s
         for i in range(n):
             try:
-                knots[i], xs[i], reports, _ = self.roll(x0s[i], us[i])
+                rolled = self.roll(x0s[i], us[i])
+                knots[i], xs[i] = rolled.knot, rolled.xs
             except KeyboardInterrupt as stop:
                 status[i:] = Status.INTERRUPTED
                 if isinstance(stop, Interrupted):
-                    knots[i], xs[i], *_ = stop.result
+                    knots[i], xs[i] = stop.result.knot, stop.result.xs
                 raise Interrupted((xs, status, knots)) from None
-            status[i] = reports[min(knots[i], steps - 1), 0] if steps else Status.SOLVED
+            status[i] = rolled.reports[min(rolled.knot, steps - 1), 0] if steps else Status.SOLVED
         return xs, status, knots
 
     def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
@@ -139,14 +153,20 @@ class HighOrder(Calls):
         return Tangents(slopes, *one, *all_stages)
 
     def linearize(
-        self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
     ) -> tuple[Floats, ...]:
-        """As Calls.linearize, on one core; there is no kappa and nothing to guess."""
+        """As Engine.linearize, on one core; there is no kappa and nothing to guess."""
         self._check_swings()
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        line = Linearized(xs, us, A, B, x_next, reports)
+        line = Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
         model, work, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
         step = 0
         for _ in pieces(settings, n * substeps):
@@ -167,12 +187,6 @@ class HighOrder(Calls):
                 "(orbital), are those of order 2; use replace(order=2)"
             )
 
-    def roll_linear(self, x: Vector, us: Floats, kappa: float | None) -> tuple[int, Floats, Floats, Floats, Floats]:
-        """As Calls.roll_linear, in two passes."""
-        knot, xs, reports, _ = self.roll(x, us)
-        A, B, *_ = self.linearize(xs[:-1], us, 1, kappa)
-        return knot, xs, A, B, reports
-
     def closed_loop(
         self,
         x: Vector,
@@ -184,7 +198,7 @@ class HighOrder(Calls):
         *,
         keep: bool = False,
     ) -> tuple[int, Path]:
-        """As Calls.closed_loop."""
+        """As Engine.closed_loop."""
         path = self._path(len(policy.us), keep=keep)
         path.xs[0] = x
         model, work, settings, scheme = *self._tables(), self._scheme()

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from sim.integrators import legendre, phases, rollout
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.policy import Path, Policy
-from sim.model.model import Integers, Model, Vector
+from sim.model.model import Cube, Integers, Model, Vector
 from sim.model.pace import pieces
-from sim.simulator.calls import CONTACT, REPORT, Calls, Floats, interrupted
-from sim.simulator.high_order_calls import HighOrder
+from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -42,17 +42,23 @@ class March(NamedTuple):
     near: NDArray[np.bool_]  # (T,) which those are
 
 
-class Phased(HighOrder):
+def _held(us: Floats, wrenches: Cube, t: int, substeps: int) -> tuple[Floats, Cube]:
+    """Inputs and external wrenches of the steps of knot t."""
+    return np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(wrenches[t : t + 1], substeps, axis=0)
+
+
+class PhasedEngine(HighOrderEngine):
     """The kernels of one packed mechanism with contacts or limits."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings)
-        self._second = Calls(model, settings._replace(order=2))
+        self._second = Engine(model, settings._replace(order=2))
         self._last = threading.local()
 
-    def march(self, x: Vector, us: Floats, kappa: float | None = None) -> March:
-        """Steps from x under us (T, nu)."""
+    def march(self, x: Vector, us: Floats, wrenches: Cube | None = None, kappa: float | None = None) -> March:
+        """Steps from x under us (T, nu) and external wrenches (T, nbody, 6)."""
         steps, ncontact = len(us), self.sizes.ncontact
+        external = self.no_wrenches if wrenches is None else wrenches
         out = March(
             0,
             np.zeros((steps + 1, self.nx)),
@@ -65,7 +71,9 @@ class Phased(HighOrder):
         t, mean = 0, None
         try:
             while t < steps:
-                taken, why = self._fly(phases.Flight(us[t:], out.xs[t:], out.reports[t:], out.contacts[t:]), kappa)
+                taken, why = self._fly(
+                    phases.Flight(us[t:], external[t:], out.xs[t:], out.reports[t:], out.contacts[t:]), kappa
+                )
                 t += taken
                 if why != phases.NEAR:
                     break
@@ -74,7 +82,7 @@ class Phased(HighOrder):
                     if status != Status.SOLVED:
                         out.reports[t] = status, 0.0, np.inf, 0.0, -1.0
                         break
-                taken, mean = self._stay(out, t, us, mean, kappa)
+                taken, mean = self._stay(out, t, (us, external), mean, kappa)
                 t += taken
                 if mean is None:
                     break
@@ -88,7 +96,7 @@ class Phased(HighOrder):
 
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
         """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
-        model, work = self._table(link_smooth, link_step), self._scratch.table()
+        model, work = self.linked(link_smooth, link_step), self._scratch.table()
         settings, scheme = self.settings.array(kappa), self._scheme()
         taken, why = 0, int(Status.SOLVED)
         try:
@@ -100,21 +108,26 @@ class Phased(HighOrder):
             raise Interrupted(taken) from None
         return int(taken), int(why)
 
-    def _stay(self, out: March, first: int, us: Floats, mean: Vector, kappa: float | None) -> tuple[int, Vector | None]:
+    def _stay(
+        self, out: March, first: int, given: tuple[Floats, Floats], mean: Vector, kappa: float | None
+    ) -> tuple[int, Vector | None]:
         """Steps of order 2 from the state `mean` at step `first` until all is far: their number, and the last state.
 
-        None in its place where a step is not solved.
+        None in its place where a step is not solved. given: inputs, and external wrenches.
         """
-        model, work, settings = self._table(link_step), self._second._scratch.table(), self.settings.array(kappa)
+        model, work, settings = self.linked(link_step), self._second._scratch.table(), self.settings.array(kappa)
+        us, external = given
         t, piece, nq = first, _PIECE, self.sizes.nq
         while t < len(us):
             count = min(piece, len(us) - t)
             means = np.zeros((count + 1, self.nx))
             means[0] = mean
             rows, solved = slice(t, t + count), 0
-            line = us[rows], means, out.reports[rows], out.contacts[rows]
+            line = rollout.Motion(
+                means, us[rows], external[rows], out.reports[rows], out.contacts[rows], *self.unknown[:2]
+            )
             for _ in pieces(settings, count):
-                solved = int(rollout.roll(model, work, settings, *line, solved))
+                solved = int(rollout.roll(model, work, settings, line, solved))
                 if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
                     break
             nodes = means[1 : solved + 1].copy()
@@ -130,13 +143,27 @@ class Phased(HighOrder):
                 return t - first, None
         return t - first, mean
 
-    def roll(self, x: Vector, us: Floats) -> tuple[int, Floats, Floats, Floats]:
-        """As Calls.roll."""
-        m = self.march(x, us)
-        return m.knot, m.xs, m.reports, m.contacts
+    def roll(
+        self,
+        x: Vector,
+        us: Floats,
+        wrenches: Cube | None = None,
+        *,
+        kappa: float | None = None,
+        derivatives: bool = False,
+    ) -> Rolled:
+        """As Engine.roll; derivatives take a second pass."""
+        try:
+            m = self.march(x, us, wrenches, kappa)
+        except Interrupted as stop:
+            raise Interrupted(Rolled(*stop.result, *self.unknown[:2])) from None
+        A, B = self.unknown[:2]
+        if derivatives:
+            A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
+        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B)
 
     def far(self) -> NDArray[np.bool_]:
-        """As Calls.far; all of them where the step was of higher order."""
+        """As Engine.far; all of them where the step was of higher order."""
         return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
 
     def closed_loop(
@@ -150,7 +177,7 @@ class Phased(HighOrder):
         *,
         keep: bool = False,
     ) -> tuple[int, Path]:
-        """As Calls.closed_loop; nothing of what the policy knows of its steps is used."""
+        """As Engine.closed_loop; nothing of what the policy knows of its steps is used."""
         knots = len(policy.us)
         path = self._path(knots, keep=keep, cones=False)
         path.xs[0] = x
@@ -159,7 +186,7 @@ class Phased(HighOrder):
             try:
                 dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
                 path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
-                m = self.march(path.xs[t], np.repeat(path.us[t : t + 1], substeps, axis=0), kappa)
+                m = self.march(path.xs[t], *_held(path.us, policy.wrenches, t, substeps), kappa)
             except KeyboardInterrupt:
                 interrupted(path.report[None], 0)
                 raise Interrupted((t, path)) from None
@@ -174,17 +201,28 @@ class Phased(HighOrder):
         return knots, path
 
     def linearize(
-        self, xs: Floats, us: Floats, substeps: int, kappa: float | None, guess: Floats | None = None
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
     ) -> tuple[Floats, ...]:
-        """As Calls.linearize, on one core: products of the derivatives of the steps, each by its own order."""
+        """As Engine.linearize, on one core: products of the derivatives of the steps, each by its own order."""
         self._check_swings()
+        external = self.no_wrenches if wrenches is None else wrenches
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         for t in range(n):
-            m = self.march(xs[t], np.repeat(us[t : t + 1], substeps, axis=0), kappa)
+            m = self.march(xs[t], *_held(us, external, t, substeps), kappa)
             reports[t] = m.reports[min(m.knot, substeps - 1)]
-            steps = (self._step_slopes(m, s, us[t], kappa) for s in range(substeps)) if m.knot == substeps else ()
+            steps = (
+                (self._step_slopes(m, s, (us[t], external[t : t + 1]), kappa) for s in range(substeps))
+                if m.knot == substeps
+                else ()
+            )
             dx, du = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
             for dx_dx, dx_du, report in steps:
                 dx, du = dx_dx @ dx, dx_dx @ du + dx_du
@@ -194,12 +232,15 @@ class Phased(HighOrder):
                 A[t], B[t], x_next[t] = dx, du, m.xs[-1]
         return A, B, x_next, reports
 
-    def _step_slopes(self, m: March, s: int, u: Vector, kappa: float | None) -> tuple[Floats, Floats, Vector]:
-        """(d(next state)/d(state), by the input, report) of step s."""
+    def _step_slopes(
+        self, m: March, s: int, given: tuple[Vector, Cube], kappa: float | None
+    ) -> tuple[Floats, Floats, Vector]:
+        """(d(next state)/d(state), by the input, report) of step s; given: input, external wrenches (1, nbody, 6)."""
+        u, external = given
         if not m.near[s]:
-            A, B, _, report = super().linearize(m.xs[s : s + 1], u[None], 1, kappa)
+            A, B, _, report = super().linearize(m.xs[s : s + 1], u[None], 1, kappa, None, external)
             return A[0], B[0], report[0]
-        A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa)
+        A, B, x_next, report = self._second.linearize(m.means[s : s + 1], u[None], 1, kappa, None, external)
         after = self._node_slopes(x_next[0])
         return after @ A[0] @ np.linalg.inv(self._node_slopes(m.means[s])), after @ B[0], report[0]
 

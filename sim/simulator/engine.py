@@ -1,0 +1,406 @@
+"""Engine: the compiled calls of one packed mechanism, as functions of checked arrays.
+
+settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
+report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
+           accuracy of derivatives, 0 where there are none
+contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
+
+Calls that may take long are made in pieces (pace.py). Ctrl-C between two pieces raises Interrupted with the part of
+the result that is done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
+from sim.integrators import rollout
+from sim.integrators.policy import Path, Policy, closed_loop
+from sim.integrators.rollout import Motion
+from sim.model.data import Work
+from sim.model.layout import sizes_of, table, work_view
+from sim.model.model import Cube, Integers, Model, Vector
+from sim.model.pace import pieces, rows
+from sim.model.scratch import Scratch
+from sim.simulator.link import link_gradient, link_nodes, link_poses, link_step
+from sim.simulator.results import Interrupted, SimulationError
+from sim.simulator.settings import Settings
+from sim.solve import start_velocity
+from solvers.record import Table
+from solvers.status import MESSAGES, Status
+
+Floats = NDArray[np.float64]
+
+REPORT, CONTACT, CONE, BOUND = 6, 11, 12, 2  # numbers of a step, or of one of its contacts or limits
+_SMALL = 4096  # numbers; `dot` of more may wake up threads
+_WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
+
+
+class Rolled(NamedTuple):
+    """A rollout; rows after the solved steps are undefined."""
+
+    knot: int  # number of solved steps
+    xs: Floats  # (T + 1, nx)
+    reports: Floats  # (T, 6)
+    contacts: Floats  # (T, ncontact, 11), or (0, ncontact, 11) beside derivatives
+    A: Floats  # (T, ndx, ndx) derivatives, or (0, ndx, ndx)
+    B: Floats  # (T, ndx, nu)
+
+
+def finite_rows(array: Floats) -> NDArray[np.bool_]:
+    """Which rows (along the first axis) are finite throughout."""
+    return np.asarray(np.isfinite(array).reshape(len(array), -1).all(axis=1))
+
+
+def refuse(reports: Floats, count: int, *arrays: Floats) -> int:
+    """The first of `count` steps with a row that is not finite, and NOT_FINITE as its status; `count` without one.
+
+    A sum is looked at first, which takes a tenth of the time; small ones by `dot`, which has less to set up.
+    """
+    if all(isfinite(flat.dot(flat) if flat.size < _SMALL else flat.sum()) for flat in [a.ravel() for a in arrays]):
+        return count
+    good = np.logical_and.reduce([finite_rows(a) for a in arrays])
+    if good.all():
+        return count
+    first = int(good.argmin())
+    reports[first, 0] = Status.NOT_FINITE
+    return first
+
+
+def interrupted(reports: Floats, knot: int) -> Floats:
+    """The reports (T, 5), with that of the step `knot`, if there is one, saying that it was not tried."""
+    reports[knot : knot + 1, :REPORT] = Status.INTERRUPTED, 0.0, 0.0, 0.0, -1.0, 0.0
+    return reports
+
+
+def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: int) -> int:
+    """The number of solved knots of a rollout under a policy, which `go_on` continues after so many steps."""
+    done, steps = 0, len(path.us) * substeps
+    try:
+        for _ in pieces(settings, steps):
+            done = go_on(done)
+            if done == steps or path.report[0] != Status.SOLVED:
+                break
+    except KeyboardInterrupt:
+        interrupted(path.report[None], 0 if done < steps else 1)
+        raise Interrupted((done // substeps, path)) from None
+    return done // substeps
+
+
+class Engine:
+    """The kernels of one packed mechanism, their scratch, and the arrays that cross the border."""
+
+    def __init__(self, model: Model, settings: Settings) -> None:
+        self.model, self.settings = model, settings
+        self.sizes = sizes_of(model)
+        self.nx, self.ndx, self.nu = self.sizes.nq + self.sizes.nv, 2 * self.sizes.nv, self.sizes.nu
+        link_poses(model)
+        self._linked: set[Callable[[Model], None]] = set()
+        self._model = table(model)
+        self._scratch = Scratch(self.sizes, model.contact_frame)
+        self._settings = settings.array()  # of calls without a deadline, which write nothing into it
+        nothing = [
+            np.empty((0, *shape))
+            for shape in (
+                (self.sizes.nbody, 6),
+                (self.sizes.ncontact, CONTACT),
+                (self.ndx, self.ndx),
+                (self.ndx, self.nu),
+                (self.sizes.ncontact, CONE),
+                (self.sizes.nlimit, BOUND),
+            )
+        ]
+        self.no_wrenches, self._no_contacts = nothing[:2]
+        self.unknown = tuple(nothing[2:])  # derivatives and cone variables of steps that a policy does not know
+
+    def __getstate__(self) -> tuple[Model, Settings]:
+        """Tables and kernels are addresses in this process: another one makes its own."""
+        return self.model._replace(optional=np.zeros_like(self.model.optional)), self.settings
+
+    def __setstate__(self, state: tuple[Model, Settings]) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+    def linked(self, *needs: Callable[[Model], None]) -> Table:
+        """Table of the Model, with the optional kernels linked that a call needs."""
+        for link in needs:
+            if link not in self._linked:
+                link(self.model)
+                self._linked.add(link)
+        return self._model
+
+    def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
+        """Tables of the Model, linked for derivatives and what else a call needs, and of this thread's first Work."""
+        return self.linked(link_step, link_gradient, *needs), self._scratch.table()
+
+    # -- motions -------------------------------------------------------------------------------------------------------
+
+    def roll(
+        self,
+        x: Vector,
+        us: Floats,
+        wrenches: Cube | None = None,
+        *,
+        kappa: float | None = None,
+        derivatives: bool = False,
+    ) -> Rolled:
+        """Steps from x (nx,) under the inputs us (T, nu) and external wrenches (T, nbody, 6).
+
+        derivatives: those of every step, in one pass, instead of its contacts.
+        """
+        steps = len(us)
+        xs = np.empty((steps + 1, self.nx))
+        reports = np.zeros((steps, REPORT))
+        xs[0] = x
+        A, B = self.unknown[:2]
+        contacts = self._no_contacts
+        if derivatives:
+            A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
+            model = self.linked(link_step, link_gradient)
+        else:
+            contacts = np.empty((steps, self.sizes.ncontact, CONTACT))
+            model = self.linked(link_step)
+        motion = Motion(xs, us, self.no_wrenches if wrenches is None else wrenches, reports, contacts, A, B)
+        work = self._scratch.table()
+        settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
+        knot = 0
+        try:
+            for _ in pieces(settings, steps):
+                knot = int(rollout.roll(model, work, settings, motion, knot))
+                if knot == steps or reports[knot, 0] != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
+        if derivatives:
+            knot = refuse(reports, knot, A[:knot], B[:knot])
+        if knot < steps:
+            np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
+        return Rolled(knot, xs, reports, contacts, A, B)
+
+    def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
+        """What a rollout of so many knots fills in; without `cones`, there is nothing of contacts and limits in it."""
+        kept = knots if keep else 0
+        ncontact, nlimit = (self.sizes.ncontact, self.sizes.nlimit) if cones else (0, 0)
+        return Path(
+            np.zeros((knots + 1, self.nx)),
+            np.zeros((knots, self.nu)),
+            np.zeros((kept, ncontact, CONE)),
+            np.zeros((kept, nlimit, BOUND)),
+            np.zeros(REPORT + 1),
+        )
+
+    def closed_loop(
+        self,
+        x: Vector,
+        policy: Policy,
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
+        path = self._path(len(policy.us), keep=keep)
+        path.xs[0] = x
+        model, work, settings = self.linked(link_step), self._scratch.table(), self.settings.array(kappa)
+
+        def go_on(first: int) -> int:
+            return int(closed_loop(model, work, settings, policy, alpha, limits, substeps, path, first))
+
+        knot = follow(go_on, settings, path, substeps)
+        if knot < len(policy.us):
+            np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
+        return knot, path
+
+    def linearize(
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
+    ) -> tuple[Floats, ...]:
+        """(A, B, next states, report of every knot) of all knots; in parallel where that pays.
+
+        guess: (T, nx) next states to start from, the states themselves when left out.
+        """
+        n = len(us)
+        A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
+        x_next, reports = np.empty((n, self.nx)), np.zeros((n, REPORT))
+        if guess is not None:
+            x_next[:] = guess
+        else:
+            x_next[: len(xs) - 1] = xs[1 : n + 1]
+            if len(xs) == n:
+                x_next[-1:] = xs[-1:]
+        line = rollout.Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
+        model, settings = self.linked(link_step, link_gradient), self.settings.array(kappa)
+        if n * substeps * self.ndx < _WORTH_THREADS:
+            work, step = self._scratch.table(), 0
+            for _ in pieces(settings, n * substeps):
+                step = int(rollout.linearize(model, work, settings, (0, step, n), substeps, line))
+                if step == n * substeps:
+                    break
+        else:
+            works = self._scratch.chunks(n)
+            ends = np.arange(len(works) + 1) * n // len(works) * substeps
+            done = ends[:-1].copy()
+            for _ in pieces(settings, n * substeps):
+                rollout.linearize_knots(model, works, settings, substeps, line, done)
+                if np.array_equal(done, ends[1:]):
+                    break
+        if reports[:, 0].any() or refuse(reports, n, A, B) < n:
+            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
+            unsolved = reports[:, 0] != Status.SOLVED
+            for array in (A, B, x_next):
+                array[unsolved] = 0.0
+        return A, B, x_next, reports
+
+    def linearize_one(
+        self, x: Vector, u: Vector, kappa: float | None, wrenches: Cube | None = None
+    ) -> tuple[Floats, Floats, Vector, Vector]:
+        """(A, B, next state, report) of one step."""
+        A, B, x_next, reports = self.linearize(x[None], u[None], 1, kappa, None, wrenches)
+        return A[0], B[0], x_next[0], reports[0]
+
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+        """(states, status and number of solved steps of every rollout), in parallel."""
+        n, steps = us.shape[:2]
+        xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
+        xs[:, 0] = x0s
+        motions = rollout.Motions(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
+        model, works, settings = self.linked(link_step), self._scratch.chunks(n), self.settings.array()
+        status = reports[:, 0, 0]
+        try:
+            for _ in pieces(settings, n * steps):
+                rollout.roll_batch(model, works, settings, motions)
+                if np.all((knots == steps) | (status != Status.SOLVED)):
+                    break
+        except KeyboardInterrupt:
+            status[(knots < steps) & (status == Status.SOLVED)] = Status.INTERRUPTED
+            raise Interrupted((xs, status.astype(np.int64), knots)) from None
+        return xs, status.astype(np.int64), knots
+
+    def far(self) -> NDArray[np.bool_]:
+        """Which contacts were far in the last step of this thread, (ncontact,)."""
+        out = np.ones(self.sizes.ncontact, dtype=bool)
+        work = work_view(self._scratch.table())
+        out[work.active[: work.active_count[0]]] = False
+        return out
+
+    def last(self) -> Work:
+        """What the last step of this thread has left."""
+        return work_view(self._scratch.table())
+
+    def open_loops(self) -> list[float]:
+        """How far loops, then gears, were open in the last iterate of this thread [m, or sine of an angle]."""
+        ends = self.model.coupling_row[len(self.model.coupling_body) - self.sizes.nloop :]
+        ends = np.concatenate([ends, ends[-1] + 1 + np.arange(self.sizes.ngear)])
+        gap = np.abs(self.last().couple_gap)
+        return [float(gap[a:b].max()) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+    # -- single states ---------------------------------------------------------------------------------------------
+
+    def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
+        """(status, state) with the velocity v at the node q."""
+        x = np.concatenate([q, v])
+        status = start_velocity.start_at(self._model, self._scratch.table(), self.settings.time_step, v, x)
+        return int(status), x
+
+    def started(self, q: Vector, v: Vector) -> Vector:
+        """`start`; SimulationError when there is no such state."""
+        status, x = self.start(q, v)
+        if status != Status.SOLVED:
+            reason = Status(status)
+            raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
+        return x
+
+    def node_velocities(self, xs: Floats) -> Floats:
+        """Joint velocities at the node of every row, (n, nv)."""
+        out = np.zeros((len(xs), self.sizes.nv))
+        model, work, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            velocity.node_velocities(model, work, h, xs[part], out[part])
+        return out
+
+    def bodies(self, xs: Floats) -> Floats:
+        """Poses and velocities of the bodies at [q; joint velocities] of every row, (n, nbody, 13)."""
+        nbody = self.sizes.nbody
+        out = np.zeros((len(xs), nbody, 13))
+        for part in rows(len(xs)):
+            velocity.body_states(self._model, self._scratch.table(), xs[part], out[part].reshape(-1, 13))
+        return out
+
+    def integrate(self, xs: Floats, dxs: Floats) -> Floats:
+        """x (+) dx of every row."""
+        out = np.zeros_like(xs)
+        for part in rows(len(xs)):
+            state.integrate_states(self._model, xs[part], dxs[part], out[part])
+        return out
+
+    def difference(self, x0s: Floats, x1s: Floats) -> Floats:
+        """x1 (-) x0 of every row."""
+        out = np.zeros((len(x0s), self.ndx))
+        for part in rows(len(x0s)):
+            state.state_differences(self._model, x0s[part], x1s[part], out[part])
+        return out
+
+    def normalise(self, xs: Floats, tolerance: float) -> int:
+        """Normalise quaternions in place; see `normalise_quaternions`."""
+        for part in rows(len(xs)):
+            found = int(state.normalise_quaternions(self._model, xs[part], tolerance))
+            if found >= 0:
+                return part.start * self.sizes.nbody + found
+        return -1
+
+    def maximal(self, xs: Floats, nbody: int) -> Floats:
+        """z of every row, (n, nbody, 13)."""
+        out = np.zeros((len(xs), nbody, 13))
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            coordinates.maximal_states(self._model, work, h, xs[part], out[part].reshape(-1, 13))
+        return out
+
+    def minimal(self, zs: Floats) -> Floats:
+        """x of every z, (n, nbody, 13)."""
+        out = np.zeros((len(zs), self.nx))
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(zs)):
+            coordinates.minimal_states(self._model, work, h, zs[part].reshape(-1, 13), out[part])
+        return out
+
+    def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
+        """dz/dx."""
+        out = np.zeros((12 * nbody, self.ndx))
+        h = self.settings.time_step
+        coordinates_jacobian.maximal_jacobian_at(self._model, self._scratch.table(), h, x, out)
+        return out
+
+    def minimal_jacobian(self, z: Floats) -> Floats:
+        """dx/dz."""
+        out = np.zeros((self.ndx, 12 * len(z)))
+        h = self.settings.time_step
+        coordinates_jacobian.minimal_jacobian_at(self._model, self._scratch.table(), h, z, out)
+        return out
+
+    def energies(self, xs: Floats) -> Floats:
+        """(kinetic, potential) energy of every row."""
+        out = np.zeros((len(xs), 2))
+        model, work, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            energy.energies(model, work, h, xs[part], out[part])
+        return out
+
+    def momenta(self, xs: Floats) -> Floats:
+        """(linear, angular) momentum of every row."""
+        out = np.zeros((len(xs), 6))
+        work, h = self._scratch.table(), self.settings.time_step
+        for part in rows(len(xs)):
+            energy.momenta(self._model, work, h, xs[part], out[part])
+        return out
