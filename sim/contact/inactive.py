@@ -1,23 +1,25 @@
-"""Far contacts: their law is evaluated (inactive_impulses.py), not solved for. Which ones are far is decided here.
+"""The active set of contacts with the ground: which contacts the interior point solves for, and which it does not.
 
-On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. Far
-away that force hardly changes within a step, so it is a given impulse, like gravity: no variable of the interior point,
-no part of its matrix. Contacts of one body against one direction are a cluster, tested as one ball.
+On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
+large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity
+(inactive_impulses.py); it is no variable of the interior point and no part of its matrix. Contacts of one body against
+one direction are a cluster, tested as one ball.
 
-A cluster is far when its stiffness, in units of the inertia behind it, cannot be seen at the tolerance of the step:
+A cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the step:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
 
-for n contacts (all of the mechanism, so that the sum holds), a: half the gap that is ahead. With W the largest
-|J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds the velocity
-per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ within a
-cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with the body.
+for n contacts (all of the mechanism, so that the sum holds) at the activation gap a, half the gap that is ahead. With W
+the largest |J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds
+the velocity per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ
+within a cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with
+the body.
 
-The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
-solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
-iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`changes` of
-inactive_impulses.py bounds it, cluster by cluster, from the motion of the body since they were evaluated). A gap below
-a at the solution makes the cluster near, and the step is solved again.
+The gradient omits the stiffness, at most a part e of the inertia. The tolerance of the step leaves an error of the same
+size: a solution that is off by eps has derivatives that are off by up to sqrt(eps). The step omits no force: at every
+iterate the impulses are those of the law there, up to the tolerance in all (`changes` of inactive_impulses.py bounds
+it, cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution activates
+the cluster, and the step is solved again.
 
 Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/columns.py.
 """
@@ -70,7 +72,7 @@ def sunk_contact(model: Model) -> int:
 
 @kernel
 def choose_active(model: Model, work: Work, options: Options) -> None:
-    """Sort contacts into near and far ones, from configuration 2 and the motion that led there.
+    """Sort contacts into active and inactive ones, from configuration 2 and the motion that led there.
 
     Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
@@ -141,7 +143,7 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
 
 @kernel
 def has_activated(model: Model, work: Work) -> bool:
-    """Whether a far cluster is not, at configuration 3; it is near from now on."""
+    """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
     found = pairs_came_near(model, work)
     for m in range(work.inactive_count[0]):
         c = work.inactive_first[m]

@@ -1,4 +1,4 @@
-"""How far the impulses of a far cluster (inactive.py) may change until they are evaluated again."""
+"""How far the impulses of an inactive cluster (inactive.py) may change until they are evaluated again."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NEARER = 0.2  # part of its gap that a cluster may come nearer until its impulse
 
 @kernel
 def keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
-    """The motion of body i at which its far impulses are evaluated."""
+    """The motion of body i at which its inactive impulses are evaluated."""
     q = third_quaternion(work, i)
     row[Inactive.QUATERNION] = q[0]
     for k in range(3):
@@ -26,7 +26,7 @@ def keep_motion(work: Work, h: float, i: int, row: Vector) -> None:
 
 @kernel
 def bound_changes(model: Model, work: Work, c: int, gap: float) -> None:
-    """far[c, 1:3]: how much the wrench of a cluster can change beyond this gap, with the lever about O.
+    """BY_GAP and BY_SLIP of Inactive: how much the wrench of a cluster can change beyond this gap, lever about O.
 
     d gamma <= kappa/gap^2 d(gap),   d beta <= mu d gamma + mu^2 kappa/gap^2 d(slip)
     """

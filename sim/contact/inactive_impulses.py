@@ -1,4 +1,4 @@
-"""Impulses of far contacts (inactive.py): the law of the central path, evaluated anew when the motion has changed it.
+"""Impulses of inactive contacts (inactive.py): the law of the central path, evaluated again when motion has changed it.
 
 Most of what changes is the moment, for arms turn with the body. That is known exactly: of a cluster whose law still
 holds only the arms are turned, at a cost that does not depend on the number of its contacts.
@@ -21,7 +21,7 @@ from solvers.rotation import cross, put_three, rotate, three, transposed_times
 
 @kernel
 def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
-    """Bounds of the change of a far cluster's wrench since its law was evaluated: by that law, by turned arms."""
+    """Bounds of the change of an inactive cluster's wrench since its law was evaluated: by that law, by turned arms."""
     i = model.contact_body[c]
     row = work.inactive[c]
     if row[Inactive.LEAST_GAP] == 0.0:
@@ -49,7 +49,7 @@ def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
 
 @kernel
 def update_inactive(model: Model, work: Work, h: float) -> None:
-    """Impulses of the far clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
+    """Impulses of the inactive clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
     share = work.inactive_share[0]
     for m in range(work.inactive_count[0]):
         c = work.inactive_first[m]
@@ -74,7 +74,7 @@ def _cone_impulse(mu: float, kappa: float, gap: float, x: float, y: float) -> tu
 
 @kernel
 def turn_arms(model: Model, work: Work, c: int) -> None:
-    """far[c, 20:23], the moment of the impulses of the last evaluation, at configuration 3:
+    """Inactive.MOMENT, that of the impulses of the last evaluation, at configuration 3:
 
     (R sum gamma p) x n + (R sum beta p) x t - sum rho beta n x t
     """
@@ -93,7 +93,7 @@ def turn_arms(model: Model, work: Work, c: int) -> None:
 
 @kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
-    """far[c, 4:37] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
+    """The row of `inactive` and the cone variables of a cluster at configuration 3: affine in p and the radius rho,
 
     gap    n.x3 - height + (R^T n).p - rho              slip    t.v + (R^T (t x omega)).p - rho (t x omega).n
     """
@@ -152,7 +152,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
 
 @kernel
 def add_inactive_wrenches(model: Model, work: Work) -> None:
-    """wrench -= impulses of the far clusters, about O."""
+    """wrench -= impulses of the inactive clusters, about O."""
     for m in range(work.inactive_count[0]):
         c = work.inactive_first[m]
         i = model.contact_body[c]

@@ -1,4 +1,4 @@
-"""The impulse of a far contact on terrain, and how much it may change: inactive_impulses.py where frames turn."""
+"""The impulse of an inactive contact on terrain, and how much it may change: inactive_impulses.py where frames turn."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solvers.rotation import cross, put_three, three
 
 @optional(Slot.EVALUATE_ON_TERRAIN)
 def evaluate_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
-    """far[c, 1:4], far[c, 4:24] and the cone variables of a far contact at configuration 3.
+    """The row of `inactive` and the cone variables of an inactive contact at configuration 3.
 
     Within 0.2 of the lower bound b of its distance: gaps above 0.8 b, |m| <= 1 + 1.2 (1 + slope^2) b H, and frame
     and slip change with the second derivatives H of the ground.

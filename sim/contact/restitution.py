@@ -52,7 +52,7 @@ _NEVER = 1e9  # [m]
 
 @kernel
 def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
-    """Gaps of the near contacts at an earlier configuration, and their rows; configuration 3 is used up."""
+    """Gaps of the active contacts at an earlier configuration, and their rows; configuration 3 is used up."""
     first = configuration == 1
     pos = work.pos1 if first else work.pos2
     rot = work.rot1 if first else work.rot2
@@ -115,7 +115,7 @@ def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
 
 @optional(Slot.FIND_IMPACTS)
 def find_impacts(model: Model, work: Work, h: float) -> None:
-    """Which near contacts are impacts in this step, and their floors."""
+    """Which active contacts are impacts in this step, and their floors."""
     for c in range(work.bounce.shape[0]):
         work.bounce[c, Bounce.FLOOR] = 0.0
         work.bounce[c, Bounce.RESTITUTION] = 0.0

@@ -86,6 +86,13 @@ class Inactive(IntEnum):
     TURNED = 36  # 1 where only the arms have been turned since the impulses were evaluated
 
 
+class Apart(IntEnum):
+    """inactive, in motions of higher order: the node in `work` (integrators/phases.py)."""
+
+    GAP = 0
+    SPEED = 1
+
+
 class Cluster(IntEnum):
     """cluster: contacts of one body against one direction, as one ball (mechanism/pack_clusters.py)."""
 

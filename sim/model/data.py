@@ -23,6 +23,7 @@ class Work(NamedTuple):
     bound_step: Matrix  # (nlimit, 2) and of limits
     couple_force: Vector  # (nrow,) impulses of loops
     couple_rank: Vector  # (4,) of the dense system of loops, gears and pairs: CoupleRank
+    # scratch
     origin: Vector  # (3,) the reference point O
     # configurations 1, 2 and 3, and the motion between them
     theta1: Vector  # (nq,) coordinates at 1
@@ -83,7 +84,7 @@ class Work(NamedTuple):
     bifurcation_count: Integers  # (1,) rows of bifurcation_direction in use
     bifurcation_replaces: Integers  # (1,) 1 where they stand in place of constraints, too
     loop_used: Integers  # (nrow,) scratch
-    coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
+    coupling_live: Integers  # (ncoupling,) 1 for two bodies with active pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted

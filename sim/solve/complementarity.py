@@ -1,4 +1,4 @@
-"""Complementarity of all near contacts, and all limits, at once: products, their violation, the way to the boundary."""
+"""Complementarity of all active contacts and all limits: products, their violation, the step to the boundary."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""All near contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
+"""All active contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
 
-Their complementarity products are in complementarity.py. Far contacts (inactive.py) have no part in its variables
+Their complementarity products are in complementarity.py. Inactive contacts (inactive.py) have no part in its variables
 and its matrix.
 """
 
@@ -58,7 +58,7 @@ _LIMIT_INERTIA = 0.01  # [kg m^2] stands for the inertia behind a joint limit wh
 
 @kernel
 def inequality_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gaps and slips of near contacts, impulses of far ones, gaps of limits, at configuration 3."""
+    """Gaps and slips of active contacts, impulses of inactive ones, gaps of limits, at configuration 3."""
     for m in range(work.active_ground_count[0]):
         contact_kinematics(model, work, h, work.active[m])
     update_inactive(model, work, h)
@@ -119,7 +119,7 @@ def return_inequalities(model: Model, work: Work, h: float, kappa: float) -> Non
 
 @kernel
 def total_impulse(model: Model, work: Work) -> float:
-    """Sum of the normal impulses of near contacts and limits: of what they balance, an estimate."""
+    """Sum of the normal impulses of active contacts and limits: of what they balance, an estimate."""
     total = 0.0
     for m in range(work.active_count[0]):
         c = work.active[m]

@@ -1,22 +1,21 @@
-"""Which elements of two shapes are in contact: faces, edges, corners. A discrete choice, made once per attempt.
+"""The active features of two shapes: the faces, edges and corners in contact. A discrete choice, made once per attempt.
 
-A step finds the pose at its end; the elements that touch there are not known before. Were they chosen anew at every
-iterate, gaps and normals would jump from one to the next, and at a corner that slides over an edge there may be no
-solution at all. So they are chosen where an attempt starts, and kept: the equations are smooth. A solution at which
-the shapes overlap in other elements is none; these are chosen then, and the step is solved again.
+A step finds the pose at its end; the features that touch there are not known before. If they were chosen anew at every
+iterate, gaps and normals would jump, and at a corner that slides over an edge there may be no solution at all. So they
+are chosen where an attempt starts, and kept: the equations are smooth. A solution at which the shapes overlap in other
+features is refused; these become active, and the step is solved again.
 
-Where a solution with some elements overlaps in others, and one with these in the first ones, both are taken.
+Where a solution with some features overlaps in others, and the one with these overlaps in the first, both are taken.
 
-Only elements that did not overlap when the step began are chosen: a contact pushes along the normal that it has at the
-end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
-energy. That is so where they overlapped along the normal that they had then, and along the one that they have in the
-end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds energy.) Where a point
-of a collision with a cylinder is lost so, and has nothing instead, all elements of the collision are those of the
-beginning.
+Only features that did not overlap when the step began are chosen: a contact pushes along its normal at the end of the
+step, and where its two features, extended to lines and planes, had to move apart to get there, it adds energy. That is
+so where they overlapped along the normal at the beginning, and along the one at the end. (Shapes that overlap at the
+beginning have no others; they are pushed out, and that adds energy.) Where a point of a collision with a cylinder is
+lost in this way, and has no other feature, all features of the collision are those of the beginning.
 
-Shapes may slide from one element to another within a step. The one that they came to was below the other then, is left
-out, and overlaps in the end. Where several attempts end so (`overlap_allowed`), normals may have turned on the way
-(`left_behind`), and a small overlap is left to the next step.
+Shapes may slide from one feature to another within a step. The feature that they reach was below the other at the
+beginning, is not chosen, and overlaps in the end. Where several attempts end so (`overlap_allowed`), normals may have
+turned on the way (`left_behind`), and a small overlap is left to the next step.
 """
 
 from __future__ import annotations
@@ -116,7 +115,7 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
 
 @optional(Slot.CHOOSE_PAIRS)
 def choose_pairs(model: Model, work: Work) -> None:
-    """`choose_shapes` of the near collisions, at configuration 3."""
+    """`choose_shapes` of the active collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
             place_shapes(model, work, j, work.pos3, work.rot3)

@@ -1,17 +1,17 @@
-"""Far collisions: their law is evaluated, not solved for; they are no part of the matrix of a step.
+"""The active set of collisions: the law of an inactive one is evaluated, not solved for; it is no part of the matrix.
 
 As for contacts with the ground (contact/inactive.py): on the central path a contact is an explicit force law, gamma =
-kappa/gap and friction with it. Far away it changes little while a step is solved, so it is a given impulse. It is
-evaluated anew wherever the motion of the bodies may have changed it by more than the tolerance of the step; nothing is
-left out.
+kappa/gap and friction with it. At a large gap it changes little while a step is solved, so it is a given impulse. It is
+evaluated again wherever the motion of the bodies may have changed it by more than the tolerance of the step. No force
+is omitted.
 
-A collision is far when its stiffness, in units of the inertia behind it, does not slow Newton's method down:
+A collision is inactive when its stiffness, relative to the inertia behind it, does not slow Newton's method down:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) d <= 1e-2
 
-for its n points, a: half the gap ahead; M and T as in inactive.py, of both bodies; d: the collisions that one of
-its bodies has, so that the sum over them holds. A gap below a at the solution makes the collision near, and the step is
-solved again. Derivatives take all collisions as near ones (`all_near`): they are exact.
+for its n points at the activation gap a, half the gap ahead; M and T as in inactive.py, of both bodies; d: the
+collisions that one of its bodies has, so that the sum over them holds. A gap below a at the solution activates the
+collision, and the step is solved again. Derivatives take all collisions as active (`all_near`): they are exact.
 
 Columns of model.pair_far: PairBound of sim/model/columns.py.
 """
@@ -33,7 +33,7 @@ from sim.model.slots import Slot
 from solvers.jit import kernel
 from solvers.optional import optional
 
-COUPLED = 1e-2  # largest sum of e over the far collisions of a body
+COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
 @optional(Slot.ENLIST_PAIRS)
@@ -56,7 +56,7 @@ def enlist_pairs(model: Model, work: Work) -> None:
 
 @optional(Slot.BEGIN_PAIRS)
 def begin_pairs(model: Model, work: Work, options: Options) -> None:
-    """Which collisions are near, and what the shapes of these are at configuration 2, where the step begins."""
+    """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] > 0:
@@ -94,7 +94,7 @@ def _travel(model: Model, work: Work, j: int) -> float:
 
 @kernel
 def _far_enough(model: Model, options: Options, j: int, a: float) -> float:
-    """a where a collision with this half gap is far, 0 where it is near."""
+    """a where a collision with this half gap is inactive, 0 where it is active."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     h = options.h
@@ -106,7 +106,7 @@ def _far_enough(model: Model, options: Options, j: int, a: float) -> float:
 
 @kernel
 def _change(model: Model, work: Work, options: Options, j: int, a: float) -> float:
-    """Bound of the change of the wrench of a far collision per displacement d of its bodies; slips change by 2 d/h."""
+    """Bound of the change of an inactive collision's wrench per displacement d of its bodies; slips change by 2 d/h."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     lever = 1.0
@@ -122,7 +122,7 @@ def _change(model: Model, work: Work, options: Options, j: int, a: float) -> flo
 
 @optional(Slot.FAR_PAIR_IMPULSES)
 def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
-    """Wrenches of the far collisions at configuration 3, evaluated again where they may have changed."""
+    """Wrenches of the inactive collisions at configuration 3, evaluated again where they may have changed."""
     if work.pair_change[0] == 0.0 or not _moved(model, work):
         return
     work.pair_evaluated[0] = 1.0
@@ -150,7 +150,7 @@ def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
 
 @kernel
 def _evaluate(model: Model, work: Work, h: float, j: int, kappa: float, a: float) -> None:
-    """Cone variables of one point of a far collision on the central path, and its wrench."""
+    """Cone variables of one point of an inactive collision on the central path, and its wrench."""
     c = model.contact_height.shape[0] + j
     point_kinematics(model, work, h, j)
     start_contact(model, work, c, kappa, a)
@@ -161,7 +161,7 @@ def _evaluate(model: Model, work: Work, h: float, j: int, kappa: float, a: float
 
 @kernel
 def _moved(model: Model, work: Work) -> bool:
-    """Whether some body has moved so far that the far wrenches may have changed by more than the tolerance."""
+    """Whether some body has moved so far that the inactive wrenches may have changed by more than the tolerance."""
     if work.pair_evaluated[0] == 0.0:
         return True
     for i in range(work.inactive_pose.shape[0]):
@@ -182,7 +182,7 @@ def _moved(model: Model, work: Work) -> bool:
 
 @kernel
 def add_inactive_pairs(work: Work) -> None:
-    """wrench += those of the far collisions."""
+    """wrench += those of the inactive collisions."""
     if work.pair_change[0] == 0.0:
         return
     for i in range(work.wrench.shape[0]):
@@ -192,7 +192,7 @@ def add_inactive_pairs(work: Work) -> None:
 
 @optional(Slot.PAIRS_CAME_NEAR, default=False)
 def pairs_came_near(model: Model, work: Work) -> bool:
-    """Whether a far collision is not, at configuration 3; it is near from now on."""
+    """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
     j = 0
     while j < model.pair_kind.shape[0]:
@@ -212,7 +212,7 @@ def pairs_came_near(model: Model, work: Work) -> bool:
 
 @optional(Slot.ALL_NEAR)
 def all_near(model: Model, work: Work) -> None:
-    """All collisions taken as near ones, for the derivatives of a step that has been solved."""
+    """All collisions taken as active, for the derivatives of a step that has been solved."""
     for j in range(model.pair_kind.shape[0]):
         work.pair_activation[j] = 0.0
     enlist_pairs(model, work)

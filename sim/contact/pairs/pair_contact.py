@@ -91,7 +91,7 @@ def is_absent(work: Work, j: int) -> bool:
 
 @optional(Slot.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
+    """Gap, slip, frame and point of the pairs of active collisions at configuration 3."""
     ground = model.contact_height.shape[0]
     for m in range(work.active_ground_count[0], work.active_count[0]):
         j = work.active[m] - ground

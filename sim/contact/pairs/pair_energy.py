@@ -2,7 +2,7 @@
 
 An impulse acts along the normal at the end of a step. Where shapes that were apart have passed through one another, or
 an element was chosen that is none there, that normal points where the bodies came from, and the step gives them energy
-that they never had. So no solution is accepted whose impulses do both, over all near collisions j, P: where they act,
+that they never had. So no solution is accepted whose impulses do both, over all active collisions j, P: where they act,
 
     sum f.(u + u')/2 > allowed,    sum f.u' > allowed,    u, u' the relative velocities at P before and after
 

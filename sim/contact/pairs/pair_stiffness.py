@@ -80,7 +80,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 @optional(Slot.CONDENSE_PAIRS)
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
-    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
+    """coupling_K of the active pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
         if work.coupling_live[k] == 1:
@@ -112,7 +112,7 @@ def apply_pairs(model: Model, work: Work) -> float:
 
 @optional(Slot.PAIR_CONSTANTS)
 def pair_constants(model: Model, work: Work, target: NewtonTarget) -> None:
-    """wrench -= constant parts of the impulses of the near pairs, for the target of this Newton step."""
+    """wrench -= constant parts of the impulses of the active pairs, for the target of this Newton step."""
     ground = model.contact_height.shape[0]
     for m in range(work.active_ground_count[0], work.active_count[0]):
         c = work.active[m]

@@ -113,7 +113,7 @@ def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector
 
 @kernel
 def remember(model: Model, work: Work, first: int) -> None:
-    """pair_kept: the elements of the points of a collision that press; 0 for the others."""
+    """pair_previous: the features of the points of a collision that press; 0 for the others."""
     close = NEAR * least_size(model, first)
     ground = model.contact_height.shape[0]
     for j in range(first, last_point(model, first)):
@@ -123,7 +123,7 @@ def remember(model: Model, work: Work, first: int) -> None:
 
 @kernel
 def keep(model: Model, work: Work, first: int) -> None:
-    """Elements of pair_kept that were not chosen again take the places of points that there are not now."""
+    """Features of pair_previous that were not chosen again take the places of points that there are not now."""
     end = last_point(model, first)
     begin = first + room(model.pair_kind[first], model.pair_sizes[first], model.hull)
     free = begin
