@@ -88,25 +88,25 @@ class Work(NamedTuple):
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
     feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
     overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
-    inactive: Matrix  # (nground, 37) see contact/inactive.py
+    inactive: Matrix  # (nground, 37) Inactive, see contact/inactive.py
     inactive_share: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
-    cone: Matrix  # (ncontact, 12) cone variables, see contact/ground_contact.py
+    cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid
     cone_trial: Matrix  # (ncontact, 12)
-    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
+    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian: Kin
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 22) see contacts/restitution.py
+    bounce: Matrix  # (ncontact, 22) Bounce, see contact/restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
-    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contacts/softening.py
+    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contact/softening.py
     contact_w: Matrix  # (ncontact, 3) constant part of the same
-    contact_scale: Matrix  # (ncontact, 16) scaling of the cone
+    contact_scale: Matrix  # (ncontact, 16) ConeScale or PyramidScale
     # pairs
     shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
-    pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_out: Matrix  # (npair, 43) what `collide` finds: Witness
     pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
     pair_activation: Vector  # (npair,) at its first pair: half the gap ahead of an inactive collision, or 0
     pair_travel: Vector  # (1,) displacement of a body after which inactive collisions are evaluated again [m]
@@ -150,7 +150,7 @@ class Work(NamedTuple):
     loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
-    bound: Matrix  # (nlimit, 2) slack, impulse
+    bound: Matrix  # (nlimit, 2) Bound
     bound_trial: Matrix  # (nlimit, 2)
     bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)
