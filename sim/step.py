@@ -17,12 +17,6 @@ from solvers.compiler import inlined, optional
 from solvers.status import Status
 from solvers.types import Vector
 
-_SOLVED = int(Status.SOLVED)
-_NOT_FINITE = int(Status.NOT_FINITE)
-_ANGULAR_STEP = int(Status.ANGULAR_STEP)
-_LOOP_STEP = int(Status.LOOP_STEP)
-_ENERGY_STEP = int(Status.ENERGY_STEP)
-
 
 @optional(Slot.STEP, default=int(Status.NOT_FINITE))
 def step(
@@ -37,7 +31,7 @@ def step(
     nq = work.theta1.shape[0]
     q = x[:nq]
     v = x[nq:]
-    r = Outcome(_ANGULAR_STEP, 0, 1e300, 0.0)
+    r = Outcome(Status.ANGULAR_STEP.value, 0, 1e300, 0.0)
     if begin_step(model, work, options.h, q, v, u):
         start_loops(model, work, guess.impulses)
         if model.loop_ntrans.shape[0] > 0:
@@ -51,9 +45,9 @@ def step(
     report[2] = r.residual
     report[3] = r.violation
     report[4] = -1.0
-    if status != _SOLVED and r.iterations > 0:
+    if status != Status.SOLVED and r.iterations > 0:
         report[4] = worst_contact(model, work, options.kappa)
-    work.counts[3] = work.counts[3] + 1 if status == _SOLVED else 0
+    work.carried_steps[0] = work.carried_steps[0] + 1 if status == Status.SOLVED else 0
     return status
 
 
@@ -63,11 +57,11 @@ def _checked(model: Model, work: Work, options: Options, inputs: tuple[Vector, V
 
     inputs: (q, v, u). The interior point asks for the latter of every solution it finds.
     """
-    if r.status == _SOLVED and loops_gained(model, work, options, inputs[1]):
-        return Outcome(_LOOP_STEP, r.iterations, r.residual, r.violation)
+    if r.status == Status.SOLVED and loops_gained(model, work, options, inputs[1]):
+        return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)
     smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
-    if r.status == _SOLVED and smooth and step_gained(model, work, options, inputs):
-        return Outcome(_ENERGY_STEP, r.iterations, r.residual, r.violation)
+    if r.status == Status.SOLVED and smooth and step_gained(model, work, options, inputs):
+        return Outcome(Status.ENERGY_STEP.value, r.iterations, r.residual, r.violation)
     return r
 
 
@@ -82,4 +76,4 @@ def _write(work: Work, r: Outcome, out: Vector) -> int:
     for k in range(work.nu.shape[0]):
         out[nq + k] = work.nu[k]
         total += out[nq + k]
-    return r.status if abs(total) < 1e300 else _NOT_FINITE
+    return r.status if abs(total) < 1e300 else Status.NOT_FINITE.value

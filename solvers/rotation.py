@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 
 from solvers.compiler import kernel
-from solvers.types import Matrix, Vector
+from solvers.dense import Matrix, Vector
 
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -21,6 +21,18 @@ _SERIES = 1e-2  # below this squared angle the Taylor series is exact to roundin
 def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> Vec3:
     """a x b"""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+
+
+@kernel
+def three(a: Vector, k: int) -> Vec3:
+    """Entries k, k + 1 and k + 2 of a row."""
+    return a[k], a[k + 1], a[k + 2]
+
+
+@kernel
+def put_three(v: Vec3, k: int, out: Vector) -> None:
+    """Entries k, k + 1 and k + 2 of a row = v."""
+    out[k], out[k + 1], out[k + 2] = v
 
 
 @kernel

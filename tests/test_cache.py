@@ -302,13 +302,8 @@ print(json.dumps(compiled_signatures()))
 """
     kernels = json.loads(python(program))
     assert any(name.startswith("sim.") for name in kernels)
-    hard = "complementarity interior_point inequalities central_path direction step_length merit".split()
-    foreign = (
-        "solvers.cones",
-        "sim.contact",
-        "sim.dynamics.momentum_balance.joints.limits",
-        *(f"sim.solve.{name}" for name in hard),
-    )
+    hard = "complementarity interior_point inequalities globalization direction step_length merit".split()
+    foreign = ("solvers.cones", "sim.contact", "sim.dynamics.joints.limits", *(f"sim.solve.{name}" for name in hard))
     assert [name for name in kernels if name.startswith(foreign)] == []
 
 
@@ -340,8 +335,8 @@ for mech in scenes:
 
 FEATURES = (  # of few scenes: rooms and files with kernels of their own
     "sim.contact.collision.", "sim.contact.pairs.", "sim.contact.pyramid", "sim.contact.restitution",
-    "sim.contact.terrain_contact", "sim.contact.height_field", "sim.dynamics.momentum_balance.joints.cone_limit",
-    "sim.dynamics.momentum_balance.joints.swing", "sim.dynamics.momentum_balance.loops.", "sim.simulator.derivatives.parameters.", "sim.integrators.hamilton",
+    "sim.contact.terrain_contact", "sim.contact.height_field", "sim.dynamics.joints.cone_limit",
+    "sim.dynamics.joints.swing", "sim.dynamics.loops.", "sim.derivatives.parameters.", "sim.integrators.hamilton",
     "sim.integrators.runge_kutta",
 )  # fmt: skip
 

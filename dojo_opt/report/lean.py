@@ -186,7 +186,7 @@ def _by_module(kernels: list[str]) -> str:
 
 CONTACT_KERNELS = tuple(
     f"sim.{name}." for name in ("contact", "dynamics.joints.limits", "solve.interior_point", "solve.inequalities")
-) + ("sim.solve.central_path.", "solvers.cones.")
+) + ("sim.solve.globalization.", "solvers.cones.")
 
 
 def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:

@@ -3,8 +3,7 @@
     mu gamma v_t + psi beta = 0,      psi = a + sqrt(a^2 + |v_t|^2),   a = kappa / (2 mu gamma)
 
 is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma follows from it, so the
-cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method, in columns 2:4 of
-`cone`. Columns of contact_scale: 0:2 d(beta)/d(mu gamma), 2:4 residual of the law as a change of -beta.
+cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method.
 
 With b = mu gamma the same path is also
 
@@ -18,6 +17,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.model.columns import Cone, ConeScale, Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -39,10 +39,10 @@ def start_cone(model: Model, work: Work, c: int, kappa: float) -> None:
     """beta on the central path of kappa at the present slip and normal impulse."""
     z = work.cone[c]
     k = work.contact_kin[c]
-    b0 = model.contact_friction[c] * z[1]
-    psi, _ = cone_slip(b0, k[1], k[2], kappa)
-    z[2] = -b0 * k[1] / psi
-    z[3] = -b0 * k[2] / psi
+    b0 = model.contact_friction[c] * z[Cone.IMPULSE]
+    psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
+    z[Cone.FRICTION1] = -b0 * k[Kin.SLIP1] / psi
+    z[Cone.FRICTION2] = -b0 * k[Kin.SLIP2] / psi
 
 
 @kernel
@@ -50,9 +50,9 @@ def cone_violation(model: Model, work: Work, c: int, kappa: float) -> float:
     """|mu gamma v_t + psi beta|, in units of kappa."""
     z = work.cone[c]
     k = work.contact_kin[c]
-    b0 = model.contact_friction[c] * z[1]
-    psi, _ = cone_slip(b0, k[1], k[2], kappa)
-    return max(abs(b0 * k[1] + psi * z[2]), abs(b0 * k[2] + psi * z[3]))
+    b0 = model.contact_friction[c] * z[Cone.IMPULSE]
+    psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
+    return max(abs(b0 * k[Kin.SLIP1] + psi * z[Cone.FRICTION1]), abs(b0 * k[Kin.SLIP2] + psi * z[Cone.FRICTION2]))
 
 
 @kernel
@@ -76,32 +76,32 @@ def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, 
     W = work.contact_W[c]
     q = work.contact_scale[c]
     mu = model.contact_friction[c]
-    b0 = mu * z[1]
-    room = b0 * b0 - z[2] * z[2] - z[3] * z[3]
+    b0 = mu * z[Cone.IMPULSE]
+    room = b0 * b0 - z[Cone.FRICTION1] * z[Cone.FRICTION1] - z[Cone.FRICTION2] * z[Cone.FRICTION2]
     if linear and room > _INSIDE * b0 * b0:
         condense_sticking(z, k, b0, kappa, share, W, q)
     else:
         condense_sliding(z, k, b0, kappa, share, W, q)
-    W[3] = mu * W[0] * q[0]
-    W[6] = mu * W[0] * q[1]
+    W[3] = mu * W[0] * q[ConeScale.GROWTH]
+    W[6] = mu * W[0] * q[ConeScale.GROWTH + 1]
 
 
 @kernel
 def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """psi dbeta = -(b I + beta v_t^T/r) dv_t - share (v_t + beta dpsi/db) db - residual,   r = psi - a"""
-    psi, r = cone_slip(b0, k[1], k[2], kappa)
+    psi, r = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     a = psi - r
-    b1, b2 = within_cone(b0, z[2], z[3])
+    b1, b2 = within_cone(b0, z[Cone.FRICTION1], z[Cone.FRICTION2])
     i = 1.0 / psi
-    W[4] = -i * (b0 + b1 * k[1] / r)
-    W[5] = -i * b1 * k[2] / r
-    W[7] = -i * b2 * k[1] / r
-    W[8] = -i * (b0 + b2 * k[2] / r)
+    W[4] = -i * (b0 + b1 * k[Kin.SLIP1] / r)
+    W[5] = -i * b1 * k[Kin.SLIP2] / r
+    W[7] = -i * b2 * k[Kin.SLIP1] / r
+    W[8] = -i * (b0 + b2 * k[Kin.SLIP2] / r)
     g = -(a / b0) * (1.0 + a / r)  # dpsi/db
-    q[0] = -i * share * (k[1] + b1 * g)
-    q[1] = -i * share * (k[2] + b2 * g)
-    q[2] = i * (b0 * k[1] + psi * z[2])
-    q[3] = i * (b0 * k[2] + psi * z[3])
+    q[ConeScale.GROWTH] = -i * share * (k[Kin.SLIP1] + b1 * g)
+    q[ConeScale.GROWTH + 1] = -i * share * (k[Kin.SLIP2] + b2 * g)
+    q[ConeScale.RESIDUAL] = i * (b0 * k[Kin.SLIP1] + psi * z[Cone.FRICTION1])
+    q[ConeScale.RESIDUAL + 1] = i * (b0 * k[Kin.SLIP2] + psi * z[Cone.FRICTION2])
 
 
 @kernel
@@ -111,7 +111,7 @@ def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: floa
     by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where that is near what the
     law says, against beta and at most twice as fast, and otherwise what it says, -kappa beta/c: the matrix is definite.
     """
-    x, y, b1, b2 = k[1], k[2], z[2], z[3]
+    x, y, b1, b2 = k[Kin.SLIP1], k[Kin.SLIP2], z[Cone.FRICTION1], z[Cone.FRICTION2]
     n = b1 * b1 + b2 * b2
     c = b0 * b0 - n
     r1, r2 = c * x + kappa * b1, c * y + kappa * b2
@@ -125,11 +125,11 @@ def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: floa
     W[5] = g * e * s1 * b2
     W[7] = g * e * s2 * b1
     W[8] = g * (1.0 + e * s2 * b2)
-    q[0] = -share * b0 * e * s1
-    q[1] = -share * b0 * e * s2
+    q[ConeScale.GROWTH] = -share * b0 * e * s1
+    q[ConeScale.GROWTH + 1] = -share * b0 * e * s2
     d = e * (b1 * r1 + b2 * r2)
-    q[2] = (r1 + s1 * d) / kappa
-    q[3] = (r2 + s2 * d) / kappa
+    q[ConeScale.RESIDUAL] = (r1 + s1 * d) / kappa
+    q[ConeScale.RESIDUAL + 1] = (r2 + s2 * d) / kappa
 
 
 @kernel
@@ -138,8 +138,8 @@ def cone_constant(model: Model, work: Work, c: int) -> None:
     w = work.contact_w[c]
     q = work.contact_scale[c]
     b = model.contact_friction[c] * w[0]
-    w[1] = b * q[0] - q[2]
-    w[2] = b * q[1] - q[3]
+    w[1] = b * q[ConeScale.GROWTH] - q[ConeScale.RESIDUAL]
+    w[2] = b * q[ConeScale.GROWTH + 1] - q[ConeScale.RESIDUAL + 1]
 
 
 @kernel
@@ -148,5 +148,5 @@ def recover_cone(work: Work, c: int, a: float, x: float, y: float) -> None:
     d = work.cone_step[c]
     W = work.contact_W[c]
     w = work.contact_w[c]
-    d[2] = W[3] * a + W[4] * x + W[5] * y + w[1]
-    d[3] = W[6] * a + W[7] * x + W[8] * y + w[2]
+    d[Cone.FRICTION1] = W[3] * a + W[4] * x + W[5] * y + w[1]
+    d[Cone.FRICTION2] = W[6] * a + W[7] * x + W[8] * y + w[2]

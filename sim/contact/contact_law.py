@@ -1,8 +1,8 @@
 """The contact laws on the central path: residuals, condensation to W d(gap, slip) + w, recovery of the cone steps.
 
-Columns of `cone` (and of its steps): 0 s, 1 gamma, the gap slack and the normal impulse, s gamma = kappa; from 2 on
-those of the friction law (cone.py, pyramid.py). A contact without friction has the first line only: the cone would be
-degenerate, and costs nothing when left out.
+Columns of `cone` (and of its steps): Cone or Pyramid; the slack s of the gap and the normal impulse gamma, s gamma =
+kappa, then those of the friction law (cone.py, pyramid.py). A contact without friction has the first
+two only: its cone would be degenerate, and costs nothing when omitted.
 """
 
 from __future__ import annotations
@@ -20,31 +20,28 @@ from sim.contact.pyramid import (
     start_pyramid,
 )
 from sim.contact.softening import soften
+from sim.model.columns import Bounce, Cone, Kin
 from sim.model.data import Work
 from sim.model.model import Law, Model
-from sim.model.options import LINEAR, SOFT, Goal
+from sim.model.options import LawForm, NewtonTarget
 from solvers.compiler import kernel
 from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
-_IMPACT = int(Law.IMPACT)
-_LINEAR = int(Law.LINEAR)
-_NONLINEAR = int(Law.NONLINEAR)
-
 
 @kernel
 def law_of(model: Model, c: int) -> int:
     """Law of contact c: without friction it is an impact law."""
-    return model.contact_law[c] if model.contact_friction[c] > 0.0 else _IMPACT
+    return model.contact_law[c] if model.contact_friction[c] > 0.0 else Law.IMPACT.value
 
 
 @kernel
 def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) -> None:
     """Variables of contact c on the central path of kappa at its gap (at least `floor`) and slip: gamma = kappa / s."""
     z = work.cone[c]
-    z[0] = max(work.contact_kin[c, 0], floor)
-    z[1] = kappa / z[0]
+    z[Cone.SLACK] = max(work.contact_kin[c, Kin.GAP], floor)
+    z[Cone.IMPULSE] = kappa / z[Cone.SLACK]
     _start_friction(model, work, c, kappa)
 
 
@@ -56,11 +53,11 @@ def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float, pre
     """
     z = work.cone[c]
     weight = h * _response(model, c)
-    impulse = z[1] if predicted else work.cone_trial[c, 1]
+    impulse = z[Cone.IMPULSE] if predicted else work.cone_trial[c, Cone.IMPULSE]
     if predicted and weight * impulse * impulse > kappa:
-        z[0] = kappa / impulse
+        z[Cone.SLACK] = kappa / impulse
     else:
-        z[0], z[1] = onto_path(work.contact_kin[c, 0], impulse, weight, kappa)
+        z[Cone.SLACK], z[Cone.IMPULSE] = onto_path(work.contact_kin[c, Kin.GAP], impulse, weight, kappa)
         _start_friction(model, work, c, kappa)
 
 
@@ -68,9 +65,9 @@ def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float, pre
 def _start_friction(model: Model, work: Work, c: int, kappa: float) -> None:
     """Friction of contact c on the central path of kappa at its slip."""
     law = law_of(model, c)
-    if law == _NONLINEAR:
+    if law == Law.NONLINEAR:
         start_cone(model, work, c, kappa)
-    elif law == _LINEAR:
+    elif law == Law.LINEAR:
         start_pyramid(model, work, c, kappa)
 
 
@@ -86,8 +83,8 @@ def _response(model: Model, c: int) -> float:
 @kernel
 def contact_error(model: Model, work: Work, c: int) -> float:
     """Largest equality residual of contact c: |gap - s|, and those of the pyramid."""
-    r = abs(work.contact_kin[c, 0] - work.cone[c, 0])
-    if law_of(model, c) == _LINEAR:
+    r = abs(work.contact_kin[c, Kin.GAP] - work.cone[c, Cone.SLACK])
+    if law_of(model, c) == Law.LINEAR:
         r = max(r, pyramid_error(model, work, c))
     return r
 
@@ -97,18 +94,22 @@ def contact_impulse(model: Model, work: Work, c: int) -> tuple[float, float, flo
     """Impulse (normal, t1, t2) of the present cone variables."""
     z = work.cone[c]
     law = law_of(model, c)
-    if law == _NONLINEAR:
-        return z[1], z[2], z[3]
-    if law == _LINEAR:
-        return z[1], z[4] - z[5], z[6] - z[7]
-    return z[1], 0.0, 0.0
+    if law == Law.NONLINEAR:
+        return z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
+    if law == Law.LINEAR:
+        return (
+            z[Cone.IMPULSE],
+            z[Cone.FRICTION2 + 1] - z[Cone.FRICTION2 + 2],
+            z[Cone.FRICTION2 + 3] - z[Cone.FRICTION2 + 4],
+        )
+    return z[Cone.IMPULSE], 0.0, 0.0
 
 
 @kernel
 def contact_products(model: Model, work: Work, c: int) -> tuple[float, float, float, float]:
     """(sum, count, low, high) of the complementarity products of contact c; all equal kappa on the central path."""
-    p = work.cone[c, 0] * work.cone[c, 1]
-    if law_of(model, c) == _LINEAR:
+    p = work.cone[c, Cone.SLACK] * work.cone[c, Cone.IMPULSE]
+    if law_of(model, c) == Law.LINEAR:
         total, lo, hi = pyramid_products(model, work, c)
         return p + total, 6.0, min(p, lo), max(p, hi)
     return p, 1.0, p, p
@@ -117,21 +118,21 @@ def contact_products(model: Model, work: Work, c: int) -> tuple[float, float, fl
 @kernel
 def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
     """Violation of the law of the exact cone, in units of kappa; 0 for the others."""
-    return cone_violation(model, work, c, kappa) if law_of(model, c) == _NONLINEAR else 0.0
+    return cone_violation(model, work, c, kappa) if law_of(model, c) == Law.NONLINEAR else 0.0
 
 
 @kernel
 def slip_noise(model: Model, work: Work, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            i = model.contact_body[c]
-            k = work.contact_kin[c]
-            length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
-            length += abs(k[3]) + abs(k[4]) + abs(k[5])
-            speed = length / h + abs(k[1]) + abs(k[2])
-            e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, 1] * speed)
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        i = model.contact_body[c]
+        k = work.contact_kin[c]
+        length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
+        length += abs(k[Kin.ARM]) + abs(k[Kin.ARM + 1]) + abs(k[Kin.ARM + 2])
+        speed = length / h + abs(k[Kin.SLIP1]) + abs(k[Kin.SLIP2])
+        e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, Cone.IMPULSE] * speed)
     return e
 
 
@@ -140,8 +141,8 @@ def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tu
     """(sum, count) of the complementarity products after a step of length alpha."""
     z = work.cone[c]
     d = work.cone_step[c]
-    p = (z[0] + alpha * d[0]) * (z[1] + alpha * d[1])
-    if law_of(model, c) == _LINEAR:
+    p = (z[Cone.SLACK] + alpha * d[Cone.SLACK]) * (z[Cone.IMPULSE] + alpha * d[Cone.IMPULSE])
+    if law_of(model, c) == Law.LINEAR:
         return p + pyramid_products_ahead(model, work, c, alpha), 6.0
     return p, 1.0
 
@@ -149,9 +150,11 @@ def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tu
 @kernel
 def keep_in_cone(model: Model, work: Work, c: int) -> None:
     """Shorten the friction of the exact cone to mu gamma."""
-    if law_of(model, c) == _NONLINEAR:
+    if law_of(model, c) == Law.NONLINEAR:
         z = work.cone[c]
-        z[2], z[3] = within_cone(model.contact_friction[c] * z[1], z[2], z[3])
+        z[Cone.FRICTION1], z[Cone.FRICTION2] = within_cone(
+            model.contact_friction[c] * z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
+        )
 
 
 @kernel
@@ -159,8 +162,8 @@ def contact_boundary(model: Model, work: Work, c: int) -> float:
     """Largest step that keeps the cone variables of contact c in their cones, or 1e30."""
     z = work.cone[c]
     d = work.cone_step[c]
-    a = min(orthant_step(z[0], d[0]), orthant_step(z[1], d[1]))
-    if law_of(model, c) == _LINEAR:
+    a = min(orthant_step(z[Cone.SLACK], d[Cone.SLACK]), orthant_step(z[Cone.IMPULSE], d[Cone.IMPULSE]))
+    if law_of(model, c) == Law.LINEAR:
         a = min(a, pyramid_boundary(model, work, c))
     return a
 
@@ -173,7 +176,7 @@ def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> 
     """
     weight = _response(model, c)
     return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
-    if law_of(model, c) == _LINEAR:
+    if law_of(model, c) == Law.LINEAR:
         return_pyramid(model, work, c, weight, kappa)
 
 
@@ -188,36 +191,36 @@ def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, s
     W = work.contact_W[c]
     for e in range(9):
         W[e] = 0.0
-    W[0] = -work.cone[c, 1] / work.cone[c, 0]
+    W[0] = -work.cone[c, Cone.IMPULSE] / work.cone[c, Cone.SLACK]
     law = law_of(model, c)
-    if law == _NONLINEAR:
-        condense_cone(model, work, c, kappa, share, form == LINEAR)
-    elif law == _LINEAR:
+    if law == Law.NONLINEAR:
+        condense_cone(model, work, c, kappa, share, form == LawForm.LINEAR)
+    elif law == Law.LINEAR:
         condense_pyramid(model, work, c)
-    if form == SOFT:
+    if form == LawForm.SOFT:
         soften(model, work, h, c)
 
 
 @kernel
-def contact_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
-    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the goal.
+def contact_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
+    """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the target.
 
-    `goal.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
+    `target.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
     """
     z = work.cone[c]
     d = work.cone_step[c]
     w = work.contact_w[c]
-    r = goal.kappa - z[0] * z[1]
-    if goal.corrected > 0.0:
-        r -= goal.corrected * d[0] * d[1]
-    w[0] = (r - z[1] * goal.share * (work.contact_kin[c, 0] - z[0])) / z[0]
+    r = target.kappa - z[Cone.SLACK] * z[Cone.IMPULSE]
+    if target.corrected > 0.0:
+        r -= target.corrected * d[Cone.SLACK] * d[Cone.IMPULSE]
+    w[0] = (r - z[Cone.IMPULSE] * target.share * (work.contact_kin[c, Kin.GAP] - z[Cone.SLACK])) / z[Cone.SLACK]
     w[1] = 0.0
     w[2] = 0.0
     law = law_of(model, c)
-    if law == _NONLINEAR:
+    if law == Law.NONLINEAR:
         cone_constant(model, work, c)
-    elif law == _LINEAR:
-        pyramid_constant(model, work, c, goal)
+    elif law == Law.LINEAR:
+        pyramid_constant(model, work, c, target)
 
 
 @kernel
@@ -226,12 +229,12 @@ def recover_contact(model: Model, work: Work, c: int, rate: Vec3, share: float) 
     z = work.cone[c]
     d = work.cone_step[c]
     a, x, y = rate
-    d[0] = a + share * (work.contact_kin[c, 0] - z[0])
-    d[1] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
+    d[Cone.SLACK] = a + share * (work.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
+    d[Cone.IMPULSE] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
     law = law_of(model, c)
-    if law == _NONLINEAR:
+    if law == Law.NONLINEAR:
         recover_cone(work, c, a, x, y)
-    elif law == _LINEAR:
+    elif law == Law.LINEAR:
         recover_pyramid(model, work, c, x, y, share)
 
 
@@ -243,7 +246,7 @@ def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> 
     fn, f1, f2 = contact_impulse(model, work, c)
     for e in range(3):
         out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-        out[3 + e] = work.pos3[i, e] + k[3 + e]
+        out[3 + e] = work.pos3[i, e] + k[Kin.ARM + e]
         out[8 + e] = F[e]
-    out[6] = k[0] + work.bounce[c, 0]
-    out[7] = (k[1] * k[1] + k[2] * k[2]) ** 0.5
+    out[6] = k[Kin.GAP] + work.bounce[c, Bounce.FLOOR]
+    out[7] = (k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2]) ** 0.5

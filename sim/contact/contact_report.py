@@ -6,6 +6,7 @@ from sim.contact.contact_law import contact_error, report_contact, slip_violatio
 from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
+from sim.model.columns import Bound
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -24,13 +25,13 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     worst = -1.0
     error = 0.0
     for k in range(model.limit_dof.shape[0]):
-        error = max(error, abs(work.bound_gap[k] - work.bound[k, 0]))
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
-            if e > error:
-                error = e
-                worst = float(c)
+        error = max(error, abs(work.bound_gap[k] - work.bound[k, Bound.SLACK]))
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
+        if e > error:
+            error = e
+            worst = float(c)
     return worst
 
 
@@ -40,11 +41,12 @@ def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
 
     (ncontact, 11)
     """
-    for m in range(work.counts[1]):
-        first = work.far_first[m]
-        contact_kinematics(model, work, h, first, model.cluster_end[first])
+    for m in range(work.inactive_count[0]):
+        first = work.inactive_first[m]
+        for c in range(first, model.cluster_end[first]):
+            contact_kinematics(model, work, h, c)
     for c in range(model.contact_height.shape[0]):
         if model.contact_hold[c] != 0:
-            contact_kinematics(model, work, h, c, c + 1)
+            contact_kinematics(model, work, h, c)
         report_contact(model, work, c, work.contact_frame[c], out[c])
     report_pairs(model, work, out)

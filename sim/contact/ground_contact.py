@@ -6,8 +6,7 @@
 The impulse f = n gamma + T^T beta acts at r from the centre of mass, as the wrench (f, r x f) in world axes (expressing
 the torque in the frame of configuration 3, as Dojo does, breaks angular momentum at O(h |omega|)).
 
-Columns of contact_kin:  0 gap, 1:3 slip, 3:6 r, 6:9 R3 p, then rows of the Jacobian of (gap, slip), 9:18 by the
-rotation about O, 18:27 by the translation, which of a half-space are n, T/h.
+Columns of contact_kin: sim/model/columns.py. Of a half-space, the rows of the Jacobian by the translation are n, T/h.
 
 contact_frame holds the rows n, T: those of the half-space, or on terrain those of the place (terrain_contact.py).
 """
@@ -15,40 +14,40 @@ contact_frame holds the rows n, T: those of the half-space, or on terrain those 
 from __future__ import annotations
 
 from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
+from sim.model.columns import Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
-from solvers.rotation import cross, rotate, transposed_times
-from solvers.types import Matrix
+from solvers.rotation import cross, put_three, rotate, three, transposed_times
+from solvers.types import Matrix, Vector
 
 
 @kernel
-def contact_kinematics(model: Model, work: Work, h: float, first: int, last: int) -> None:
-    """Gap, slip and arms at configuration 3 of the contacts from first up to last."""
+def contact_kinematics(model: Model, work: Work, h: float, c: int) -> None:
+    """Gap, slip and arms at configuration 3 of contact c."""
     g = 2.0 / h
-    for c in range(first, last):
-        i = model.contact_body[c]
-        k = work.contact_kin[c]
-        f = work.contact_frame[c]
-        curved = model.contact_terrain[c] > 0
-        if curved:
-            place_on_terrain(model, work, c)
-        point = model.contact_point[c]
-        px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
-        rho = model.contact_radius[c]
-        x, y, z = px - rho * f[0], py - rho * f[1], pz - rho * f[2]
-        ox, oy, oz = g * work.turn[i, 1], g * work.turn[i, 2], g * work.turn[i, 3]
-        vx, vy, vz = cross(ox, oy, oz, x, y, z)
-        vx += (work.pos3[i, 0] - work.pos2[i, 0]) / h
-        vy += (work.pos3[i, 1] - work.pos2[i, 1]) / h
-        vz += (work.pos3[i, 2] - work.pos2[i, 2]) / h
-        if not curved:
-            X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
-            k[0] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
-        k[1] = f[3] * vx + f[4] * vy + f[5] * vz
-        k[2] = f[6] * vx + f[7] * vy + f[8] * vz
-        k[3], k[4], k[5] = x, y, z
-        k[6], k[7], k[8] = px, py, pz
+    i = model.contact_body[c]
+    k = work.contact_kin[c]
+    f = work.contact_frame[c]
+    curved = model.contact_terrain[c] > 0
+    if curved:
+        place_on_terrain(model, work, c)
+    point = model.contact_point[c]
+    px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
+    rho = model.contact_radius[c]
+    x, y, z = px - rho * f[0], py - rho * f[1], pz - rho * f[2]
+    ox, oy, oz = g * work.turn[i, 1], g * work.turn[i, 2], g * work.turn[i, 3]
+    vx, vy, vz = cross(ox, oy, oz, x, y, z)
+    vx += (work.pos3[i, 0] - work.pos2[i, 0]) / h
+    vy += (work.pos3[i, 1] - work.pos2[i, 1]) / h
+    vz += (work.pos3[i, 2] - work.pos2[i, 2]) / h
+    if not curved:
+        X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
+        k[Kin.GAP] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
+    k[Kin.SLIP1] = f[3] * vx + f[4] * vy + f[5] * vz
+    k[Kin.SLIP2] = f[6] * vx + f[7] * vy + f[8] * vz
+    k[Kin.ARM], k[Kin.ARM + 1], k[Kin.ARM + 2] = x, y, z
+    k[Kin.POINT], k[Kin.POINT + 1], k[Kin.POINT + 2] = px, py, pz
 
 
 @kernel
@@ -66,21 +65,24 @@ def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
     dx = work.pos3[i, 0] - work.origin[0]
     dy = work.pos3[i, 1] - work.origin[1]
     dz = work.pos3[i, 2] - work.origin[2]
-    k[9], k[10], k[11] = cross(dx + k[6], dy + k[7], dz + k[8], f[0], f[1], f[2])
+    px, py, pz = three(k, Kin.POINT)
+    put_three(cross(dx + px, dy + py, dz + pz, f[0], f[1], f[2]), Kin.BY_ROTATION, k)
     w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
     g = 2.0 / h
     for e in range(3):
-        k[18 + e], k[21 + e], k[24 + e] = f[e], f[3 + e] / h, f[6 + e] / h
+        k[Kin.BY_TRANSLATION + e] = f[e]
+        k[Kin.BY_TRANSLATION + 3 + e] = f[3 + e] / h
+        k[Kin.BY_TRANSLATION + 6 + e] = f[6 + e] / h
     for e in range(1, 3):
         tx, ty, tz = f[3 * e], f[3 * e + 1], f[3 * e + 2]
         ax, ay, az = cross(dx, dy, dz, tx, ty, tz)
-        yx, yy, yz = cross(k[3], k[4], k[5], tx, ty, tz)
+        yx, yy, yz = cross(*three(k, Kin.ARM), tx, ty, tz)
         bx, by, bz = cross(sx, sy, sz, yx, yy, yz)
         ux, uy, uz = cross(sx, sy, sz, tx, ty, tz)
-        mx, my, mz = cross(k[6], k[7], k[8], ux, uy, uz)
-        k[9 + 3 * e] = (ax + w * yx + bx) / h - g * mx
-        k[10 + 3 * e] = (ay + w * yy + by) / h - g * my
-        k[11 + 3 * e] = (az + w * yz + bz) / h - g * mz
+        mx, my, mz = cross(*three(k, Kin.POINT), ux, uy, uz)
+        k[Kin.BY_ROTATION + 3 * e] = (ax + w * yx + bx) / h - g * mx
+        k[Kin.BY_ROTATION + 1 + 3 * e] = (ay + w * yy + by) / h - g * my
+        k[Kin.BY_ROTATION + 2 + 3 * e] = (az + w * yz + bz) / h - g * mz
     if model.contact_terrain[c] > 0:
         turn_on_terrain(model, work, h, c)
 
@@ -91,9 +93,9 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
     i = model.contact_body[c]
     k = work.contact_kin[c]
     x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
-    ax = work.pos2[i, 0] - work.origin[0] + k[3]
-    ay = work.pos2[i, 1] - work.origin[1] + k[4]
-    az = work.pos2[i, 2] - work.origin[2] + k[5]
+    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
+    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
+    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
     tx, ty, tz = cross(ax, ay, az, x, y, z)
     out[i, 0] -= x
     out[i, 1] -= y
@@ -114,9 +116,9 @@ def add_contact_law(model: Model, work: Work, c: int, out: Matrix) -> None:
     F = work.contact_frame[c]
     W = work.contact_W[c]
     A = out[i]
-    ax = work.pos2[i, 0] - work.origin[0] + k[3]
-    ay = work.pos2[i, 1] - work.origin[1] + k[4]
-    az = work.pos2[i, 2] - work.origin[2] + k[5]
+    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
+    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
+    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
     x0, y0, z0 = transposed_times(F, W[0], W[3], W[6])  # columns of F^T W
     x1, y1, z1 = transposed_times(F, W[1], W[4], W[7])
     x2, y2, z2 = transposed_times(F, W[2], W[5], W[8])
@@ -140,7 +142,7 @@ def add_contact_turn(model: Model, work: Work, c: int, fn: float, f1: float, f2:
     k = work.contact_kin[c]
     A = out[model.contact_body[c]]
     x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
-    px, py, pz = k[6], k[7], k[8]
+    px, py, pz = three(k, Kin.POINT)
     dot = x * px + y * py + z * pz
     A[21] -= px * x - dot
     A[22] -= px * y
@@ -154,11 +156,15 @@ def add_contact_turn(model: Model, work: Work, c: int, fn: float, f1: float, f2:
 
 
 @kernel
+def _rate(k: Vector, row: int, t: Vector) -> float:
+    """Row of C times the twist t."""
+    v, w = Kin.BY_TRANSLATION + 3 * row, Kin.BY_ROTATION + 3 * row
+    return k[v] * t[0] + k[v + 1] * t[1] + k[v + 2] * t[2] + k[w] * t[3] + k[w + 1] * t[4] + k[w + 2] * t[5]
+
+
+@kernel
 def contact_rate(model: Model, work: Work, c: int) -> tuple[float, float, float]:
     """d(gap, slip) = C twist, with the twists of the last solve."""
     k = work.contact_kin[c]
     t = work.twist[model.contact_body[c]]
-    d0 = k[18] * t[0] + k[19] * t[1] + k[20] * t[2] + k[9] * t[3] + k[10] * t[4] + k[11] * t[5]
-    d1 = k[21] * t[0] + k[22] * t[1] + k[23] * t[2] + k[12] * t[3] + k[13] * t[4] + k[14] * t[5]
-    d2 = k[24] * t[0] + k[25] * t[1] + k[26] * t[2] + k[15] * t[3] + k[16] * t[4] + k[17] * t[5]
-    return d0, d1, d2
+    return _rate(k, 0, t), _rate(k, 1, t), _rate(k, 2, t)

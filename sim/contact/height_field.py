@@ -7,14 +7,14 @@ Between the grid lines i and i + 1, at the fraction t, F is the sum of four coef
 along either direction; one row of coefficients lies outside of the grid on every side. Beyond it all coefficients are
 those of the edge: the ground goes on level within three cells.
 
-Columns of terrain_place:  0:2 direction of the first grid axis in the plane, 2:4 where the grid begins [m], 4:6 grid
-lines per metre, 6 bound of sqrt(1 + |grad F|^2), 7 bound of |second derivative of F| [1/m].
+Columns of terrain_place: Grid of sim/model/columns.py.
 """
 
 from __future__ import annotations
 
 from math import floor
 
+from sim.model.columns import Grid
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3
@@ -55,9 +55,9 @@ def field_values(
     """The same with other coefficients on its grid."""
     p = model.terrain_place[k]
     first, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
-    C, S = p[0], p[1]
-    i, a = cell(p[4] * (C * (x - p[2]) + S * (y - p[3])), nx)
-    j, b = cell(p[5] * (C * (y - p[3]) - S * (x - p[2])), ny)
+    C, S = p[Grid.DIRECTION], p[Grid.DIRECTION + 1]
+    i, a = cell(p[Grid.DENSITY] * (C * (x - p[Grid.ORIGIN]) + S * (y - p[Grid.ORIGIN + 1])), nx)
+    j, b = cell(p[Grid.DENSITY + 1] * (C * (y - p[Grid.ORIGIN + 1]) - S * (x - p[Grid.ORIGIN])), ny)
     f, fs, ft, fss, fst, ftt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for r in range(4):
         row = first + ny * min(max(i + r, 0), nx - 1)
@@ -70,8 +70,9 @@ def field_values(
         f, ft, ftt = f + w * q, ft + w * qt, ftt + w * qtt
         fs, fst = fs + dw * q, fst + dw * qt
         fss += ddw * q
-    fs, ft = p[4] * fs, p[5] * ft
-    fss, fst, ftt = p[4] * p[4] * fss, p[4] * p[5] * fst, p[5] * p[5] * ftt
+    fs, ft = p[Grid.DENSITY] * fs, p[Grid.DENSITY + 1] * ft
+    a, b = p[Grid.DENSITY], p[Grid.DENSITY + 1]
+    fss, fst, ftt = a * a * fss, a * b * fst, b * b * ftt
     return (
         f,
         C * fs - S * ft,

@@ -1,30 +1,27 @@
-"""Far contacts: their law is evaluated (inactive_impulses.py), not solved for. Which ones are far is decided here.
+"""The active set of contacts with the ground: which contacts the interior point solves for, and which it does not.
 
-On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. Far
-away that force hardly changes within a step, so it is a given impulse, like gravity: no variable of the interior point,
-no part of its matrix. Contacts of one body against one direction are a cluster, tested as one ball.
+On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
+large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity
+(inactive_impulses.py); it is no variable of the interior point and no part of its matrix. Contacts of one body against
+one direction are a cluster, tested as one ball.
 
-A cluster is far when its stiffness, in units of the inertia behind it, cannot be seen at the tolerance of the step:
+A cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the step:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) <= 1000 tolerance
 
-for n contacts (all of the mechanism, so that the sum holds), a: half the gap that is ahead. With W the largest
-|J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds the velocity
-per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ within a
-cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with the body.
+for n contacts (all of the mechanism, so that the sum holds) at the activation gap a, half the gap that is ahead. With W
+the largest |J^-1/2 (r x f)| of a unit impulse f at a contact and J0 the least moment of inertia, M = 1/m + W^2 bounds
+the velocity per impulse, whatever else hangs on the body, and 2 spread W/sqrt(J0) is added for impulses that differ
+within a cluster; T = |J^-1/2 (p x f)|/sqrt(J0), at the mean p of its points, is the turn of their common impulse with
+the body.
 
-The gradient leaves out the stiffness, at most a part e of the inertia; the tolerance of the step leaves as much open, a
-solution that is off by eps has derivatives that are off by up to sqrt(eps). The step leaves out no force: wherever an
-iterate is, the impulses in use are those of the law there, but for a change of the tolerance in all (`changes` of
-inactive_impulses.py bounds it, cluster by cluster, from the motion of the body since they were evaluated). A gap below
-a at the solution makes the cluster near, and the step is solved again.
+The gradient omits the stiffness, at most a part e of the inertia. The tolerance of the step leaves an error of the same
+size: a solution that is off by eps has derivatives that are off by up to sqrt(eps). The step omits no force: at every
+iterate the impulses are those of the law there, up to the tolerance in all (`changes` of inactive_impulses.py bounds
+it, cluster by cluster, from the motion of the body since they were evaluated). A gap below a at the solution activates
+the cluster, and the step is solved again.
 
-Columns of `far`, at the first contact of a far cluster:  0 a (0: near), 1:4 bounds of d(wrench about O) per gap, slip
-and turn; and of the body when the law was evaluated, 4:7 position, 7:11 quaternion, 11:14 velocity, 14:17 angular
-velocity; 17:23 force and moment about the centre of mass, 23 the smallest gap (0: not evaluated), 24 the largest
-height of a plane, 25:36 arms of the force (inactive_impulses.py), 36 whether they have turned since the law was
-evaluated. Columns of `cluster`:  0:3 centre in the body, 3 radius around it, 4 arm: largest distance from the centre of
-mass, 5 M, 6 largest friction, 7 T.
+Columns of `inactive` and `cluster`: Inactive and Cluster of sim/model/columns.py.
 """
 
 from __future__ import annotations
@@ -33,11 +30,12 @@ from sim.contact.pairs.inactive_pairs import enlist_pairs, pairs_came_near
 from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.confined import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
+from sim.model.columns import Cluster, Inactive
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Options
 from solvers.compiler import kernel
-from solvers.rotation import rotate
+from solvers.rotation import rotate, three
 
 
 @kernel
@@ -59,8 +57,8 @@ def cluster_gap(model: Model, work: Work, c: int, height: float, third: bool) ->
     rot = work.rot3 if third else work.rot2
     n = model.contact_frame[c]
     p = model.cluster[c]
-    x, y, z = rotate(rot, i, p[0], p[1], p[2])
-    return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[3]
+    x, y, z = rotate(rot, i, *three(p, Cluster.CENTRE))
+    return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[Cluster.RADIUS]
 
 
 @kernel
@@ -73,23 +71,23 @@ def sunk_contact(model: Model) -> int:
 
 
 @kernel
-def choose_far(model: Model, work: Work, options: Options) -> None:
-    """Sort contacts into near and far ones, from configuration 2 and the motion that led there.
+def choose_active(model: Model, work: Work, options: Options) -> None:
+    """Sort contacts into active and inactive ones, from configuration 2 and the motion that led there.
 
     Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
-    known = work.far_law[0] == options.kappa
-    work.far_law[0] = options.kappa
+    known = work.inactive_kappa[0] == options.kappa
+    work.inactive_kappa[0] = options.kappa
     count = model.contact_height.shape[0]
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
-    work.counts[0] = 0
-    work.counts[1] = 0
+    work.active_ground_count[0] = 0
+    work.inactive_count[0] = 0
     c = 0
     while c < count:
         i = model.contact_body[c]
         n = model.contact_frame[c]
         most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
-        most = 0.5 * (most + model.cluster[c, 4])  # no contact has more: a quick no, for most
+        most = 0.5 * (most + model.cluster[c, Cluster.ARM])  # no contact has more: a quick no, for most
         if model.contact_terrain[c] > 0:
             most = 1e9
         a = 0.0
@@ -97,32 +95,30 @@ def choose_far(model: Model, work: Work, options: Options) -> None:
             a = _half_gap_ahead(model, work, c)
             if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
                 a = 0.0
-        work.far[c, 0] = a
+        work.inactive[c, Inactive.ACTIVATION] = a
         if a == 0.0 or not known:
-            work.far[c, 23] = 0.0
+            work.inactive[c, Inactive.LEAST_GAP] = 0.0
         _enlist(model, work, c)
         c = model.cluster_end[c]
-    work.counts[2] = work.counts[0]
+    work.active_count[0] = work.active_ground_count[0]
     enlist_pairs(model, work)
-    work.far_law[1] = options.tolerance / max(1, work.counts[1])
+    work.inactive_share[0] = options.tolerance / max(1, work.inactive_count[0])
 
 
 @kernel
 def _enlist(model: Model, work: Work, c: int) -> None:
-    """Append a cluster to far_first, or its contacts to the runs of near; what cannot move is in neither."""
+    """Append a cluster to inactive_first, or its contacts to `active`; what cannot move is in neither."""
     if model.contact_hold[c] != 0:
         return
-    end = model.cluster_end[c]
-    runs = work.counts[0]
-    if work.far[c, 0] > 0.0:
-        work.far_first[work.counts[1]] = c
-        work.counts[1] += 1
-    elif runs > 0 and work.near[runs - 1, 1] == c:
-        work.near[runs - 1, 1] = end
-    else:
-        work.near[runs, 0] = c
-        work.near[runs, 1] = end
-        work.counts[0] += 1
+    if work.inactive[c, Inactive.ACTIVATION] > 0.0:
+        work.inactive_first[work.inactive_count[0]] = c
+        work.inactive_count[0] += 1
+        return
+    n = work.active_ground_count[0]
+    for k in range(c, model.cluster_end[c]):
+        work.active[n] = k
+        n += 1
+    work.active_ground_count[0] = n
 
 
 @kernel
@@ -131,9 +127,9 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
     i = model.contact_body[c]
     travel = 0.0
     for k in range(3):
-        travel += abs(work.move_in[i, k]) + 2.0 * model.cluster[c, 4] * abs(work.turn_in[i, 1 + k])
+        travel += abs(work.move_in[i, k]) + 2.0 * model.cluster[c, Cluster.ARM] * abs(work.turn_in[i, 1 + k])
     height = highest(model, c)
-    work.far[c, 24] = height
+    work.inactive[c, Inactive.HEIGHT] = height
     return 0.5 * (cluster_gap(model, work, c, height, False) - travel)
 
 
@@ -141,25 +137,26 @@ def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
 def _stiffness(model: Model, h: float, c: int, a: float) -> float:
     """e a^2/(n kappa) of a cluster at the gap a, see above."""
     p = model.cluster[c]
-    return (p[6] * p[6] + h * (1.0 + p[6])) * p[5] + h * (1.0 + p[6]) * p[7] * a
+    mu = p[Cluster.FRICTION]
+    return (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY] + h * (1.0 + mu) * p[Cluster.TURNING] * a
 
 
 @kernel
-def came_near(model: Model, work: Work) -> bool:
-    """Whether a far cluster is not, at configuration 3; it is near from now on."""
+def has_activated(model: Model, work: Work) -> bool:
+    """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
     found = pairs_came_near(model, work)
-    for m in range(work.counts[1]):
-        c = work.far_first[m]
-        if cluster_gap(model, work, c, work.far[c, 24], True) < work.far[c, 0]:
+    for m in range(work.inactive_count[0]):
+        c = work.inactive_first[m]
+        if cluster_gap(model, work, c, work.inactive[c, Inactive.HEIGHT], True) < work.inactive[c, Inactive.ACTIVATION]:
             found = True
-            work.far[c, 0] = 0.0
-            work.far[c, 23] = 0.0
+            work.inactive[c, Inactive.ACTIVATION] = 0.0
+            work.inactive[c, Inactive.LEAST_GAP] = 0.0
     if found:
-        work.counts[0] = 0
-        work.counts[1] = 0
+        work.active_ground_count[0] = 0
+        work.inactive_count[0] = 0
         for c in range(model.contact_height.shape[0]):
             if model.cluster_end[c] > 0:
                 _enlist(model, work, c)
-        work.counts[2] = work.counts[0]
+        work.active_count[0] = work.active_ground_count[0]
         enlist_pairs(model, work)
     return found

@@ -1,10 +1,7 @@
-"""Impulses of far contacts (inactive.py): the law of the central path, evaluated anew when the motion has changed it.
+"""Impulses of inactive contacts (inactive.py): the law of the central path, evaluated again when motion has changed it.
 
 Most of what changes is the moment, for arms turn with the body. That is known exactly: of a cluster whose law still
 holds only the arms are turned, at a cost that does not depend on the number of its contacts.
-
-Columns 25:36 of `far`:  25:28, 28:31, 31:34 sums of p times the impulses along n, t1, t2 (p: contact points, in axes of
-the body), 34:36 sums of radius times impulse along t1, t2.
 """
 
 from __future__ import annotations
@@ -15,55 +12,55 @@ from sim.contact.contact_law import contact_impulse, start_contact
 from sim.contact.inactive_bounds import ANGLE, NEARER, bound_changes, keep_motion
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.dynamics.displacements import third_quaternion
+from sim.model.columns import Cluster, Cone, Inactive, Kin
 from sim.model.data import Work
 from sim.model.model import Law, Model
 from solvers.compiler import inlined, kernel
-from solvers.rotation import cross, rotate, transposed_times
-
-_LINEAR = int(Law.LINEAR)
+from solvers.rotation import cross, put_three, rotate, three, transposed_times
 
 
 @kernel
 def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
-    """Bounds of the change of a far cluster's wrench since its law was evaluated: by that law, by turned arms."""
+    """Bounds of the change of an inactive cluster's wrench since its law was evaluated: by that law, by turned arms."""
     i = model.contact_body[c]
-    row = work.far[c]
-    if row[23] == 0.0:
+    row = work.inactive[c]
+    if row[Inactive.LEAST_GAP] == 0.0:
         return 1e300, 0.0
     dx = 0.0
     dv = 0.0
     dw = 0.0
     w = 0.0
     q = third_quaternion(work, i)
-    dq = abs(q[0] - row[7])
+    dq = abs(q[0] - row[Inactive.QUATERNION])
     for k in range(3):
         omega = 2.0 / h * work.turn[i, 1 + k]
-        dx += abs(work.pos3[i, k] - row[4 + k])
-        dq += abs(q[1 + k] - row[8 + k])
-        dv += abs(work.move[i, k] / h - row[11 + k])
-        dw += abs(omega - row[14 + k])
+        dx += abs(work.pos3[i, k] - row[Inactive.POSITION + k])
+        dq += abs(q[1 + k] - row[Inactive.QUATERNION + 1 + k])
+        dv += abs(work.move[i, k] / h - row[Inactive.VELOCITY + k])
+        dw += abs(omega - row[Inactive.ANGULAR + k])
         w += abs(omega)
-    arm = model.cluster[c, 4]
+    arm = model.cluster[c, Cluster.ARM]
     turn = ANGLE * dq
-    if dx + arm * turn > NEARER * row[23]:
+    if dx + arm * turn > NEARER * row[Inactive.LEAST_GAP]:
         return 1e300, 0.0
-    return row[1] * (dx + arm * turn) + row[2] * (dv + arm * (dw + w * turn)), row[3] * turn
+    law = row[Inactive.BY_GAP] * (dx + arm * turn) + row[Inactive.BY_SLIP] * (dv + arm * (dw + w * turn))
+    return law, row[Inactive.BY_TURN] * turn
 
 
 @kernel
-def far_impulses(model: Model, work: Work, h: float) -> None:
-    """Impulses of the far clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
-    share = work.far_law[1]
-    for m in range(work.counts[1]):
-        c = work.far_first[m]
+def update_inactive(model: Model, work: Work, h: float) -> None:
+    """Impulses of the inactive clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
+    share = work.inactive_share[0]
+    for m in range(work.inactive_count[0]):
+        c = work.inactive_first[m]
         law, arms = changes(model, work, h, c)
         if model.contact_terrain[c] > 0:
             if not law + arms <= share:
                 evaluate_on_terrain(model, work, h, c)
         elif not law <= share:
             _evaluate(model, work, h, c)
-        elif work.far[c, 36] > 0.0 or law + arms > share:
-            work.far[c, 36] = 1.0
+        elif work.inactive[c, Inactive.TURNED] > 0.0 or law + arms > share:
+            work.inactive[c, Inactive.TURNED] = 1.0
             turn_arms(model, work, c)
 
 
@@ -77,94 +74,96 @@ def _cone_impulse(mu: float, kappa: float, gap: float, x: float, y: float) -> tu
 
 @kernel
 def turn_arms(model: Model, work: Work, c: int) -> None:
-    """far[c, 20:23], the moment of the impulses of the last evaluation, at configuration 3:
+    """Inactive.MOMENT, that of the impulses of the last evaluation, at configuration 3:
 
     (R sum gamma p) x n + (R sum beta p) x t - sum rho beta n x t
     """
     i = model.contact_body[c]
-    row = work.far[c]
+    row = work.inactive[c]
     f = model.contact_frame[c]
     R = work.rot3
-    nx, ny, nz = cross(*rotate(R, i, row[25], row[26], row[27]), f[0], f[1], f[2])
-    ax, ay, az = cross(*rotate(R, i, row[28], row[29], row[30]), f[3], f[4], f[5])
-    bx, by, bz = cross(*rotate(R, i, row[31], row[32], row[33]), f[6], f[7], f[8])
+    nx, ny, nz = cross(*rotate(R, i, *three(row, Inactive.ARMS)), f[0], f[1], f[2])
+    ax, ay, az = cross(*rotate(R, i, *three(row, Inactive.ARMS + 3)), f[3], f[4], f[5])
+    bx, by, bz = cross(*rotate(R, i, *three(row, Inactive.ARMS + 6)), f[6], f[7], f[8])
     # n x t1 = t2, n x t2 = -t1
-    row[20] = nx + ax + bx - row[34] * f[6] + row[35] * f[3]
-    row[21] = ny + ay + by - row[34] * f[7] + row[35] * f[4]
-    row[22] = nz + az + bz - row[34] * f[8] + row[35] * f[5]
+    row[Inactive.MOMENT] = nx + ax + bx - row[Inactive.RADIUS_ARMS] * f[6] + row[Inactive.RADIUS_ARMS + 1] * f[3]
+    row[Inactive.MOMENT + 1] = ny + ay + by - row[Inactive.RADIUS_ARMS] * f[7] + row[Inactive.RADIUS_ARMS + 1] * f[4]
+    row[Inactive.MOMENT + 2] = nz + az + bz - row[Inactive.RADIUS_ARMS] * f[8] + row[Inactive.RADIUS_ARMS + 1] * f[5]
 
 
 @kernel
 def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
-    """far[c, 4:37] and the cone variables of a cluster at configuration 3: affine in the point p and the radius rho,
+    """The row of `inactive` and the cone variables of a cluster at configuration 3: affine in p and the radius rho,
 
     gap    n.x3 - height + (R^T n).p - rho              slip    t.v + (R^T (t x omega)).p - rho (t x omega).n
     """
     i = model.contact_body[c]
-    row = work.far[c]
+    row = work.inactive[c]
     keep_motion(work, h, i, row)
     f = model.contact_frame[c]
     R = work.rot3
-    x, y, z = cross(f[3], f[4], f[5], row[14], row[15], row[16])
+    x, y, z = cross(f[3], f[4], f[5], *three(row, Inactive.ANGULAR))
     a0, a1, a2 = transposed_times(R[i], x, y, z)
     ra = f[0] * x + f[1] * y + f[2] * z
-    x, y, z = cross(f[6], f[7], f[8], row[14], row[15], row[16])
+    x, y, z = cross(f[6], f[7], f[8], *three(row, Inactive.ANGULAR))
     b0, b1, b2 = transposed_times(R[i], x, y, z)
     rb = f[0] * x + f[1] * y + f[2] * z
     n0, n1, n2 = transposed_times(R[i], f[0], f[1], f[2])
-    D = f[0] * row[4] + f[1] * row[5] + f[2] * row[6]
-    va = f[3] * row[11] + f[4] * row[12] + f[5] * row[13]
-    vb = f[6] * row[11] + f[7] * row[12] + f[8] * row[13]
+    D = f[0] * row[Inactive.POSITION] + f[1] * row[Inactive.POSITION + 1] + f[2] * row[Inactive.POSITION + 2]
+    va = f[3] * row[Inactive.VELOCITY] + f[4] * row[Inactive.VELOCITY + 1] + f[5] * row[Inactive.VELOCITY + 2]
+    vb = f[6] * row[Inactive.VELOCITY] + f[7] * row[Inactive.VELOCITY + 1] + f[8] * row[Inactive.VELOCITY + 2]
     N, X, Y, rX, rY = 0.0, 0.0, 0.0, 0.0, 0.0
     N0, N1, N2, X0, X1, X2, Y0, Y1, Y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    kappa = work.far_law[0]
+    kappa = work.inactive_kappa[0]
     least = 1e300
     for k in range(c, model.cluster_end[c]):
         p = model.contact_point[k]
         rho = model.contact_radius[k]
-        gap = max(D - model.contact_height[k] + n0 * p[0] + n1 * p[1] + n2 * p[2] - rho, row[0])
+        gap = max(D - model.contact_height[k] + n0 * p[0] + n1 * p[1] + n2 * p[2] - rho, row[Inactive.ACTIVATION])
         least = min(least, gap)
         x = va + a0 * p[0] + a1 * p[1] + a2 * p[2] - rho * ra
         y = vb + b0 * p[0] + b1 * p[1] + b2 * p[2] - rho * rb
-        if model.contact_law[k] == _LINEAR:
+        if model.contact_law[k] == Law.LINEAR:
             kin = work.contact_kin[k]
-            kin[0], kin[1], kin[2] = gap, x, y
-            start_contact(model, work, k, kappa, row[0])
+            kin[Kin.GAP], kin[Kin.SLIP1], kin[Kin.SLIP2] = gap, x, y
+            start_contact(model, work, k, kappa, row[Inactive.ACTIVATION])
             fn, fx, fy = contact_impulse(model, work, k)
         else:
             fn, fx, fy = _cone_impulse(model.contact_friction[k], kappa, gap, x, y)
             z = work.cone[k]
-            z[0], z[1], z[2], z[3] = gap, fn, fx, fy
+            z[Cone.SLACK], z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = gap, fn, fx, fy
         N, X, Y = N + fn, X + fx, Y + fy
         rX, rY = rX + rho * fx, rY + rho * fy
         N0, N1, N2 = N0 + fn * p[0], N1 + fn * p[1], N2 + fn * p[2]
         X0, X1, X2 = X0 + fx * p[0], X1 + fx * p[1], X2 + fx * p[2]
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
-    row[23] = least
+    row[Inactive.LEAST_GAP] = least
     bound_changes(model, work, c, (1.0 - NEARER) * least)
     turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
-    row[3] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
+    row[Inactive.BY_TURN] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
     for k in range(3):
-        row[17 + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
-    row[25], row[26], row[27], row[28], row[29], row[30] = N0, N1, N2, X0, X1, X2
-    row[31], row[32], row[33], row[34], row[35], row[36] = Y0, Y1, Y2, rX, rY, 0.0
+        row[Inactive.FORCE + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
+    put_three((N0, N1, N2), Inactive.ARMS, row)
+    put_three((X0, X1, X2), Inactive.ARMS + 3, row)
+    put_three((Y0, Y1, Y2), Inactive.ARMS + 6, row)
+    row[Inactive.RADIUS_ARMS], row[Inactive.RADIUS_ARMS + 1], row[Inactive.TURNED] = rX, rY, 0.0
     turn_arms(model, work, c)
 
 
 @kernel
-def add_far_wrenches(model: Model, work: Work) -> None:
-    """wrench -= impulses of the far clusters, about O."""
-    for m in range(work.counts[1]):
-        c = work.far_first[m]
+def add_inactive_wrenches(model: Model, work: Work) -> None:
+    """wrench -= impulses of the inactive clusters, about O."""
+    for m in range(work.inactive_count[0]):
+        c = work.inactive_first[m]
         i = model.contact_body[c]
-        row = work.far[c]
-        x, y, z = row[17], row[18], row[19]
+        row = work.inactive[c]
+        x, y, z = three(row, Inactive.FORCE)
         o = work.origin
         tx, ty, tz = cross(work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], x, y, z)
         A = work.wrench[i]
         A[0] -= x
         A[1] -= y
         A[2] -= z
-        A[3] -= tx + row[20]
-        A[4] -= ty + row[21]
-        A[5] -= tz + row[22]
+        A[3] -= tx + row[Inactive.MOMENT]
+        A[4] -= ty + row[Inactive.MOMENT + 1]
+        A[5] -= tz + row[Inactive.MOMENT + 2]

@@ -1,16 +1,18 @@
 """Friction in a four-sided pyramid on the central path.
 
-Columns of `cone`:  2 psi, 3 s_psi, 4:8 beta, 8:12 s       psi s_psi = kappa,    s_psi = mu gamma - sum beta
-                                                           beta_i s_i = kappa,   s_i = d_i.v_t + psi
-with the directions d = (t1, -t1, t2, -t2). Columns of contact_scale, k_i = beta_i/s_i: 0:4 k_i, 4:6 e = sum k_i d_i
-along t1 and t2, 6 g = 1/(s_psi + psi sum k_i), 7 the constant part of dpsi, 8:12 those of dbeta.
+    psi s_psi = kappa,    s_psi = mu gamma - sum beta        psi: Pyramid.SPEED, s_psi: Pyramid.CAP
+    beta_i s_i = kappa,   s_i = d_i.v_t + psi                beta: Pyramid.FRICTION, s: Pyramid.SLIP
+
+with the directions d = (t1, -t1, t2, -t2).  Condensed, with k_i = beta_i/s_i, e = sum k_i d_i along t1 and t2, and
+g = 1/(s_psi + psi sum k_i), in contact_scale: PyramidScale.
 """
 
 from __future__ import annotations
 
+from sim.model.columns import Kin, Pyramid, PyramidScale
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import orthant_step, return_pair
@@ -50,19 +52,26 @@ def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
     """Variables on the central path of kappa at the present slip and gap slack."""
     z = work.cone[c]
     k = work.contact_kin[c]
-    psi = _pyramid_slip(k[1], k[2], z[0] / model.contact_friction[c])
-    z[2] = psi
-    z[3] = kappa / psi
+    psi = _pyramid_slip(k[Kin.SLIP1], k[Kin.SLIP2], z[Pyramid.SLACK] / model.contact_friction[c])
+    z[Pyramid.SPEED] = psi
+    z[Pyramid.CAP] = kappa / psi
     for e in range(4):
-        z[8 + e] = side(e, k[1], k[2]) + psi
-        z[4 + e] = kappa / z[8 + e]
+        z[Pyramid.SLIP + e] = side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + psi
+        z[Pyramid.FRICTION + e] = kappa / z[Pyramid.SLIP + e]
 
 
 @kernel
 def cap_error(model: Model, work: Work, c: int) -> float:
     """mu gamma - sum beta - s_psi of the pyramid."""
     z = work.cone[c]
-    return model.contact_friction[c] * z[1] - z[4] - z[5] - z[6] - z[7] - z[3]
+    return (
+        model.contact_friction[c] * z[Pyramid.IMPULSE]
+        - z[Pyramid.FRICTION]
+        - z[Pyramid.FRICTION + 1]
+        - z[Pyramid.FRICTION + 2]
+        - z[Pyramid.FRICTION + 3]
+        - z[Pyramid.CAP]
+    )
 
 
 @optional(Slot.PYRAMID_ERROR, default=0.0)
@@ -72,7 +81,7 @@ def pyramid_error(model: Model, work: Work, c: int) -> float:
     k = work.contact_kin[c]
     r = abs(cap_error(model, work, c))
     for e in range(4):
-        r = max(r, abs(side(e, k[1], k[2]) + z[2] - z[8 + e]))
+        r = max(r, abs(side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e]))
     return r
 
 
@@ -80,11 +89,11 @@ def pyramid_error(model: Model, work: Work, c: int) -> float:
 def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, float]:
     """(sum, low, high) of the five products."""
     z = work.cone[c]
-    total = z[2] * z[3]
+    total = z[Pyramid.SPEED] * z[Pyramid.CAP]
     lo = total
     hi = total
     for e in range(4):
-        t = z[4 + e] * z[8 + e]
+        t = z[Pyramid.FRICTION + e] * z[Pyramid.SLIP + e]
         total += t
         lo = min(lo, t)
         hi = max(hi, t)
@@ -96,9 +105,11 @@ def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> fl
     """Sum of the five products after a step of length alpha."""
     z = work.cone[c]
     d = work.cone_step[c]
-    total = (z[2] + alpha * d[2]) * (z[3] + alpha * d[3])
+    total = (z[Pyramid.SPEED] + alpha * d[Pyramid.SPEED]) * (z[Pyramid.CAP] + alpha * d[Pyramid.CAP])
     for e in range(4):
-        total += (z[4 + e] + alpha * d[4 + e]) * (z[8 + e] + alpha * d[8 + e])
+        total += (z[Pyramid.FRICTION + e] + alpha * d[Pyramid.FRICTION + e]) * (
+            z[Pyramid.SLIP + e] + alpha * d[Pyramid.SLIP + e]
+        )
     return total
 
 
@@ -133,23 +144,25 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
     mu = model.contact_friction[c]
     total = 0.0
     for e in range(4):
-        q[e] = z[4 + e] / z[8 + e]
+        q[e] = z[Pyramid.FRICTION + e] / z[Pyramid.SLIP + e]
         total += q[e]
-    q[4] = q[0] - q[1]
-    q[5] = q[2] - q[3]
-    q[6] = 1.0 / (z[3] + z[2] * total)
-    g = z[2] * q[6]
-    x, y = q[0] + q[1], q[2] + q[3]
-    W[4] = -q[6] * (x * (z[3] + z[2] * y) + 4.0 * z[2] * q[0] * q[1])
-    W[5] = g * q[4] * q[5]
+    q[PyramidScale.SUM] = q[PyramidScale.RATIO] - q[PyramidScale.RATIO + 1]
+    q[PyramidScale.SUM + 1] = q[PyramidScale.RATIO + 2] - q[PyramidScale.RATIO + 3]
+    q[PyramidScale.INVERSE] = 1.0 / (z[Pyramid.CAP] + z[Pyramid.SPEED] * total)
+    g = z[Pyramid.SPEED] * q[PyramidScale.INVERSE]
+    k1, k2, k3, k4 = q[0], q[1], q[2], q[3]
+    psi, cap = z[Pyramid.SPEED], z[Pyramid.CAP]
+    x, y = k1 + k2, k3 + k4
+    W[4] = -q[PyramidScale.INVERSE] * (x * (cap + psi * y) + 4.0 * psi * k1 * k2)
+    W[5] = g * q[PyramidScale.SUM] * q[PyramidScale.SUM + 1]
     W[7] = W[5]
-    W[8] = -q[6] * (y * (z[3] + z[2] * x) + 4.0 * z[2] * q[2] * q[3])
-    W[3] = mu * W[0] * g * q[4]
-    W[6] = mu * W[0] * g * q[5]
+    W[8] = -q[PyramidScale.INVERSE] * (y * (cap + psi * x) + 4.0 * psi * k3 * k4)
+    W[3] = mu * W[0] * g * q[PyramidScale.SUM]
+    W[6] = mu * W[0] * g * q[PyramidScale.SUM + 1]
 
 
 @optional(Slot.PYRAMID_CONSTANT)
-def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
+def pyramid_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
     """Friction part of contact_w, after its normal part."""
     z = work.cone[c]
     d = work.cone_step[c]
@@ -158,18 +171,20 @@ def pyramid_constant(model: Model, work: Work, c: int, goal: Goal) -> None:
     q = work.contact_scale[c]
     total = 0.0
     for e in range(4):
-        r = goal.kappa - z[4 + e] * z[8 + e]
-        if goal.corrected > 0.0:
-            r -= goal.corrected * d[4 + e] * d[8 + e]
-        q[8 + e] = (r - z[4 + e] * goal.share * (side(e, k[1], k[2]) + z[2] - z[8 + e])) / z[8 + e]
-        total += q[8 + e]
-    r = goal.kappa - z[2] * z[3]
-    if goal.corrected > 0.0:
-        r -= goal.corrected * d[2] * d[3]
-    q[7] = (r + z[2] * (total - goal.share * cap_error(model, work, c))) * q[6]
-    p = q[7] - z[2] * q[6] * model.contact_friction[c] * w[0]
-    w[1] = q[8] - q[9] - q[4] * p
-    w[2] = q[10] - q[11] - q[5] * p
+        r = target.kappa - z[Pyramid.FRICTION + e] * z[Pyramid.SLIP + e]
+        if target.corrected > 0.0:
+            r -= target.corrected * d[Pyramid.FRICTION + e] * d[Pyramid.SLIP + e]
+        error = side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e]
+        q[PyramidScale.FRICTION + e] = (r - z[Pyramid.FRICTION + e] * target.share * error) / z[Pyramid.SLIP + e]
+        total += q[PyramidScale.FRICTION + e]
+    r = target.kappa - z[Pyramid.SPEED] * z[Pyramid.CAP]
+    if target.corrected > 0.0:
+        r -= target.corrected * d[Pyramid.SPEED] * d[Pyramid.CAP]
+    total -= target.share * cap_error(model, work, c)
+    q[PyramidScale.SPEED] = (r + z[Pyramid.SPEED] * total) * q[PyramidScale.INVERSE]
+    p = q[PyramidScale.SPEED] - z[Pyramid.SPEED] * q[PyramidScale.INVERSE] * model.contact_friction[c] * w[0]
+    w[1] = q[PyramidScale.FRICTION] - q[PyramidScale.FRICTION + 1] - q[PyramidScale.SUM] * p
+    w[2] = q[PyramidScale.FRICTION + 2] - q[PyramidScale.FRICTION + 3] - q[PyramidScale.SUM + 1] * p
 
 
 @optional(Slot.RECOVER_PYRAMID)
@@ -180,12 +195,14 @@ def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share:
     k = work.contact_kin[c]
     q = work.contact_scale[c]
     mu = model.contact_friction[c]
-    p = q[7] - z[2] * q[6] * (mu * d[1] + q[4] * x + q[5] * y)
+    p = q[PyramidScale.SPEED] - z[Pyramid.SPEED] * q[PyramidScale.INVERSE] * (
+        mu * d[Pyramid.IMPULSE] + q[PyramidScale.SUM] * x + q[PyramidScale.SUM + 1] * y
+    )
     total = 0.0
-    d[2] = p
+    d[Pyramid.SPEED] = p
     for e in range(4):
         t = side(e, x, y) + p
-        d[4 + e] = q[8 + e] - q[e] * t
-        d[8 + e] = t + share * (side(e, k[1], k[2]) + z[2] - z[8 + e])
-        total += d[4 + e]
-    d[3] = mu * d[1] - total + share * cap_error(model, work, c)
+        d[Pyramid.FRICTION + e] = q[PyramidScale.FRICTION + e] - q[e] * t
+        d[Pyramid.SLIP + e] = t + share * (side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e])
+        total += d[Pyramid.FRICTION + e]
+    d[Pyramid.CAP] = mu * d[Pyramid.IMPULSE] - total + share * cap_error(model, work, c)

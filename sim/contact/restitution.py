@@ -24,8 +24,7 @@ What the impulses do not do, the energy at the nodes may, by a part of first ord
 somewhere within one. A frictionless chain of three bodies with e = 1 gained up to 1.0e-3 of its energy in two impacts
 at 2 ms, 1.5e-4 at .25 ms, and lost .3 % and .05 % (median of eight falls); between impacts, 1.7e-5 and 3e-7.
 
-Columns of bounce:  0 floor, 1 e in this step (0: no impact), 2:8 d(phi1)/d(twist of configuration 1), 8:14 the same
-of 2, 14 phi1, 15 phi2, of pairs 16:19 the contact point at 1, 19:22 at 2. Derivatives: restitution_gradient.py.
+Derivatives: restitution_gradient.py.
 
 Scenes without restitution do not compile these kernels.
 """
@@ -37,9 +36,10 @@ from math import sqrt
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
+from sim.model.columns import Bounce, Frame, Kin
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import AT_EVERY_POSE, AT_START
+from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, transposed_times
@@ -51,7 +51,7 @@ _NEVER = 1e9  # [m]
 
 @kernel
 def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
-    """Gaps of the near contacts at an earlier configuration, and their rows; configuration 3 is used up."""
+    """Gaps of the active contacts at an earlier configuration, and their rows; configuration 3 is used up."""
     first = configuration == 1
     pos = work.pos1 if first else work.pos2
     rot = work.rot1 if first else work.rot2
@@ -60,31 +60,33 @@ def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
             work.pos3[i, k] = pos[i, k]
         for k in range(9):
             work.rot3[i, k] = rot[i, k]
-    for m in range(work.counts[0]):
-        contact_kinematics(model, work, h, work.near[m, 0], work.near[m, 1])
-    work.pair_free[0] = AT_EVERY_POSE  # what touched there, whatever it is now
+    for m in range(work.active_ground_count[0]):
+        contact_kinematics(model, work, h, work.active[m])
+    work.feature_choice[0] = FeatureChoice.EVERY_POSE  # what touched there, whatever it is now
     pair_kinematics(model, work, h)
-    work.pair_free[0] = AT_START
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            b = work.bounce[c]
-            k = work.contact_kin[c]
-            b[14 if first else 15] = k[0]
-            row = b[2:8] if first else b[8:14]
-            if c < model.contact_height.shape[0]:
-                contact_jacobian(model, work, h, c)
-                for r in range(3):
-                    row[r], row[3 + r] = k[18 + r], k[9 + r]
-                continue
-            F = work.pair_frame[c - model.contact_height.shape[0]]
-            o = work.origin
-            n = gap_normal(model, work, c - model.contact_height.shape[0])
-            row[0], row[1], row[2] = n
-            row[3], row[4], row[5] = cross(F[9] - o[0], F[10] - o[1], F[11] - o[2], n[0], n[1], n[2])
+    work.feature_choice[0] = FeatureChoice.ONCE
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        b = work.bounce[c]
+        k = work.contact_kin[c]
+        b[14 if first else 15] = k[Kin.GAP]
+        row = b[Bounce.ROW1 : Bounce.ROW2] if first else b[Bounce.ROW2 : Bounce.GAP1]
+        if c < model.contact_height.shape[0]:
+            contact_jacobian(model, work, h, c)
             for r in range(3):
-                b[16 + r if first else 19 + r] = F[9 + r]
-            if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
-                b[14 if first else 15] = -_NEVER if first else _NEVER
+                row[r], row[3 + r] = k[Kin.BY_TRANSLATION + r], k[Kin.BY_ROTATION + r]
+            continue
+        F = work.pair_frame[c - model.contact_height.shape[0]]
+        o = work.origin
+        n = gap_normal(model, work, c - model.contact_height.shape[0])
+        row[0], row[1], row[2] = n
+        row[3], row[4], row[5] = cross(
+            F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2], n[0], n[1], n[2]
+        )
+        for r in range(3):
+            b[16 + r if first else 19 + r] = F[Frame.POINT + r]
+        if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
+            b[14 if first else 15] = -_NEVER if first else _NEVER
 
 
 @kernel
@@ -93,29 +95,29 @@ def least_closing(model: Model, work: Work, h: float, c: int) -> float:
     g = model.gravity
     fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
     m = model.body_mass[model.contact_body[c]]
-    return h * sqrt(max(fall, work.far_law[0] / (h * m) if m > 0.0 else 0.0))
+    return h * sqrt(max(fall, work.inactive_kappa[0] / (h * m) if m > 0.0 else 0.0))
 
 
 @kernel
 def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
     """Floors of the impacts of this step, with a share of the restitution."""
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            b = work.bounce[c]
-            e = share * model.contact_restitution[c]
-            floor = (1.0 - e) * b[15] + e * b[14]
-            fast = b[14] - b[15] > least_closing(model, work, h, c)
-            impact = e > 0.0 and fast and 2.0 * b[15] < b[14] and floor > 0.0
-            b[0] = floor if impact else 0.0
-            b[1] = e if impact else 0.0
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        b = work.bounce[c]
+        e = share * model.contact_restitution[c]
+        floor = (1.0 - e) * b[Bounce.GAP2] + e * b[Bounce.GAP1]
+        fast = b[Bounce.GAP1] - b[Bounce.GAP2] > least_closing(model, work, h, c)
+        impact = e > 0.0 and fast and 2.0 * b[Bounce.GAP2] < b[Bounce.GAP1] and floor > 0.0
+        b[Bounce.FLOOR] = floor if impact else 0.0
+        b[Bounce.RESTITUTION] = e if impact else 0.0
 
 
 @optional(Slot.FIND_IMPACTS)
 def find_impacts(model: Model, work: Work, h: float) -> None:
-    """Which near contacts are impacts in this step, and their floors."""
+    """Which active contacts are impacts in this step, and their floors."""
     for c in range(work.bounce.shape[0]):
-        work.bounce[c, 0] = 0.0
-        work.bounce[c, 1] = 0.0
+        work.bounce[c, Bounce.FLOOR] = 0.0
+        work.bounce[c, Bounce.RESTITUTION] = 0.0
     work.bounce_share[0] = 1.0
     look_back(model, work, h, 1)
     look_back(model, work, h, 2)
@@ -125,9 +127,9 @@ def find_impacts(model: Model, work: Work, h: float) -> None:
 @optional(Slot.SUBTRACT_FLOORS)
 def subtract_floors(model: Model, work: Work) -> None:
     """contact_kin: gaps above the floors."""
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            work.contact_kin[c, 0] -= work.bounce[c, 0]
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        work.contact_kin[c, Kin.GAP] -= work.bounce[c, Bounce.FLOOR]
 
 
 @kernel
@@ -153,7 +155,7 @@ def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
     if c < ground:
         k = work.contact_kin[c]
         p = work.pos2[a]
-        x, y, z = velocity_sum(work, h, a, p[0] + k[3], p[1] + k[4], p[2] + k[5])
+        x, y, z = velocity_sum(work, h, a, p[0] + k[Kin.ARM], p[1] + k[Kin.ARM + 1], p[2] + k[Kin.ARM + 2])
         fx, fy, fz = transposed_times(work.contact_frame[c], fn, f1, f2)
         return 0.5 * (fx * x + fy * y + fz * z)
     if is_absent(work, c - ground):
@@ -177,14 +179,14 @@ def impacts_gained(model: Model, work: Work, h: float) -> bool:
     gain = 0.0
     size = 0.0
     rebound = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            b = work.bounce[c]
-            fn, _, _ = contact_impulse(model, work, c)
-            gain += impulse_work(model, work, h, c)
-            gap = work.contact_kin[c, 0] + b[0]
-            size += 0.5 * fn * (abs(gap - b[15]) + abs(b[15] - b[14])) / h
-            rebound += 0.5 * fn * b[1] * abs(b[15] - b[14]) / h
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        b = work.bounce[c]
+        fn, _, _ = contact_impulse(model, work, c)
+        gain += impulse_work(model, work, h, c)
+        gap = work.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]
+        size += 0.5 * fn * (abs(gap - b[Bounce.GAP2]) + abs(b[Bounce.GAP2] - b[Bounce.GAP1])) / h
+        rebound += 0.5 * fn * b[Bounce.RESTITUTION] * abs(b[Bounce.GAP2] - b[Bounce.GAP1]) / h
     if not rebound > 0.0 or not gain > _NOISE * size:
         return False
     least = max(gain / rebound, 2.0 * (1.0 - work.bounce_share[0]))

@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from math import sqrt
 
+from sim.model.columns import Bounce, Cone, ConeScale, Frame, Kin
 from sim.model.data import Work
 from sim.model.model import Law, Model
 from solvers.compiler import kernel
-from solvers.rotation import Vec3, cross
+from solvers.rotation import Vec3, cross, three
 from solvers.types import Vector
 
-_LINEAR = int(Law.LINEAR)
 _PART = 3e-8
 _PART_OF_IMPACTS = 1e-8  # with restitution, whose rates are summed first (restitution_gradient.py): less is rounded
 _LEAST = 1e-6  # of M, which G is not taken to be below: forces between parts that hold one another stop no speed
@@ -58,27 +58,33 @@ def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]
     k = work.contact_kin[c]
     a = model.contact_body[c]
     M = free_response(model, a)
-    x, y, z = speed_before(work, h, a, k[3], k[4], k[5])
+    x, y, z = speed_before(work, h, a, *three(k, Kin.ARM))
     j = c - model.contact_height.shape[0]
     if j >= 0:
         b = model.coupling_body[model.pair_coupling[j], 1]
         if b >= 0:
             M += free_response(model, b)
             p, o = work.pair_frame[j], work.pos3[b]
-            u, v, w = speed_before(work, h, b, p[9] - o[0], p[10] - o[1], p[11] - o[2])
+            u, v, w = speed_before(
+                work, h, b, p[Frame.POINT] - o[0], p[Frame.POINT + 1] - o[1], p[Frame.POINT + 2] - o[2]
+            )
             x, y, z = x - u, y - v, z - w
     g = model.gravity
     speed = sqrt(x * x + y * y + z * z) + h * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    return M, max(min(M, speed / work.cone[c, 1]), _LEAST * M)
+    return M, max(min(M, speed / work.cone[c, Cone.IMPULSE]), _LEAST * M)
 
 
 @kernel
 def soften(model: Model, work: Work, h: float, c: int) -> None:
     """W of contact c becomes W', its derivative by friction (contact_scale) what it is then; contact_hard: M W'."""
     W = work.contact_W[c]
-    q = work.contact_scale[c, 4:6] if model.contact_law[c] == _LINEAR else work.contact_scale[c, 0:2]
+    q = (
+        work.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
+        if model.contact_law[c] == Law.LINEAR
+        else work.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
+    )
     M, G = responses(model, work, h, c)
-    d = (_PART if work.bounce[c, 1] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
+    d = (_PART if work.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
     _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
     hard = max(-h * W[0], -W[4], -W[8])
     work.contact_hard[0] = max(work.contact_hard[0], M * hard)

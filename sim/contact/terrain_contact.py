@@ -18,11 +18,12 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.contact.height_field import height_field
+from sim.model.columns import Bounce, Grid, Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import Vec3, cross, rotate, transposed_times
+from solvers.rotation import Vec3, cross, rotate, three, transposed_times
 from solvers.types import Matrix, Vector
 
 
@@ -51,7 +52,7 @@ def place_on_terrain(model: Model, work: Work, c: int) -> None:
     F, Fx, Fy, _xx, _xy, _yy = height_field(model, model.contact_terrain[c] - 1, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
     upright_frame(-i * Fx, -i * Fy, i, work.contact_frame[c])
-    work.contact_kin[c, 0] = i * (z - F - model.contact_height[c])
+    work.contact_kin[c, Kin.GAP] = i * (z - F - model.contact_height[c])
 
 
 @optional(Slot.TERRAIN_GAP, default=0.0)
@@ -60,7 +61,7 @@ def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
     k = model.contact_terrain[c] - 1
     x, y, z = centre(model, c, work.pos3, work.rot3) if third else centre(model, c, work.pos2, work.rot2)
     F = height_field(model, k, x, y)[0]
-    return (z - F - model.contact_height[c]) / model.terrain_place[k, 6]
+    return (z - F - model.contact_height[c]) / model.terrain_place[k, Grid.SLOPE]
 
 
 @kernel
@@ -100,13 +101,15 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
         u, v = e1[r], e2[r]
         W[6 * r], W[6 * r + 1], W[6 * r + 2] = u, v, 0.0
         W[6 * r + 3], W[6 * r + 4], W[6 * r + 5] = -az * v, az * u, ax * v - ay * u
-    g = (k[0] + work.bounce[c, 0]) * f[2] * f[2]  # contact_kin has the gap above the floor of an impact
+    g = (
+        (k[Kin.GAP] + work.bounce[c, Bounce.FLOOR]) * f[2] * f[2]
+    )  # contact_kin has the gap above the floor of an impact
     mx, my, mz = f[0] - g * (Fxx * Fx + Fxy * Fy), f[1] - g * (Fxy * Fx + Fyy * Fy), f[2]
-    k[18], k[19], k[20] = mx, my, mz
-    k[9], k[10], k[11] = cross(ax, ay, az, mx, my, mz)
+    k[Kin.BY_TRANSLATION], k[Kin.BY_TRANSLATION + 1], k[Kin.BY_TRANSLATION + 2] = mx, my, mz
+    k[Kin.BY_ROTATION], k[Kin.BY_ROTATION + 1], k[Kin.BY_ROTATION + 2] = cross(ax, ay, az, mx, my, mz)
     q = 2.0 / h
     o = (q * work.turn[i, 1], q * work.turn[i, 2], q * work.turn[i, 3])
-    u0, u1, u2 = cross(o[0], o[1], o[2], k[3], k[4], k[5])
+    u0, u1, u2 = cross(o[0], o[1], o[2], *three(k, Kin.ARM))
     u0 += (work.pos3[i, 0] - work.pos2[i, 0]) / h
     u1 += (work.pos3[i, 1] - work.pos2[i, 1]) / h
     u2 += (work.pos3[i, 2] - work.pos2[i, 2]) / h
@@ -118,8 +121,8 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
         d = cross(f[0], f[1], f[2], b[0], b[1], b[2])
         s0, s1, s2 = a[0] - rho * d[0], a[1] - rho * d[1], a[2] - rho * d[2]
         for j in range(3):
-            k[18 + 3 * e + j] += s0 * W[j] + s1 * W[6 + j] + s2 * W[12 + j]
-            k[9 + 3 * e + j] += s0 * W[3 + j] + s1 * W[9 + j] + s2 * W[15 + j]
+            k[Kin.BY_TRANSLATION + 3 * e + j] += s0 * W[j] + s1 * W[6 + j] + s2 * W[12 + j]
+            k[Kin.BY_ROTATION + 3 * e + j] += s0 * W[3 + j] + s1 * W[9 + j] + s2 * W[15 + j]
 
 
 @optional(Slot.ADD_FRAME_MATRIX)
@@ -135,9 +138,9 @@ def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2:
     A = out[i]
     x, y, z = transposed_times(F, fn, f1, f2)
     rho = model.contact_radius[c]
-    ax = work.pos2[i, 0] - work.origin[0] + k[3]
-    ay = work.pos2[i, 1] - work.origin[1] + k[4]
-    az = work.pos2[i, 2] - work.origin[2] + k[5]
+    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
+    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
+    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
     for j in range(6):
         d = cross(W[j], W[6 + j], W[12 + j], x, y, z)
         n = cross(W[j], W[6 + j], W[12 + j], F[0], F[1], F[2])

@@ -14,12 +14,13 @@ from sim.contact.ground_contact import add_contact_law
 from sim.contact.pairs.pair_contact import pair_arm, pair_force
 from sim.contact.pairs.pair_stiffness import slip_rate
 from sim.derivatives.coupling_gradient import add_column
+from sim.model.columns import Bounce, Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.dense import dot
-from solvers.rotation import Vec3, cross, join, transposed_times
+from solvers.rotation import Vec3, cross, join, three, transposed_times
 from solvers.types import Matrix, Vector
 
 
@@ -37,7 +38,7 @@ def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
         f = transposed_times(work.contact_frame[c], W[0], W[3], W[6])
         o = work.origin
         p = work.pos2[i]
-        a = (p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5])
+        a = (p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2])
     return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
 
 
@@ -52,21 +53,21 @@ def add_bounce_composites(model: Model, work: Work) -> bool:
     for i in range(work.A.shape[0]):
         for k in range(36):
             work.A[i, k] = work.A3[i, k]
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            b = work.bounce[c]
-            if b[1] == 0.0:
-                continue
-            if c < ground:
-                impacts = True
-                add_contact_law(model, work, c, work.A)
-                continue
-            f, t = gap_wrench(model, work, c)
-            for side in range(2):
-                i = model.coupling_body[model.pair_coupling[c - ground], side]
-                if i >= 0:
-                    _add_outer(work.A1[i], f, t, b[1], b[2:8])
-                    _add_outer(work.A2[i], f, t, 1.0 - b[1], b[8:14])
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        b = work.bounce[c]
+        if b[Bounce.RESTITUTION] == 0.0:
+            continue
+        if c < ground:
+            impacts = True
+            add_contact_law(model, work, c, work.A)
+            continue
+        f, t = gap_wrench(model, work, c)
+        for side in range(2):
+            i = model.coupling_body[model.pair_coupling[c - ground], side]
+            if i >= 0:
+                _add_outer(work.A1[i], f, t, b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2])
+                _add_outer(work.A2[i], f, t, 1.0 - b[Bounce.RESTITUTION], b[Bounce.ROW2 : Bounce.GAP1])
     return impacts
 
 
@@ -84,25 +85,25 @@ def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
 def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
     """dR_dq, dR_dv of impacts with the ground; of pairs, -= the same across the two bodies."""
     ground = model.contact_height.shape[0]
-    for m in range(work.counts[0]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            if work.bounce[c, 1] != 0.0:
-                _add_ground(model, work, h, c)
-                _add_composites(model, work, h, c)
+    for m in range(work.active_ground_count[0]):
+        c = work.active[m]
+        if work.bounce[c, Bounce.RESTITUTION] != 0.0:
+            _add_ground(model, work, h, c)
+            _add_composites(model, work, h, c)
     for j in range(model.pair_kind.shape[0]):
         b = work.bounce[ground + j]
         one = model.coupling_body[model.pair_coupling[j], 0]
         two = model.coupling_body[model.pair_coupling[j], 1]
-        if b[1] == 0.0 or two < 0:
+        if b[Bounce.RESTITUTION] == 0.0 or two < 0:
             continue
         f, t = gap_wrench(model, work, ground + j)
         for side in range(2):
             i = one if side == 0 else two
             k = two if side == 0 else one
             join(work.couple_wrench, f, t)
-            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dq)
-            _across(model, work, (i, k), -b[1], b[2:8], work.S1, work.dR_dv)
-            _across(model, work, (i, k), b[1] - 1.0, b[8:14], work.S2, work.dR_dq)
+            _across(model, work, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], work.S1, work.dR_dq)
+            _across(model, work, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], work.S1, work.dR_dv)
+            _across(model, work, (i, k), b[Bounce.RESTITUTION] - 1.0, b[Bounce.ROW2 : Bounce.GAP1], work.S2, work.dR_dq)
 
 
 @kernel
@@ -115,10 +116,23 @@ def _rates(model: Model, work: Work, h: float, c: int, twists: tuple[Vector, Vec
     e = (s[3], s[4], s[5])
     u, v, w = cross(s[3], s[4], s[5], p[0] - o[0], p[1] - o[1], p[2] - o[2])
     x = (s[0] + u, s[1] + v, s[2] + w)
-    r = (k[3], k[4], k[5])
-    gap = dot(k[18:21], t[:3]) + dot(k[9:12], t[3:]) - b[1] * dot(b[2:8], s1) - (1.0 - b[1]) * dot(b[8:14], s)
-    one = dot(k[21:24], t[:3]) + dot(k[12:15], t[3:]) + slip_rate(F[3], F[4], F[5], r, work.turn[i], x, e) / h
-    two = dot(k[24:27], t[:3]) + dot(k[15:18], t[3:]) + slip_rate(F[6], F[7], F[8], r, work.turn[i], x, e) / h
+    r = three(k, Kin.ARM)
+    gap = (
+        dot(k[Kin.BY_TRANSLATION : Kin.BY_TRANSLATION + 3], t[:3])
+        + dot(k[Kin.BY_ROTATION : Kin.BY_ROTATION + 3], t[3:])
+        - b[Bounce.RESTITUTION] * dot(b[Bounce.ROW1 : Bounce.ROW2], s1)
+        - (1.0 - b[Bounce.RESTITUTION]) * dot(b[Bounce.ROW2 : Bounce.GAP1], s)
+    )
+    one = (
+        dot(k[Kin.BY_TRANSLATION + 3 : Kin.BY_TRANSLATION + 6], t[:3])
+        + dot(k[Kin.BY_ROTATION + 3 : Kin.BY_ROTATION + 6], t[3:])
+        + slip_rate(F[3], F[4], F[5], r, work.turn[i], x, e) / h
+    )
+    two = (
+        dot(k[Kin.BY_TRANSLATION + 6 : Kin.BY_TRANSLATION + 9], t[:3])
+        + dot(k[Kin.BY_ROTATION + 6 : Kin.BY_TRANSLATION], t[3:])
+        + slip_rate(F[6], F[7], F[8], r, work.turn[i], x, e) / h
+    )
     return gap, one, two
 
 
@@ -131,7 +145,7 @@ def _impulse_wrench(model: Model, work: Work, c: int, g: Vec3) -> None:
     f1 = W[3] * g[0] + W[4] * g[1] + W[5] * g[2]
     f2 = W[6] * g[0] + W[7] * g[1] + W[8] * g[2]
     f = transposed_times(work.contact_frame[c], fn, f1, f2)
-    t = cross(p[0] - o[0] + k[3], p[1] - o[1] + k[4], p[2] - o[2] + k[5], f[0], f[1], f[2])
+    t = cross(p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2], f[0], f[1], f[2])
     join(work.couple_wrench, f, t)
 
 

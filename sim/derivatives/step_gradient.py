@@ -27,8 +27,6 @@ from solvers.lanes import LANES, load, spread, store
 from solvers.rotation import Vec3, left_jacobian, quat_exp, quat_matrix
 from solvers.types import Matrix, Vector
 
-_JOINT = int(InputKind.JOINT)
-
 
 @optional(Slot.GRADIENT, default=False)
 def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix) -> bool:
@@ -96,7 +94,7 @@ def _input_columns(model: Model, work: Work, h: float) -> None:
             store(work.columns, d, 2 * nv + k, spread(0.0))
     for j in range(nu):
         col = 2 * nv + j
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             work.columns[model.input_index[j], col] = h
             continue
         w = work.couple_wrench

@@ -16,7 +16,7 @@ _HANDED_ON = 16  # steps until poses are computed from coordinates
 @kernel
 def follows_on(work: Work, q: Vector, v: Vector) -> bool:
     """Whether (q, v) is where the last step of this motion ended, with its configurations still in `work`."""
-    if work.counts[3] == 0:
+    if work.carried_steps[0] == 0:
         return False
     for k in range(q.shape[0]):
         if q[k] != work.theta3[k]:
@@ -109,6 +109,6 @@ def advance(model: Model, work: Work, h: float, q: Vector, v: Vector, before: Ve
                 _axis(model, work, i, d + k, a, work.pos1, work.rot1, work.S1)
                 a = (work.rot2[i, k], work.rot2[i, 3 + k], work.rot2[i, 6 + k])
                 _axis(model, work, i, d + k, a, work.pos2, work.rot2, work.S2)
-    if work.counts[3] % _HANDED_ON == 0:
+    if work.carried_steps[0] % _HANDED_ON == 0:
         tree_poses(model, work, q)
     arriving_momenta(work)

@@ -10,9 +10,6 @@ from solvers.dense import copy, dot
 from solvers.rotation import cross, rotate
 from solvers.types import Cube, Integers, Matrix, Vector
 
-_JOINT = int(InputKind.JOINT)
-_BODY = int(InputKind.BODY)
-
 
 @kernel
 def set_external(work: Work, wrenches: Cube, t: int) -> None:
@@ -28,7 +25,7 @@ def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
     w = model.input_wrench[j]
     f = (w[0], w[1], w[2])
     t = (w[3], w[4], w[5])
-    if model.input_kind[j] == _BODY:
+    if model.input_kind[j] == InputKind.BODY:
         f = rotate(work.rot2, i, f[0], f[1], f[2])
         t = rotate(work.rot2, i, t[0], t[1], t[2])
     o = work.origin
@@ -53,7 +50,7 @@ def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
         t = cross(x, y, z, F[0], F[1], F[2])
         F[3], F[4], F[5] = t[0] + e[3], t[1] + e[4], t[2] + e[5]
     for j in range(u.shape[0]):
-        if model.input_kind[j] != _JOINT:
+        if model.input_kind[j] != InputKind.JOINT:
             w = work.wrench[0]
             input_wrench(model, work, j, w)
             for k in range(6):
@@ -86,14 +83,14 @@ def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
             w[k] = model.body_mass[i] * model.gravity[k] + work.external[i, k]
         _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], out[i])
     for j in range(u.shape[0]):
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             continue
         i = model.input_index[j]
         input_wrench(model, work, j, w)
         for k in range(6):
             w[k] *= u[j]
         N = out[i]
-        if model.input_kind[j] != _BODY:
+        if model.input_kind[j] != InputKind.BODY:
             _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], N)
             continue
         for r in range(3):  # S* w = (-[f] w_S, -[n] w_S - [f] v_S)
@@ -115,7 +112,7 @@ def input_slopes(model: Model, work: Work, free: Integers, out: Matrix) -> None:
         for d in range(out.shape[0]):
             out[d, j] = 0.0
         i = model.input_index[j]
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             out[i, j] = 1.0
             continue
         input_wrench(model, work, j, w)

@@ -21,8 +21,6 @@ from solvers.compiler import kernel
 from solvers.rotation import Mat3, cross, rotate
 from solvers.types import Matrix, Vector
 
-_BODY = int(InputKind.BODY)
-_JOINT = int(InputKind.JOINT)
 _HALF_TURN, _WHOLE_TURN = 9.8696, 39.4784  # pi^2 and (2 pi)^2, rounded down
 
 
@@ -64,7 +62,7 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
         advance(model, work, h, q, v, before)
         world_inertia(model, work.rot2, work.inertia_world)
     else:
-        work.counts[3] = 0
+        work.carried_steps[0] = 0
         tree_poses(model, work, q)
         move_back(model, work, h, q, v)
         world_inertia(model, work.rot2, work.inertia_world)
@@ -113,13 +111,13 @@ def turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
 @kernel
 def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
     """Add the impulse h u of a WORLD or BODY input to its body (JOINT inputs enter the generalized residual)."""
-    if model.input_kind[j] == _JOINT:
+    if model.input_kind[j] == InputKind.JOINT:
         return
     i = model.input_index[j]
     w = model.input_wrench[j]
     f = (h * u * w[0], h * u * w[1], h * u * w[2])
     t = (h * u * w[3], h * u * w[4], h * u * w[5])
-    if model.input_kind[j] == _BODY:
+    if model.input_kind[j] == InputKind.BODY:
         f = rotate(work.rot2, i, f[0], f[1], f[2])
         t = rotate(work.rot2, i, t[0], t[1], t[2])
         for k in range(3):

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.momentum_balance import body_jacobian
+from sim.model.columns import Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.lanes import load, store
-from solvers.rotation import cross, transposed_times
+from solvers.rotation import cross, three, transposed_times
 from solvers.types import Matrix, Vector
 
 
@@ -92,9 +93,9 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
     A = work.A2[i]
     w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
     ih = 1.0 / h
-    y0, y1, y2 = cross(k[3], k[4], k[5], F[3], F[4], F[5])
+    y0, y1, y2 = cross(*three(k, Kin.ARM), F[3], F[4], F[5])
     a0, a1, a2 = cross(sx, sy, sz, y0, y1, y2)
-    z0, z1, z2 = cross(k[3], k[4], k[5], F[6], F[7], F[8])
+    z0, z1, z2 = cross(*three(k, Kin.ARM), F[6], F[7], F[8])
     b0, b1, b2 = cross(sx, sy, sz, z0, z1, z2)
     C1 = (-F[3], -F[4], -F[5], a0 - w * y0, a1 - w * y1, a2 - w * y2)
     C2 = (-F[6], -F[7], -F[8], b0 - w * z0, b1 - w * z1, b2 - w * z2)
@@ -106,9 +107,9 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
         A[j] -= x
         A[6 + j] -= y
         A[12 + j] -= z
-        A[18 + j] -= k[4] * z - k[5] * y
-        A[24 + j] -= k[5] * x - k[3] * z
-        A[30 + j] -= k[3] * y - k[4] * x
+        A[18 + j] -= k[Kin.ARM + 1] * z - k[Kin.ARM + 2] * y
+        A[24 + j] -= k[Kin.ARM + 2] * x - k[Kin.ARM] * z
+        A[30 + j] -= k[Kin.ARM] * y - k[Kin.ARM + 1] * x
 
 
 @kernel

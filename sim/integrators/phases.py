@@ -8,7 +8,7 @@ g0, g1 are lower bounds of a gap where the step begins and where it ends, and d 
 a path no longer than d between two places g0 and g1 from the ground is nowhere nearer to it than g. Paths are no longer
 than d while accelerations hardly change within a step. A step that turns out to be near is not taken.
 
-Columns of `far` here, at the first contact of a cluster:  0 gap, 1 speed, of the node in `work`.
+Columns of `inactive` here, at the first contact of a cluster: Apart of sim/model/columns.py.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from sim.contact.inactive import cluster_gap, highest
 from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import Scheme, advance, begin
 from sim.mechanism.confined import IDLE
+from sim.model.columns import Apart
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
 from sim.model.model import Model
@@ -78,10 +79,10 @@ def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> flo
     total = 0.0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
-            row, speed = work.far[c], _speed(model, work, c)
+            row, speed = work.inactive[c], _speed(model, work, c)
             gap = cluster_gap(model, work, c, highest(model, c), False)
-            g = _least(gap, speed, row[0], row[1], h)
-            row[0], row[1] = gap, speed
+            g = _least(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
+            row[Apart.GAP], row[Apart.SPEED] = gap, speed
             total = total + (model.cluster_end[c] - c) * kappa / g if g > 0.0 else 1e300
     for k in range(model.limit_dof.shape[0]):
         gap, speed = _limit(model, work, k, v)
@@ -134,11 +135,11 @@ def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
         t[0], t[1], t[2], t[3] = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
         for k in range(3):
             work.move[i, k] = work.pos3[i, k] - work.pos2[i, k]
-    work.counts[1] = 0
+    work.inactive_count[0] = 0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0:
-            work.far_first[work.counts[1]] = c
-            work.counts[1] += 1
+            work.inactive_first[work.inactive_count[0]] = c
+            work.inactive_count[0] += 1
         work.bounce[c, 0] = 0.0
         for k in range(work.cone.shape[1]):
             work.cone[c, k] = 0.0

@@ -71,18 +71,16 @@ def options_of(work: Work, settings: Vector, begins: bool) -> Options:
 
 @kernel
 def begin(work: Work) -> None:
-    """Forget the motion before."""
-    work.counts[3] = 0
+    """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
+    work.carried_steps[0] = 0
+    work.inactive_kappa[0] = 0.0
+    clear(work.cone_step)
+    clear(work.bound_step)
     clear(work.external)
-    # what is known of far contacts (contact/inactive.py), forces of loops and last directions belong to another motion
-    work.far_law[0] = 0.0
     for row in range(work.couple_force.shape[0]):
         work.couple_force[row] = 0.0
-    for c in range(work.cone_step.shape[0]):
-        for k in range(work.cone_step.shape[1]):
-            work.cone_step[c, k] = 0.0
-    for k in range(work.bound_step.shape[0]):
-        work.bound_step[k, 0] = work.bound_step[k, 1] = 0.0
+    for k in range(work.couple_rank.shape[0]):
+        work.couple_rank[k] = 0.0
 
 
 @kernel

@@ -8,8 +8,22 @@ from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
 class Work(NamedTuple):
-    """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards."""
+    """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards.
 
+    The first block is no scratch: it is state between the steps of a motion (CARRY of layout.py), which a new motion
+    clears. The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`; they are used again
+    only where a motion goes on, as `carried_steps` and `Guess.impulses` say.
+    """
+
+    # state between steps
+    carried_steps: Integers  # (1,) steps of this motion, 0 where configurations have to be computed, see carry_over.py
+    external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
+    inactive_kappa: Vector  # (1,) kappa of the impulses of inactive contacts, 0 where none are known
+    cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
+    bound_step: Matrix  # (nlimit, 2) and of limits
+    couple_force: Vector  # (nrow,) impulses of loops
+    couple_rank: Vector  # (4,) of the dense system of loops, gears and pairs: CoupleRank
+    # scratch
     origin: Vector  # (3,) the reference point O
     # configurations 1, 2 and 3, and the motion between them
     theta1: Vector  # (nq,) coordinates at 1
@@ -33,7 +47,6 @@ class Work(NamedTuple):
     inertia_world: Matrix  # (nbody, 9) at configuration 2
     momentum_in: Matrix  # (nbody, 6) momentum of interval 1-2 at node 2 plus applied impulses, at the centre of mass
     momentum_out: Matrix  # (nbody, 6) momentum of interval 2-3, likewise without impulses
-    external: Matrix  # (nbody, 6) external force at the centre of mass and torque in this step, world axes [N, N m]
     body_impulse: Matrix  # (nbody, 6) force and torque impulses of BODY inputs, world axes, at the centre of mass
     arm: Matrix  # (nbody, 6) at configuration 2, world axes: joint frame from the parent, joint point from the body
     turn_matrix: Matrix  # (nbody, 9) rotation matrix of the turn from configuration 2 to 1 or 3, less the identity
@@ -59,45 +72,48 @@ class Work(NamedTuple):
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
-    # near and far contacts
-    counts: (
-        Integers  # (4,) runs of near contacts (with that of pairs: 2), far clusters; steps handed on by carry_over.py
-    )
-    near: IntegerMatrix  # (ncontact, 2) first contact, and one past the last, of each run of near contacts
-    far_first: Integers  # (nground,) first contacts of the far clusters
+    # active contacts, part of the equations, and inactive ones, whose impulses are evaluated
+    active: Integers  # (ncontact,) the active contacts, those with the ground first
+    active_count: Integers  # (1,)
+    active_ground_count: Integers  # (1,) how many of them are with the ground
+    inactive_count: Integers  # (1,) inactive clusters
+    inactive_first: Integers  # (nground,) their first contacts
     pair_sides: Integers  # (npair,) axes that separate the shapes at configuration 2, at the first pair of a collision
     pair_code: Integers  # (npair,) elements that make each contact point, chosen where an attempt starts
-    pair_kept: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
-    loop_led: Integers  # (2,) rows of loop_lead in use; 1: in place of constraints too
+    pair_previous: Integers  # (npair,) of the choice before, those that pressed; 0 for the others
+    bifurcation_count: Integers  # (1,) rows of bifurcation_direction in use
+    bifurcation_replaces: Integers  # (1,) 1 where they stand in place of constraints, too
     loop_used: Integers  # (nrow,) scratch
-    coupling_live: Integers  # (ncoupling,) 1 for two bodies with near pairs
+    coupling_live: Integers  # (ncoupling,) 1 for two bodies with active pairs
     couple_live: IntegerMatrix  # (nrow, 2) rows of the dense system, with their couplings
-    pair_free: Integers  # (2,) where elements are chosen: AT_START, AT_EVERY_POSE, BESIDE_KEPT; [1] active_features.py
-    far: Matrix  # (nground, 37) see inactive.py
-    far_law: Vector  # (2,) kappa, and the change of a far cluster's impulses that nobody sees
+    feature_choice: Integers  # (1,) FeatureChoice: when active features of shapes are chosen
+    overlap_allowed: Integers  # (1,) 1 where a small overlap in other features is accepted
+    inactive: Matrix  # (nground, 37) Inactive, see contact/inactive.py
+    inactive_share: Vector  # (1,) change of a cluster's impulses below which they stand [N s]
     # contacts
-    cone: Matrix  # (ncontact, 12) cone variables, see contact/ground_contact.py
-    cone_step: Matrix  # (ncontact, 12)
+    cone: Matrix  # (ncontact, 12) cone variables: Cone or Pyramid
     cone_trial: Matrix  # (ncontact, 12)
-    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian
+    contact_kin: Matrix  # (ncontact, 27) gap, tangential velocity, arms and their Jacobian: Kin
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the ground, world axes
     contact_turn: Matrix  # (nground, 18) on terrain, rotation of the frame by the twist
-    bounce: Matrix  # (ncontact, 22) see contacts/restitution.py
+    bounce: Matrix  # (ncontact, 22) Bounce, see contact/restitution.py
     bounce_share: Vector  # (1,)
     contact_W: Matrix  # (ncontact, 9) d(impulse)/d(gap, slip), contact frame
-    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contacts/softening.py
+    contact_hard: Vector  # (1,) hardest contact of the last derivatives, see contact/softening.py
     contact_w: Matrix  # (ncontact, 3) constant part of the same
-    contact_scale: Matrix  # (ncontact, 16) scaling of the cone
+    contact_scale: Matrix  # (ncontact, 16) ConeScale or PyramidScale
     # pairs
     shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
-    pair_out: Matrix  # (npair, 43) what `collide` says
+    pair_out: Matrix  # (npair, 43) what `collide` finds: Witness
     pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
-    pair_apart: Vector  # (npair,) half the gap ahead of a far collision, 0 of a near one, at its first pair
-    pair_far_state: Vector  # (3,) see pairs/inactive_pairs.py
-    far_pose: Matrix  # (nbody, 7) poses where the far collisions were evaluated
-    far_wrench: Matrix  # (nbody, 6) their wrenches about O
+    pair_activation: Vector  # (npair,) at its first pair: half the gap ahead of an inactive collision, or 0
+    pair_travel: Vector  # (1,) displacement of a body after which inactive collisions are evaluated again [m]
+    pair_evaluated: Vector  # (1,) whether they have been in this step
+    pair_change: Vector  # (1,) bound of the change of their wrenches per displacement, 0 where there are none
+    inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
+    inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
     pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
@@ -116,11 +132,9 @@ class Work(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
-    couple_rank: Vector  # (4,) rank and size of the dense system, its least pivot that counts, least deficiency
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops
-    couple_force: Vector  # (nrow,) impulses of loops
     couple_step: Vector  # (nrow,)
     couple_trial: Vector  # (nrow,)
     couple_panel: Matrix  # (nrow, 2 nv + nu)
@@ -131,13 +145,12 @@ class Work(NamedTuple):
     loop_start: Vector  # (nv,) where it looks for another one
     loop_kept: Vector  # (nv,) the first of them
     loop_pivot: Vector  # (1,) least pivot of the dense system at configuration 2
-    loop_lead: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loops/bifurcation.py
+    bifurcation_direction: Matrix  # (nrow, nv) directions of forces in joint space, or 0, see loops/bifurcation.py
     loop_scale: Vector  # (nrow,) scratch
     loop_open: Vector  # (nrow,) |gap| of loops at configuration 2
     gear_rate: Matrix  # (ngear, 2) d(gap)/d(v25) of both
     # limits
-    bound: Matrix  # (nlimit, 2) slack, impulse
-    bound_step: Matrix  # (nlimit, 2)
+    bound: Matrix  # (nlimit, 2) Bound
     bound_trial: Matrix  # (nlimit, 2)
     bound_row: Matrix  # (nlimit, 6) of a cone: torque per unit of impulse, and d(gap)/d(v25); by rotation
     bound_gap: Vector  # (nlimit,)

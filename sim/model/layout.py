@@ -13,7 +13,7 @@ from sim.model.slots import Slot
 from solvers.compiler import Field, record, table
 from solvers.lanes import LANES, SIDE, whole
 
-__all__ = ["MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
+__all__ = ["CARRY", "MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
            "allocate_work", "model_view", "sizes_of", "table", "work_view"]  # fmt: skip
 
 Shape = tuple[int | str, ...]
@@ -54,42 +54,55 @@ MODEL_FLOATS = _shapes(
     """
 )
 
-WORK_INTS = _shapes(
+# state between the steps of a motion: `begin` of integrators/rollout.py clears all of it
+CARRY_INTS = _shapes("carried_steps 1")
+CARRY_FLOATS = _shapes(
     """
-    counts 4, near ncontact 2, far_first nground, pair_sides npair, pair_code npair, pair_kept npair, pair_free 2,
-    loop_led 2, loop_used nrow, reach_of nreach, coupling_live ncoupling, couple_live nrow 2
+    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, couple_force nrow, couple_rank 4
+    """
+)
+CARRY = (*CARRY_INTS, *CARRY_FLOATS)
+
+WORK_INTS = CARRY_INTS | _shapes(
+    """
+    active_ground_count 1, active_count 1, inactive_count 1, active ncontact, inactive_first nground,
+    pair_sides npair, pair_code npair, pair_previous npair,
+    feature_choice 1, overlap_allowed 1, bifurcation_count 1, bifurcation_replaces 1, loop_used nrow, reach_of nreach,
+    coupling_live ncoupling,
+    couple_live nrow 2
     """
 )
 
-WORK_FLOATS = _shapes(
+WORK_FLOATS = CARRY_FLOATS | _shapes(
     """
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
-    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, external nbody 6, body_impulse nbody 6,
+    S3nu nv 6, inertia_world nbody 9, momentum_in nbody 6, momentum_out nbody 6, body_impulse nbody 6,
     arm nbody 6, turn_matrix nbody 9, move_in nbody 3, move nbody 3, turn_in nbody 4, turn nbody 4,
     balance nbody 6, node_inertia nbody 9, node_momentum nbody 6, node_p nv, node_share nv,
     wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
     articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
-    joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_step ncontact 12, cone_trial ncontact 12,
+    joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
     contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,
-    bound_step nlimit 2, bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
+     bound_trial nlimit 2, bound_row nlimit 6, bound_gap nlimit, bound_w nlimit,
     shape_pos 2npair 3, shape_rot 2npair 9, pair_relative npair 12, pair_out npair 43,
     pair_frame npair 12, pair_trial 1 43,
-    pair_before npair 13, pair_apart npair, pair_far_state 3, far_pose nbody 7, far_wrench nbody 6,
+    pair_before npair 13, pair_activation npair, pair_travel 1, pair_evaluated 1, pair_change 1,
+    inactive_pose nbody 7, inactive_wrench nbody 6,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
-    couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_force nrow, couple_step nrow, couple_trial nrow,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2,
+    couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_step nrow, couple_trial nrow,
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
-    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, loop_lead nrow nv, loop_scale nrow,
+    loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, bifurcation_direction nrow nv, loop_scale nrow,
     loop_open nrow, gear_rate ngear 2,
     A1 nbody 36, A2 nbody 36, A3 nbody 36, F nv 24, G nv 24, S_across 18 nwide, F_across 12 nwide,
     triangles nv nwide, triangle_across 12 nwide,
     dR_dq nv nwide, dR_dv nv nwide, columns nv ncolumn, panel 6nbody npanel,
     step_A 2nv 2nv, step_B 2nv nu, chain 2nv 2nv+nu, step_x 2 nx, report 6, pace 2,
-    far nground 37, far_law 2,
+    inactive nground 37, inactive_share 1,
     reach nv nreach, delassus nreach nreach, reach_rate nreach, reach_impulse nreach, reach_friction nreach
     """
 )

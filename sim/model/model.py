@@ -92,14 +92,12 @@ class Model(NamedTuple):
     contact_restitution: Vector  # (ncontact,) share of the normal velocity that an impact gives back
     contact_frame: Matrix  # (nground, 9) rows: normal and two tangents of the half-space, world axes
     contact_height: Vector  # (nground,) the half-space is normal . x >= height [m]; of terrain, to be added to it
-    terrain_place: Matrix  # (nterrain, 8) see terrain/height_field.py
+    terrain_place: Matrix  # (nterrain, 8) Grid, see contact/height_field.py
     terrain_heights: Vector  # (nheight,) coefficients of all terrains [m]
     terrain_rates: Vector  # (nheight,) their derivatives by the radius of the contacts
-    cluster: (
-        Matrix  # (nground, 8) bounding balls and mobilities, in the row of the first contact; see contact/inactive.py
-    )
+    cluster: Matrix  # (nground, 8) in the row of the first contact of a cluster: Cluster
     pair_sizes: Matrix  # (npair, 8) of the shapes of a, then of b
-    pair_far: Matrix  # (npair, 7) what says that a collision is far (pairs/inactive_pairs.py), at its first pair
+    pair_far: Matrix  # (npair, 7) at the first pair of a collision, whether it is active: PairBound
     hull: Matrix  # (nhull, 4) tables of the polytopes that collide (collision/hull.py)
     body_reach: Vector  # (nbody,) largest distance of the shapes that collide from the centre of mass [m]
     pair_place: Matrix  # (2 npair, 12) centre and rotation of the shapes of a and of b in their bodies

@@ -1,7 +1,8 @@
-"""Options, Guess, Goal, Outcome: what a step is asked for, and how it ended."""
+"""Options, Guess, NewtonTarget, Outcome: what a step is asked for, and how it ended."""
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
 from solvers.status import Status
@@ -24,7 +25,7 @@ class Guess(NamedTuple):
     impulses: bool  # work holds the impulses of the step before
 
 
-class Goal(NamedTuple):
+class NewtonTarget(NamedTuple):
     """What a Newton step of the interior point aims at."""
 
     kappa: float  # target of the complementarity products
@@ -41,15 +42,29 @@ class Outcome(NamedTuple):
     violation: float  # largest |product - kappa| of complementary pairs
 
 
-# Work.pair_free: elements of the shapes in contact are chosen where an attempt starts; anew at every pose; or where it
-# starts, with those that pressed kept beside them
-AT_START, AT_EVERY_POSE, BESIDE_KEPT = 0, 1, 2
+class FeatureChoice(IntEnum):
+    """When the active features of two shapes are chosen: the faces, edges and corners that are in contact."""
 
-# what a solution says of them: they are those that touch; others overlap; a point has gone through the other shape; and
-# whatever touches, the step gained energy
-PLACED, OVERLAPPING, ASTRAY, WOUND_UP = 0, 1, 2, 3
+    ONCE = 0  # where an attempt starts
+    EVERY_POSE = 1  # anew at every iterate
+    WITH_PREVIOUS = 2  # where an attempt starts, beside the previous features that pressed
 
-# forms of a contact law in a matrix: as it stands; linear in the slip of what sticks; soft enough for its digits
-PLAIN, LINEAR, SOFT = 0, 1, 2
+
+class Verdict(IntEnum):
+    """What the energy and the shapes say of a solution of the equations."""
+
+    VALID = 0
+    OVERLAPPING = 1  # in features that were not active
+    TUNNELLED = 2  # a point has passed through the other shape, or a collision gave energy
+    ENERGY_GAIN = 3  # the step gained energy
+
+
+class LawForm(IntEnum):
+    """Forms of a contact law in a matrix."""
+
+    PLAIN = 0  # as it stands
+    LINEAR = 1  # linear in the slip of contacts that stick
+    SOFT = 2  # soft enough for its digits: of derivatives
+
 
 FAILED = Outcome(int(Status.NO_PROGRESS), 0, 1e300, 1e300)

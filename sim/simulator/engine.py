@@ -292,8 +292,7 @@ class Engine:
         """Which contacts were far in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         work = work_view(self._scratch.table())
-        for first, last in work.near[: work.counts[2]]:
-            out[first:last] = False
+        out[work.active[: work.active_count[0]]] = False
         return out
 
     def last(self) -> Work:

@@ -1,4 +1,4 @@
-"""Complementarity of all near contacts, and all limits, at once: products, their violation, the way to the boundary."""
+"""Complementarity of all active contacts and all limits: products, their violation, the step to the boundary."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from sim.contact.contact_law import (
     contact_products_ahead,
     slip_violation,
 )
+from sim.model.columns import Bound
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -20,14 +21,14 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
     total = 0.0
     count = 0.0
     violation = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            t, n, low, high = contact_products(model, work, c)
-            total += t
-            count += n
-            violation = max(violation, high - kappa, kappa - low)
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        t, n, low, high = contact_products(model, work, c)
+        total += t
+        count += n
+        violation = max(violation, high - kappa, kappa - low)
     for k in range(model.limit_dof.shape[0]):
-        t = work.bound[k, 0] * work.bound[k, 1]
+        t = work.bound[k, Bound.SLACK] * work.bound[k, Bound.IMPULSE]
         total += t
         count += 1.0
         violation = max(violation, abs(t - kappa))
@@ -38,9 +39,9 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
 def slip_error(model: Model, work: Work, kappa: float) -> float:
     """Largest violation of the friction law of the central path of kappa, in units of kappa."""
     e = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            e = max(e, slip_violation(model, work, c, kappa))
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        e = max(e, slip_violation(model, work, c, kappa))
     return e
 
 
@@ -49,28 +50,28 @@ def products_ahead(model: Model, work: Work, alpha: float) -> float:
     """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
     total = 0.0
     count = 0.0
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            t, n = contact_products_ahead(model, work, c, alpha)
-            total += t
-            count += n
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        t, n = contact_products_ahead(model, work, c, alpha)
+        total += t
+        count += n
     for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
         d = work.bound_step[k]
-        total += (b[0] + alpha * d[0]) * (b[1] + alpha * d[1])
+        total += (b[Bound.SLACK] + alpha * d[Bound.SLACK]) * (b[Bound.IMPULSE] + alpha * d[Bound.IMPULSE])
         count += 1.0
-    return total / count if count > 0.0 else work.far_law[0]
+    return total / count if count > 0.0 else work.inactive_kappa[0]
 
 
 @kernel
 def boundary_step(model: Model, work: Work) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
     a = 1e30
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            a = min(a, contact_boundary(model, work, c))
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        a = min(a, contact_boundary(model, work, c))
     for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
         d = work.bound_step[k]
-        a = min(a, orthant_step(b[0], d[0]), orthant_step(b[1], d[1]))
+        a = min(a, orthant_step(b[Bound.SLACK], d[Bound.SLACK]), orthant_step(b[Bound.IMPULSE], d[Bound.IMPULSE]))
     return a

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from sim.contact.ground_contact import add_contact_wrench
 from sim.dynamics.elimination import dot_six
+from sim.model.columns import Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -49,7 +50,7 @@ def contact_rates(model: Model, work: Work, c: int, a: int) -> None:
     for e in range(3):
         r = work.twist[i]
         for k in range(3):
-            r[k], r[3 + k] = J[18 + 3 * e + k], J[9 + 3 * e + k]
+            r[k], r[3 + k] = J[Kin.BY_TRANSLATION + 3 * e + k], J[Kin.BY_ROTATION + 3 * e + k]
         _rates_above(model, work, i, a + e)
 
 

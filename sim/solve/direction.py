@@ -6,7 +6,7 @@ from sim.dynamics.elimination import factor, solve
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import LINEAR, PLAIN, Goal
+from sim.model.options import LawForm, NewtonTarget
 from sim.solve.complementarity import boundary_step, products_ahead
 from sim.solve.inequalities import condense_inequalities, inequality_rhs, recover_inequalities
 from sim.solve.matrix import free_matrix
@@ -36,7 +36,7 @@ def linearize_step(
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
         free_matrix(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share, LINEAR if near else PLAIN)
+        condense_inequalities(model, work, h, smoothing, share, LawForm.LINEAR if near else LawForm.PLAIN)
         sign = factor(model, work)
         if sign >= 0:
             break
@@ -63,10 +63,10 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
                 break
             share = 0.5 if phase == 2 else 0.1
             sigma = 1.0 - share
-        goal = Goal(max(kappa, sigma * mean), share, reach * reach if phase == 1 else 0.0)
+        target = NewtonTarget(max(kappa, sigma * mean), share, reach * reach if phase == 1 else 0.0)
         for d in range(work.dnu.shape[0]):
             work.dnu[d] = -share * work.residual[d]
-        inequality_rhs(model, work, goal)
+        inequality_rhs(model, work, target)
         solve(model, work, work.dnu, work.dnu)
         solve_coupling(model, work, share, work.dnu)
         recover_inequalities(model, work, h, share)

@@ -42,6 +42,7 @@ from sim.dynamics.joints.terms import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
 from sim.dynamics.mass import eliminate_mass
 from sim.dynamics.momentum_balance import world_inertia
+from sim.model.columns import Bound, BoundRow, Cone, Kin
 from sim.model.data import Work
 from sim.model.model import InputKind, Model
 from sim.model.options import Options
@@ -51,8 +52,6 @@ from solvers.dense import clear
 from solvers.rotation import cross, rotate
 from solvers.types import Vector
 
-_JOINT = int(InputKind.JOINT)
-_BODY = int(InputKind.BODY)
 LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an accepted step
 # cosines of half the turns below which there is no such work, without contacts and with them, and above which it says
 # nothing
@@ -128,7 +127,7 @@ def input_work(model: Model, work: Work, j: int, u: float) -> float:
     """Work of the WORLD or BODY input j at configuration 2 [J]."""
     i, w = model.input_index[j], model.input_wrench[j]
     f, t = (w[0], w[1], w[2]), (w[3], w[4], w[5])
-    if model.input_kind[j] == _BODY:
+    if model.input_kind[j] == InputKind.BODY:
         f, t = rotate(work.rot2, i, f[0], f[1], f[2]), rotate(work.rot2, i, t[0], t[1], t[2])
     total = 0.0
     for k in range(3):
@@ -150,12 +149,12 @@ def work_at_node(model: Model, work: Work, h: float, v: Vector, u: Vector) -> tu
         f[d] = dot_six(work.S2[d], work.subtree[model.dof_body[d]]) + model.dof_armature[d] * (work.nu[d] - v[d])
         f[d] += h * model.dof_damper[d] * work.nu[d]
     for k in range(model.limit_dof.shape[0]):
-        add_limit_impulse(model, work, k, -work.bound[k, 1], f)
+        add_limit_impulse(model, work, k, -work.bound[k, Bound.IMPULSE], f)
     for d in range(v.shape[0]):
         part = 0.5 * f[d] * (v[d] + work.nu[d])
         total, size = total + part, size + abs(part)
     for j in range(u.shape[0]):
-        if model.input_kind[j] != _JOINT:
+        if model.input_kind[j] != InputKind.JOINT:
             part = input_work(model, work, j, u[j])
             total, size = total + part, size + abs(part)
     for i in range(model.body_parent.shape[0]):
@@ -171,20 +170,24 @@ def work_at_node(model: Model, work: Work, h: float, v: Vector, u: Vector) -> tu
 def contact_slack(model: Model, work: Work, options: Options) -> float:
     """What contacts and limits may give to what overlapped where the step began [J], and kappa/h each."""
     total = pair_slack(model, work)
-    for m in range(work.counts[0]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            i, k, n = model.contact_body[c], work.contact_kin[c], work.contact_frame[c]
-            p = model.contact_point[c]
-            x, y, z = rotate(work.rot2, i, p[0], p[1], p[2])
-            rise = n[0] * (work.move[i, 0] + k[6] - x)
-            rise += n[1] * (work.move[i, 1] + k[7] - y) + n[2] * (work.move[i, 2] + k[8] - z)
-            total += work.cone[c, 1] * max(0.0, rise)
+    for m in range(work.active_ground_count[0]):
+        c = work.active[m]
+        i, k, n = model.contact_body[c], work.contact_kin[c], work.contact_frame[c]
+        p = model.contact_point[c]
+        x, y, z = rotate(work.rot2, i, p[0], p[1], p[2])
+        rise = n[0] * (work.move[i, 0] + k[Kin.POINT] - x)
+        rise += n[1] * (work.move[i, 1] + k[Kin.POINT + 1] - y) + n[2] * (work.move[i, 2] + k[Kin.POINT + 2] - z)
+        total += work.cone[c, Cone.IMPULSE] * max(0.0, rise)
     for k in range(model.limit_dof.shape[0]):
         d, b = model.limit_dof[k], work.bound_row[k]
         rise = model.limit_sign[k] * options.h * work.nu[d]
         if model.limit_cone[k]:
-            rise = b[3] * work.nu[d] + b[4] * work.nu[d + 1] + b[5] * work.nu[d + 2]
-        total += work.bound[k, 1] * max(0.0, rise)
+            rise = (
+                b[BoundRow.RATE] * work.nu[d]
+                + b[BoundRow.RATE + 1] * work.nu[d + 1]
+                + b[BoundRow.RATE + 2] * work.nu[d + 2]
+            )
+        total += work.bound[k, Bound.IMPULSE] * max(0.0, rise)
     return total / options.h + smoothing_energy(model, options)
 
 

@@ -23,7 +23,6 @@ from solvers.compiler import inlined, optional
 from solvers.status import Status
 from solvers.types import Vector
 
-_SOLVED = int(Status.SOLVED)
 _LEADS = 2  # times that directions of loops are found anew
 
 
@@ -36,21 +35,21 @@ def _after(r: Outcome, last: Outcome) -> Outcome:
 @optional(Slot.SOLVE_LOOPS)
 def solve_loops(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
     """`solve_step` on the branch of the loops' motion."""
-    r = Outcome(_SOLVED, 0, 0.0, 0.0)
+    r = Outcome(Status.SOLVED.value, 0, 0.0, 0.0)
     if loops_regular(model, work):
         r = _after(r, solve_step(model, work, options, q, v, u, guess))
         if stay_regular(model, work, r.status):
             return r
-        guess = Guess(guess.velocity, guess.impulses and r.status == _SOLVED)
+        guess = Guess(guess.velocity, guess.impulses and r.status == Status.SOLVED)
     if predict_loops(model, work, options.h, q, v, guess.velocity):
         guess = Guess(work.loop_velocity, guess.impulses)
     r = _after(r, solve_step(model, work, options, q, v, u, guess))
-    if r.status == _SOLVED and meet_ahead(model, work):
+    if r.status == Status.SOLVED and meet_ahead(model, work):
         r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
         if is_farther(model, work, r.status):
             r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
     for _ in range(_LEADS):
-        if r.status != _SOLVED or not lead_again(model, work, options.h, q):
+        if r.status != Status.SOLVED or not lead_again(model, work, options.h, q):
             break
         r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses)))
     return r

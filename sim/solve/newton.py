@@ -7,6 +7,7 @@ from sim.dynamics.elimination import solve
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.dynamics.momentum_balance import momentum_balance
+from sim.model.columns import CoupleRank
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import FAILED, Guess, Options, Outcome
@@ -17,10 +18,6 @@ from solvers.compiler import inlined, kernel, optional
 from solvers.status import Status
 from solvers.types import Vector
 
-_SOLVED = int(Status.SOLVED)
-_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
-_NO_PROGRESS = int(Status.NO_PROGRESS)
-_SINGULAR = int(Status.SINGULAR)
 _ROUNDED = 1e-10
 
 
@@ -62,7 +59,11 @@ def closed_to(work: Work, options: Options) -> float:
 
     Least pivot: the product of the distances of configurations 2 and 3 from there.
     """
-    return options.tolerance * max(work.couple_rank[2], _ROUNDED) ** 0.5 if work.couple_rank[1] > 0.0 else 1e300
+    return (
+        options.tolerance * max(work.couple_rank[CoupleRank.PIVOT], _ROUNDED) ** 0.5
+        if work.couple_rank[CoupleRank.SIZE] > 0.0
+        else 1e300
+    )
 
 
 @optional(Slot.NEWTON, default=FAILED)
@@ -89,7 +90,7 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
             if inside and iterations > 0 and r < floor:
                 break
             if halvings > 40:
-                return Outcome(_NO_PROGRESS, iterations, r, 0.0)
+                return Outcome(Status.NO_PROGRESS.value, iterations, r, 0.0)
             halvings += 1
             if iterations == 0:  # the start itself lies outside: slow everything down
                 for d in range(v.shape[0]):
@@ -99,13 +100,13 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         if r < options.tolerance and (gap < closed_to(work, options) or r >= last):
             break
         if iterations == options.max_iterations:
-            return Outcome(_MAX_ITERATIONS, iterations, r, 0.0)
+            return Outcome(Status.MAX_ITERATIONS.value, iterations, r, 0.0)
         iterations += 1
         halvings = 0
         last = r
         alpha = 1.0
         if not newton_step(model, work, h, q, v):
-            return Outcome(_SINGULAR, iterations, r, 0.0)
+            return Outcome(Status.SINGULAR.value, iterations, r, 0.0)
     turn_bodies(work, work.rot3)
     absorb_residual(model, work)
-    return Outcome(_SOLVED, iterations, r, 0.0)
+    return Outcome(Status.SOLVED.value, iterations, r, 0.0)

@@ -13,6 +13,7 @@ from __future__ import annotations
 from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
+from sim.model.columns import Bound, Cone, Kin
 from sim.model.data import Work
 from sim.model.model import Law, Model
 from sim.model.options import Options
@@ -21,14 +22,12 @@ from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.residual import residual_scale
-from sim.solve.trial_velocity import NOWHERE, place
+from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
 from solvers.compiler import kernel
 from solvers.gauss_seidel import gauss_seidel
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
-_LINEAR = int(Law.LINEAR)
-_NONLINEAR = int(Law.NONLINEAR)
 _NEAR = 0.2  # of the way to a contact that the motion goes: what may touch
 _STEPS = 2
 _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's method does more
@@ -37,12 +36,12 @@ _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's me
 @kernel
 def predictable(model: Model, work: Work) -> bool:
     """Whether `predict` knows all that acts: no pairs of bodies, loops, gears or friction pyramids."""
-    if work.counts[2] != work.counts[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
+    if work.active_count[0] != work.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return False
-    for m in range(work.counts[0]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            if law_of(model, c) == _LINEAR:
-                return False
+    for m in range(work.active_ground_count[0]):
+        c = work.active[m]
+        if law_of(model, c) == Law.LINEAR:
+            return False
     return True
 
 
@@ -57,15 +56,15 @@ def _take_contact(work: Work, j: int, c: int, rate: Vec3) -> None:
     """w and l of contact c, in rows j, j + 1, j + 2.   rate: `contact_rate`."""
     w, l = work.reach_rate, work.reach_impulse
     k, z = work.contact_kin[c], work.cone[c]
-    w[j], w[j + 1], w[j + 2] = k[0] + rate[0], k[1] + rate[1], k[2] + rate[2]
-    l[j], l[j + 1], l[j + 2] = z[1], z[2], z[3]
+    w[j], w[j + 1], w[j + 2] = k[Kin.GAP] + rate[0], k[Kin.SLIP1] + rate[1], k[Kin.SLIP2] + rate[2]
+    l[j], l[j + 1], l[j + 2] = z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
 
 
 @kernel
 def _take_limit(work: Work, j: int, k: int, rate: float) -> None:
     """w and l of limit k, in row j.   rate: `limit_rate`."""
     work.reach_rate[j] = work.bound_gap[k] + rate
-    work.reach_impulse[j] = work.bound[k, 1]
+    work.reach_impulse[j] = work.bound[k, Bound.IMPULSE]
 
 
 @kernel
@@ -83,35 +82,35 @@ def choose(model: Model, work: Work, h: float, kappa: float) -> tuple[int, int]:
     """
     most = work.reach_of.shape[0]
     n = 0
-    for m in range(work.counts[0]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            contact_jacobian(model, work, h, c)
-            rate = contact_rate(model, work, c)
-            gap = work.contact_kin[c, 0]
-            z = work.cone[c]
-            if _may_touch(gap, rate[0], z[0], z[1], kappa):
-                if n + 3 > most:
-                    return 0, -1
-                work.reach_of[n] = c
-                work.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == _NONLINEAR else 0.0
-                _take_contact(work, n, c, rate)
-                n += 3
-            else:
-                z[1], z[2], z[3] = kappa / (gap + rate[0]), 0.0, 0.0
+    for m in range(work.active_ground_count[0]):
+        c = work.active[m]
+        contact_jacobian(model, work, h, c)
+        rate = contact_rate(model, work, c)
+        gap = work.contact_kin[c, Kin.GAP]
+        z = work.cone[c]
+        if _may_touch(gap, rate[0], z[Cone.SLACK], z[Cone.IMPULSE], kappa):
+            if n + 3 > most:
+                return 0, -1
+            work.reach_of[n] = c
+            work.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == Law.NONLINEAR else 0.0
+            _take_contact(work, n, c, rate)
+            n += 3
+        else:
+            z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = kappa / (gap + rate[0]), 0.0, 0.0
     points = n // 3
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
             continue
         change = limit_rate(model, work, h, k)
         gap = work.bound_gap[k]
-        if _may_touch(gap, change, work.bound[k, 0], work.bound[k, 1], kappa):
+        if _may_touch(gap, change, work.bound[k, Bound.SLACK], work.bound[k, Bound.IMPULSE], kappa):
             if n + 1 > most:
                 return 0, -1
             work.reach_of[n] = k
             _take_limit(work, n, k, change)
             n += 1
         else:
-            work.bound[k, 1] = kappa / (gap + change)
+            work.bound[k, Bound.IMPULSE] = kappa / (gap + change)
     return points, n
 
 
@@ -131,9 +130,9 @@ def impulses(model: Model, work: Work, h: float, kappa: float, points: int, size
     settled = gauss_seidel(work.delassus, work.reach_friction, h, kappa, points, size, work.reach_rate, l)
     for j in range(0, 3 * points, 3):
         z = work.cone[work.reach_of[j]]
-        z[1], z[2], z[3] = l[j], l[j + 1], l[j + 2]
+        z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = l[j], l[j + 1], l[j + 2]
     for j in range(3 * points, size):
-        work.bound[work.reach_of[j], 1] = l[j]
+        work.bound[work.reach_of[j], Bound.IMPULSE] = l[j]
     return settled
 
 
@@ -147,7 +146,7 @@ def descend(model: Model, work: Work) -> None:
 
 @kernel
 def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
-    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, NOWHERE where that
+    """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, INFEASIBLE where that
     fails.
 
     At nu with the impulses of the step before, whose residual is in work.residual.
@@ -156,11 +155,11 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
     h, kappa = options.h, options.kappa
     scale = residual_scale(work)
     if not factor_free(model, work, h, q, v):
-        return NOWHERE
+        return INFEASIBLE
     descend(model, work)
     points, size = choose(model, work, h, kappa)
     if size < 0:
-        return NOWHERE
+        return INFEASIBLE
     delassus(model, work, h, points, size)
     settled = True
     step = 1
@@ -171,8 +170,8 @@ def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Ve
             descend(model, work)
         for d in range(v.shape[0]):
             work.dnu[d] += work.nu[d]
-        if not place(model, work, h, q, work.dnu, 1.0):
-            return NOWHERE
+        if not set_trial_velocity(model, work, h, q, work.dnu, 1.0):
+            return INFEASIBLE
         resume_inequalities(model, work, h, kappa, True)
         balance = residuals(model, work, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:

@@ -15,13 +15,6 @@ from solvers.compiler import Table, kernel
 from solvers.status import Status
 from solvers.types import Vector
 
-_SOLVED = int(Status.SOLVED)
-_MAX_ITERATIONS = int(Status.MAX_ITERATIONS)
-_NO_PROGRESS = int(Status.NO_PROGRESS)
-_NOT_FINITE = int(Status.NOT_FINITE)
-_SINGULAR = int(Status.SINGULAR)
-_ANGULAR_STEP = int(Status.ANGULAR_STEP)
-
 
 @kernel
 def momentum_of_velocity(model: Model, work: Work, v: Vector, out: Vector) -> None:
@@ -109,13 +102,13 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
     for _ in range(50):
         _turn_back(work)
         if not turns_below_half(model, work, h, v):
-            return _ANGULAR_STEP
+            return Status.ANGULAR_STEP.value
         if not error < 1e300:
-            return _NOT_FINITE
+            return Status.NOT_FINITE.value
         if error <= 1e-14 * scale:
-            return _SOLVED
+            return Status.SOLVED.value
         if not newton_direction(model, work, h, v):
-            return _SINGULAR
+            return Status.SINGULAR.value
         for d in range(nv):
             work.nu_trial[d] = v[d]
         alpha = 1.0
@@ -130,9 +123,11 @@ def start_state(model: Model, work: Work, h: float, velocity: Vector, x: Vector)
         if alpha <= 1e-6:
             for d in range(nv):
                 v[d] = work.nu_trial[d]
-            return _SOLVED if error <= 1e-11 * scale + rounding(model, work, h) else _NO_PROGRESS
+            return (
+                Status.SOLVED.value if error <= 1e-11 * scale + rounding(model, work, h) else Status.NO_PROGRESS.value
+            )
         error = trial
-    return _MAX_ITERATIONS
+    return Status.MAX_ITERATIONS.value
 
 
 @kernel

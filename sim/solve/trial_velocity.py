@@ -11,11 +11,11 @@ from sim.solve.inequalities import inequality_kinematics
 from solvers.compiler import kernel
 from solvers.types import Vector
 
-NOWHERE = (1e300, 1e300)  # residuals where nothing could be placed
+INFEASIBLE = (1e300, 1e300)  # residuals where no trial velocity is feasible
 
 
 @kernel
-def place(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float) -> bool:
+def set_trial_velocity(model: Model, work: Work, h: float, q: Vector, v: Vector, share: float) -> bool:
     """nu = share v, slowed down until no body turns by half a turn; False if that fails."""
     for _ in range(30):
         for d in range(v.shape[0]):

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim.integrators.rollout import begin
 from sim.model.data import Work
 from sim.model.layout import (
+    CARRY,
     MODEL_FIELDS,
     MODEL_INTS,
     WORK_FIELDS,
@@ -119,3 +121,17 @@ def test_python_reads_the_same_arrays(sizes: Sizes) -> None:
     for mine, theirs in zip(work, seen, strict=True):
         assert theirs.shape == mine.shape and theirs.dtype == mine.dtype
         np.testing.assert_array_equal(theirs, mine)
+
+
+@kernel
+def _begin(work_at: Table) -> None:
+    begin(work_view(work_at))
+
+
+def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
+    work = allocate_work(ALL._replace(nrow=3))
+    for array in work:
+        array[...] = 7
+    _begin(table(work))
+    cleared = {name for name, array in zip(work._fields, work, strict=True) if array.size and not array.any()}
+    assert cleared == set(CARRY)

@@ -1,22 +1,21 @@
-"""Which elements of two shapes are in contact: faces, edges, corners. A discrete choice, made once per attempt.
+"""The active features of two shapes: the faces, edges and corners in contact. A discrete choice, made once per attempt.
 
-A step finds the pose at its end; the elements that touch there are not known before. Were they chosen anew at every
-iterate, gaps and normals would jump from one to the next, and at a corner that slides over an edge there may be no
-solution at all. So they are chosen where an attempt starts, and kept: the equations are smooth. A solution at which
-the shapes overlap in other elements is none; these are chosen then, and the step is solved again.
+A step finds the pose at its end; the features that touch there are not known before. If they were chosen anew at every
+iterate, gaps and normals would jump, and at a corner that slides over an edge there may be no solution at all. So they
+are chosen where an attempt starts, and kept: the equations are smooth. A solution at which the shapes overlap in other
+features is refused; these become active, and the step is solved again.
 
-Where a solution with some elements overlaps in others, and one with these in the first ones, both are taken.
+Where a solution with some features overlaps in others, and the one with these overlaps in the first, both are taken.
 
-Only elements that did not overlap when the step began are chosen: a contact pushes along the normal that it has at the
-end of the step, and where its two elements, prolonged to lines and planes, had to move apart to get there, it adds
-energy. That is so where they overlapped along the normal that they had then, and along the one that they have in the
-end. (Shapes that overlap at the beginning have no others; they are pushed out, and that adds energy.) Where a point
-of a collision with a cylinder is lost so, and has nothing instead, all elements of the collision are those of the
-beginning.
+Only features that did not overlap when the step began are chosen: a contact pushes along its normal at the end of the
+step, and where its two features, extended to lines and planes, had to move apart to get there, it adds energy. That is
+so where they overlapped along the normal at the beginning, and along the one at the end. (Shapes that overlap at the
+beginning have no others; they are pushed out, and that adds energy.) Where a point of a collision with a cylinder is
+lost in this way, and has no other feature, all features of the collision are those of the beginning.
 
-Shapes may slide from one element to another within a step. The one that they came to was below the other then, is left
-out, and overlaps in the end. Where several attempts end so (pair_free[1] is 1), normals may have turned on the way
-(`left_behind`), and a small overlap is left to the next step.
+Shapes may slide from one feature to another within a step. The feature that they reach was below the other at the
+beginning, is not chosen, and overlaps in the end. Where several attempts end so (`overlap_allowed`), normals may have
+turned on the way (`left_behind`), and a small overlap is left to the next step.
 """
 
 from __future__ import annotations
@@ -35,9 +34,10 @@ from sim.contact.pairs.previous_features import (
     remember,
     rounding_of_rims,
 )
+from sim.model.columns import Cone, RelativePose, Witness
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import ASTRAY, AT_EVERY_POSE, BESIDE_KEPT, OVERLAPPING, PLACED
+from sim.model.options import FeatureChoice, Verdict
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
@@ -53,9 +53,9 @@ def open_pairs(model: Model, work: Work, j: int) -> float:
     for k in range(12):
         work.pair_before[j, k] = work.pair_relative[j, k]
     pose = work.pair_before[j]
-    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9:12])
+    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP])
     apart = distance(model, work, j)
-    work.pair_before[j, 12] = min(apart, 0.0) - overlap_before(model, j)
+    work.pair_before[j, RelativePose.GAP] = min(apart, 0.0) - overlap_before(model, j)
     return apart
 
 
@@ -72,7 +72,7 @@ def distance(model: Model, work: Work, first: int) -> float:
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         choose(kind, j - first, faces, model.pair_sizes[j], model.hull, pose[:9], pose[9:], g)
-        least = min(least, g[0])
+        least = min(least, g[Witness.GAP])
         j += 1
     return least
 
@@ -81,7 +81,7 @@ def distance(model: Model, work: Work, first: int) -> float:
 def choose_shapes(model: Model, work: Work, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         remember(model, work, first)
     if on_cylinder(kind):
         choose_cylinders(model, work, first)
@@ -95,15 +95,17 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
         sizes = model.pair_sizes[j]
         code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         if code > 1 or code < 0:  # a choice
-            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-            if g[0] < before[12] and left_behind(work, kind, work.pair_out[j], pose, before, before[12]):
-                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9:12])
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
-                code = code if g[0] >= before[12] else 0
+            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+            if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
+                work, kind, work.pair_out[j], pose, before, before[RelativePose.GAP]
+            ):
+                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9 : RelativePose.GAP])
+                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+                code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
                 collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
         work.pair_code[j] = code
         j += 1
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, work, first)
         for k in range(first, j):
             sizes = model.pair_sizes[k]
@@ -112,9 +114,9 @@ def choose_shapes(model: Model, work: Work, first: int) -> None:
 
 @optional(Slot.CHOOSE_PAIRS)
 def choose_pairs(model: Model, work: Work) -> None:
-    """`choose_shapes` of the near collisions, at configuration 3."""
+    """`choose_shapes` of the active collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
+        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
             place_shapes(model, work, j, work.pos3, work.rot3)
             choose_shapes(model, work, j)
 
@@ -129,42 +131,47 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
     before = work.pair_before[first]
     g = work.pair_trial[0]
     close = NEAR * least_size(model, first)
-    least = before[12] - _LAST_RESORT * least_size(model, first)
+    least = before[RelativePose.GAP] - _LAST_RESORT * least_size(model, first)
     ground = model.contact_height.shape[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         code = work.pair_code[j]
-        if code != 0 and work.cone[ground + j, 0] < close:
+        if code != 0 and work.cone[ground + j, Cone.SLACK] < close:
             if on_cylinder(kind):
                 cylinder_before(model, work, first, j)
             else:
                 sizes = model.pair_sizes[first]
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9:12], g)
+                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
             now = work.pair_out[j]
-            turned = now[1] * g[1] + now[2] * g[2] + now[3] * g[3] < 0.0
-            doubtful = turned or g[0] < least
+            turned = (
+                now[Witness.NORMAL] * g[Witness.NORMAL]
+                + now[Witness.NORMAL + 1] * g[Witness.NORMAL + 1]
+                + now[Witness.NORMAL + 2] * g[Witness.NORMAL + 2]
+                < 0.0
+            )
+            doubtful = turned or g[Witness.GAP] < least
             if doubtful and left_behind(work, kind, now, work.pair_relative[first], before, least):
                 return True
         j += 1
     return False
 
 
-@optional(Slot.OVERLAPPING, default=PLACED)
+@optional(Slot.OVERLAPPING, default=Verdict.VALID)
 def overlapping(model: Model, work: Work) -> int:
-    """PLACED, or why the solution at configuration 3 is none: OVERLAPPING in elements that were not chosen, or ASTRAY
-    where a point has passed through the other shape.
+    """The Verdict on the solution at configuration 3: OVERLAPPING in features that were not active, TUNNELLED where a
+    point has passed through the other shape, or VALID.
     """
-    found = PLACED
+    found = Verdict.VALID.value
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_apart[j] == 0.0:
+        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
-            if signed and work.pair_free[0] == AT_EVERY_POSE:
+            if signed and work.feature_choice[0] == FeatureChoice.EVERY_POSE:
                 continue
             place_shapes(model, work, j, work.pos3, work.rot3)
             if not signed and passed_through(model, work, j):
-                return ASTRAY
-            lenient = work.pair_free[0] == AT_EVERY_POSE or work.pair_free[1] == 1
+                return Verdict.TUNNELLED.value
+            lenient = work.feature_choice[0] == FeatureChoice.EVERY_POSE or work.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
             if distance(model, work, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
-                found = OVERLAPPING
+                found = Verdict.OVERLAPPING.value
     return found

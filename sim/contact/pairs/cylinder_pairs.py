@@ -11,9 +11,10 @@ from sim.contact.collision.cylinders import (
     separation_of_cylinder,
 )
 from sim.contact.pairs.previous_features import keep, last_point, left_behind
+from sim.model.columns import RelativePose, Witness
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import BESIDE_KEPT
+from sim.model.options import FeatureChoice
 from sim.model.shape_kinds import SWAPPED, Pair
 from sim.model.slots import Slot
 from solvers.compiler import inner_kernel, optional
@@ -64,26 +65,26 @@ def choose_cylinders(model: Model, work: Work, first: int) -> None:
     """
     kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
     before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
-    R, r = before[:9], before[9:12]
+    R, r = before[:9], before[9 : RelativePose.GAP]
     missing = False
     choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
     for j in range(first, last_point(model, first)):
         k = j - first
         code = work.pair_code[j]
         collide_with_cylinder(kind, k, code, sizes, model.hull, R, r, turned, g)
-        lost = g[0] < before[12]
+        lost = g[Witness.GAP] < before[RelativePose.GAP]
         if lost:
             collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
-            lost = left_behind(work, kind, g, pose, before, before[12])
+            lost = left_behind(work, kind, g, pose, before, before[RelativePose.GAP])
         if lost:
             work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
             collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
-            if g[0] < before[12]:
+            if g[Witness.GAP] < before[RelativePose.GAP]:
                 work.pair_code[j] = 0
             missing = missing or work.pair_code[j] == 0
     if missing:
         choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
-    if work.pair_free[0] == BESIDE_KEPT:
+    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, work, first)
     put_all(model, work, first)
 
@@ -99,7 +100,7 @@ def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
         model.pair_sizes[first],
         model.hull,
         before[:9],
-        before[9:12],
+        before[9 : RelativePose.GAP],
         work.pair_scratch[:12],
         work.pair_trial[0],
     )

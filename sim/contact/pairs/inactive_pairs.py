@@ -1,22 +1,19 @@
-"""Far collisions: their law is evaluated, not solved for; they are no part of the matrix of a step.
+"""The active set of collisions: the law of an inactive one is evaluated, not solved for; it is no part of the matrix.
 
 As for contacts with the ground (contact/inactive.py): on the central path a contact is an explicit force law, gamma =
-kappa/gap and friction with it. Far away it changes little while a step is solved, so it is a given impulse. It is
-evaluated anew wherever the motion of the bodies may have changed it by more than the tolerance of the step; nothing is
-left out.
+kappa/gap and friction with it. At a large gap it changes little while a step is solved, so it is a given impulse. It is
+evaluated again wherever the motion of the bodies may have changed it by more than the tolerance of the step. No force
+is omitted.
 
-A collision is far when its stiffness, in units of the inertia behind it, does not slow Newton's method down:
+A collision is inactive when its stiffness, relative to the inertia behind it, does not slow Newton's method down:
 
     e = n kappa ((mu^2 + h (1 + mu)) M/a^2 + h (1 + mu) T/a) d <= 1e-2
 
-for its n points, a: half the gap ahead; M and T as in inactive.py, of both bodies; d: the collisions that one of
-its bodies has, so that the sum over them holds. A gap below a at the solution makes the collision near, and the step is
-solved again. Derivatives take all collisions as near ones (`all_near`): they are exact.
+for its n points at the activation gap a, half the gap ahead; M and T as in inactive.py, of both bodies; d: the
+collisions that one of its bodies has, so that the sum over them holds. A gap below a at the solution activates the
+collision, and the step is solved again. Derivatives take all collisions as active (`all_near`): they are exact.
 
-Columns of model.pair_far, at the first pair of a collision:  0 radii of the balls around the shapes, 1:3 largest
-distances of the shapes from the centres of mass, 3 M, 4 T, 5 d, 6 n.
-Of pair_far_state:  0 displacement of a body that makes them be evaluated again [m], 1 whether they have been, 2
-bound of the change of their wrenches per displacement, 0 where there is none.
+Columns of model.pair_far: PairBound of sim/model/columns.py.
 """
 
 from __future__ import annotations
@@ -28,43 +25,37 @@ from sim.contact.pairs.active_features import choose_shapes, open_pairs
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kinematics
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.dynamics.displacements import third_quaternion
+from sim.model.columns import PairBound, RelativePose, Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Options
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
-COUPLED = 1e-2  # largest sum of e over the far collisions of a body
+COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
 @optional(Slot.ENLIST_PAIRS)
 def enlist_pairs(model: Model, work: Work) -> None:
-    """Runs of near for the near collisions, after those of the ground; coupling_live, the bodies that they couple."""
+    """Append the pairs of active collisions to the active contacts; coupling_live, the bodies that they couple."""
     ground = model.contact_height.shape[0]
-    runs = work.counts[0]
-    first = runs
+    n = work.active_ground_count[0]
     for k in range(model.coupling_body.shape[0]):
         work.coupling_live[k] = 0
-    j = 0
-    while j < model.pair_kind.shape[0]:
-        end = j + 1
-        while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
-            end += 1
-        if work.pair_apart[j] == 0.0:
-            work.coupling_live[model.pair_coupling[j]] = 1
-            if runs > first and work.near[runs - 1, 1] == ground + j:
-                work.near[runs - 1, 1] = ground + end
-            else:
-                work.near[runs, 0] = ground + j
-                work.near[runs, 1] = ground + end
-                runs += 1
-        j = end
-    work.counts[2] = runs
+    first = 0
+    for j in range(model.pair_kind.shape[0]):
+        if model.pair_feature[j] == 0:
+            first = j
+        if work.pair_activation[first] == 0.0:
+            work.coupling_live[model.pair_coupling[first]] = 1
+            work.active[n] = ground + j
+            n += 1
+    work.active_count[0] = n
 
 
 @optional(Slot.BEGIN_PAIRS)
 def begin_pairs(model: Model, work: Work, options: Options) -> None:
-    """Which collisions are near, and what the shapes of these are at configuration 2, where the step begins."""
+    """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] > 0:
@@ -72,19 +63,19 @@ def begin_pairs(model: Model, work: Work, options: Options) -> None:
         place_shapes(model, work, j, work.pos2, work.rot2)
         r = work.pair_relative[j]
         travel = _travel(model, work, j)
-        apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, 0]
+        apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, PairBound.RADII]
         a = _far_enough(model, options, j, 0.5 * (apart - travel))
         if a == 0.0:
             a = _far_enough(model, options, j, 0.5 * (open_pairs(model, work, j) - travel))
         else:
             work.pair_sides[j] = OPEN
-            work.pair_before[j, 12] = -1e300
-        work.pair_apart[j] = a
+            work.pair_before[j, RelativePose.GAP] = -1e300
+        work.pair_activation[j] = a
         if a > 0.0:
             change += _change(model, work, options, j, a)
-    work.pair_far_state[0] = options.tolerance / change if change > 0.0 else 1e300
-    work.pair_far_state[1] = 0.0
-    work.pair_far_state[2] = change
+    work.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
+    work.pair_evaluated[0] = 0.0
+    work.pair_change[0] = change
 
 
 @kernel
@@ -96,55 +87,55 @@ def _travel(model: Model, work: Work, j: int) -> float:
         if i >= 0:
             for k in range(3):
                 d += abs(work.move_in[i, k])
-                d += 2.0 * model.pair_far[j, 1 + side] * abs(work.turn_in[i, 1 + k])
+                d += 2.0 * model.pair_far[j, PairBound.DISTANCE + side] * abs(work.turn_in[i, 1 + k])
     return d
 
 
 @kernel
 def _far_enough(model: Model, options: Options, j: int, a: float) -> float:
-    """a where a collision with this half gap is far, 0 where it is near."""
+    """a where a collision with this half gap is inactive, 0 where it is active."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     h = options.h
     if not a > 0.0:
         return 0.0
-    e = (mu * mu + h * (1.0 + mu)) * f[3] / a + h * (1.0 + mu) * f[4]
-    return a if f[6] * f[5] * options.kappa * e <= COUPLED * a else 0.0
+    e = (mu * mu + h * (1.0 + mu)) * f[PairBound.MOBILITY] / a + h * (1.0 + mu) * f[PairBound.TURNING]
+    return a if f[PairBound.POINTS] * f[PairBound.COLLISIONS] * options.kappa * e <= COUPLED * a else 0.0
 
 
 @kernel
 def _change(model: Model, work: Work, options: Options, j: int, a: float) -> float:
-    """Bound of the change of the wrench of a far collision per displacement d of its bodies; slips change by 2 d/h."""
+    """Bound of the change of an inactive collision's wrench per displacement d of its bodies; slips change by 2 d/h."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
     lever = 1.0
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
-            lever += f[1 + side]
+            lever += f[PairBound.DISTANCE + side]
             for k in range(3):
                 lever += abs(work.pos2[i, k] - work.origin[k])
-    push = f[6] * options.kappa / a
+    push = f[PairBound.POINTS] * options.kappa / a
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a)
 
 
 @optional(Slot.FAR_PAIR_IMPULSES)
 def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
-    """Wrenches of the far collisions at configuration 3, evaluated again where they may have changed."""
-    if work.pair_far_state[2] == 0.0 or not _moved(model, work):
+    """Wrenches of the inactive collisions at configuration 3, evaluated again where they may have changed."""
+    if work.pair_change[0] == 0.0 or not _moved(model, work):
         return
-    work.pair_far_state[1] = 1.0
-    for i in range(work.far_wrench.shape[0]):
+    work.pair_evaluated[0] = 1.0
+    for i in range(work.inactive_wrench.shape[0]):
         q = third_quaternion(work, i)
         for k in range(3):
-            work.far_pose[i, k] = work.pos3[i, k]
+            work.inactive_pose[i, k] = work.pos3[i, k]
         for k in range(4):
-            work.far_pose[i, 3 + k] = q[k]
+            work.inactive_pose[i, 3 + k] = q[k]
         for k in range(6):
-            work.far_wrench[i, k] = 0.0
+            work.inactive_wrench[i, k] = 0.0
     j = 0
     while j < model.pair_kind.shape[0]:
-        a = work.pair_apart[j]
+        a = work.pair_activation[j]
         end = j + 1
         while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
             end += 1
@@ -158,60 +149,60 @@ def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
 
 @kernel
 def _evaluate(model: Model, work: Work, h: float, j: int, kappa: float, a: float) -> None:
-    """Cone variables of one point of a far collision on the central path, and its wrench."""
+    """Cone variables of one point of an inactive collision on the central path, and its wrench."""
     c = model.contact_height.shape[0] + j
     point_kinematics(model, work, h, j)
     start_contact(model, work, c, kappa, a)
     if not is_absent(work, j):
         n, t1, t2 = contact_impulse(model, work, c)
-        add_pair_wrench(model, work, j, n, t1, t2, work.far_wrench)
+        add_pair_wrench(model, work, j, n, t1, t2, work.inactive_wrench)
 
 
 @kernel
 def _moved(model: Model, work: Work) -> bool:
-    """Whether some body has moved so far that the far wrenches may have changed by more than the tolerance."""
-    if work.pair_far_state[1] == 0.0:
+    """Whether some body has moved so far that the inactive wrenches may have changed by more than the tolerance."""
+    if work.pair_evaluated[0] == 0.0:
         return True
-    for i in range(work.far_pose.shape[0]):
+    for i in range(work.inactive_pose.shape[0]):
         reach = model.body_reach[i]
         if reach == 0.0:
             continue
         d = 0.0
         turn = 0.0
         for k in range(3):
-            d += abs(work.pos3[i, k] - work.far_pose[i, k])
+            d += abs(work.pos3[i, k] - work.inactive_pose[i, k])
         q = third_quaternion(work, i)
         for k in range(4):
-            turn += abs(q[k] - work.far_pose[i, 3 + k])
-        if not d + reach * ANGLE * turn <= work.pair_far_state[0]:
+            turn += abs(q[k] - work.inactive_pose[i, 3 + k])
+        if not d + reach * ANGLE * turn <= work.pair_travel[0]:
             return True
     return False
 
 
 @kernel
-def add_far_pairs(work: Work) -> None:
-    """wrench += those of the far collisions."""
-    if work.pair_far_state[2] == 0.0:
+def add_inactive_pairs(work: Work) -> None:
+    """wrench += those of the inactive collisions."""
+    if work.pair_change[0] == 0.0:
         return
     for i in range(work.wrench.shape[0]):
         for k in range(6):
-            work.wrench[i, k] += work.far_wrench[i, k]
+            work.wrench[i, k] += work.inactive_wrench[i, k]
 
 
 @optional(Slot.PAIRS_CAME_NEAR, default=False)
 def pairs_came_near(model: Model, work: Work) -> bool:
-    """Whether a far collision is not, at configuration 3; it is near from now on."""
+    """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
     j = 0
     while j < model.pair_kind.shape[0]:
-        least = work.pair_out[j, 0]
+        least = work.pair_out[j, Witness.GAP]
         end = j + 1
         while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
-            least = min(least, work.pair_out[end, 0])
+            least = min(least, work.pair_out[end, Witness.GAP])
             end += 1
-        if work.pair_apart[j] > 0.0 and least < work.pair_apart[j]:
+        if work.pair_activation[j] > 0.0 and least < work.pair_activation[j]:
             found = True
-            work.pair_apart[j] = 0.0
+            work.pair_activation[j] = 0.0
             place_shapes(model, work, j, work.pos2, work.rot2)
             open_pairs(model, work, j)
         j = end
@@ -220,7 +211,7 @@ def pairs_came_near(model: Model, work: Work) -> bool:
 
 @optional(Slot.ALL_NEAR)
 def all_near(model: Model, work: Work) -> None:
-    """All collisions taken as near ones, for the derivatives of a step that has been solved."""
+    """All collisions taken as active, for the derivatives of a step that has been solved."""
     for j in range(model.pair_kind.shape[0]):
-        work.pair_apart[j] = 0.0
+        work.pair_activation[j] = 0.0
     enlist_pairs(model, work)

@@ -20,12 +20,13 @@ from sim.contact.pairs.active_features import choose_shapes
 from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
+from sim.model.columns import Frame, Kin, Witness
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import AT_EVERY_POSE
+from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import Vec3, cross, rotate, transposed_times
+from solvers.rotation import Vec3, cross, rotate, three, transposed_times
 from solvers.types import Matrix
 
 POLE = (sin(0.6) * cos(1.1), sin(0.6) * sin(1.1), cos(0.6))  # where `tangents` begin
@@ -68,14 +69,14 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
     pose = work.pair_relative[first]
-    if work.pair_free[0] == AT_EVERY_POSE:
+    if work.feature_choice[0] == FeatureChoice.EVERY_POSE:
         choose_shapes(model, work, first)
     elif on_cylinder(kind):
         collide_cylinders(model, work, first)
         return
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        if work.pair_free[0] != AT_EVERY_POSE:
+        if work.feature_choice[0] != FeatureChoice.EVERY_POSE:
             collide_chosen(
                 kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
             )
@@ -85,18 +86,18 @@ def collide_shapes(model: Model, work: Work, first: int) -> None:
 @kernel
 def is_absent(work: Work, j: int) -> bool:
     """Whether the shapes have no such point now (a corner cut off): it has a gap of 1 m then, and no wrench."""
-    return work.pair_out[j, 0] > _NO_POINT
+    return work.pair_out[j, Witness.GAP] > _NO_POINT
 
 
 @optional(Slot.PAIR_KINEMATICS)
 def pair_kinematics(model: Model, work: Work, h: float) -> None:
-    """Gap, slip, frame and point of the pairs of near collisions at configuration 3."""
+    """Gap, slip, frame and point of the pairs of active collisions at configuration 3."""
     ground = model.contact_height.shape[0]
-    for m in range(work.counts[0], work.counts[2]):
-        for j in range(work.near[m, 0] - ground, work.near[m, 1] - ground):
-            if model.pair_feature[j] == 0:
-                collide_shapes(model, work, j)
-            point_kinematics(model, work, h, j)
+    for m in range(work.active_ground_count[0], work.active_count[0]):
+        j = work.active[m] - ground
+        if model.pair_feature[j] == 0:
+            collide_shapes(model, work, j)
+        point_kinematics(model, work, h, j)
 
 
 @kernel
@@ -107,23 +108,23 @@ def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
     g = work.pair_out[j]
     F = work.pair_frame[j]
     s = shape_b(model, j)
-    t1, t2 = tangents(g[1], g[2], g[3])
-    F[0], F[1], F[2] = rotate(work.shape_rot, s, g[1], g[2], g[3])
+    t1, t2 = tangents(*three(g, Witness.NORMAL))
+    F[0], F[1], F[2] = rotate(work.shape_rot, s, *three(g, Witness.NORMAL))
     F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
     F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
-    F[9], F[10], F[11] = rotate(work.shape_rot, s, g[4], g[5], g[6])
+    F[Frame.POINT], F[Frame.POINT + 1], F[Frame.POINT + 2] = rotate(work.shape_rot, s, *three(g, Witness.POINT))
     for k in range(3):
-        F[9 + k] += work.shape_pos[s, k]
-    ax, ay, az = point_velocity(work, h, a, F[9], F[10], F[11])
-    bx, by, bz = point_velocity(work, h, b, F[9], F[10], F[11])
+        F[Frame.POINT + k] += work.shape_pos[s, k]
+    ax, ay, az = point_velocity(work, h, a, *three(F, Frame.POINT))
+    bx, by, bz = point_velocity(work, h, b, *three(F, Frame.POINT))
     x, y, z = ax - bx, ay - by, az - bz
     kin = work.contact_kin[model.contact_height.shape[0] + j]
-    kin[0] = 1.0 if is_absent(work, j) else g[0]
-    kin[1] = F[3] * x + F[4] * y + F[5] * z
-    kin[2] = F[6] * x + F[7] * y + F[8] * z
-    kin[3] = F[9] - work.pos3[a, 0]
-    kin[4] = F[10] - work.pos3[a, 1]
-    kin[5] = F[11] - work.pos3[a, 2]
+    kin[Kin.GAP] = 1.0 if is_absent(work, j) else g[Witness.GAP]
+    kin[Kin.SLIP1] = F[3] * x + F[4] * y + F[5] * z
+    kin[Kin.SLIP2] = F[6] * x + F[7] * y + F[8] * z
+    kin[Kin.ARM] = F[Frame.POINT] - work.pos3[a, 0]
+    kin[Kin.ARM + 1] = F[Frame.POINT + 1] - work.pos3[a, 1]
+    kin[Kin.ARM + 2] = F[Frame.POINT + 2] - work.pos3[a, 2]
     if is_taut(model, work, j):
         pull_from_before(model, work, j)
 
@@ -158,9 +159,9 @@ def pair_arm(model: Model, work: Work, j: int) -> Vec3:
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)
     F = work.pair_frame[j]
-    x = F[9] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
-    y = F[10] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])
-    z = F[11] - work.origin[2] - wa * (work.pos3[a, 2] - work.pos2[a, 2])
+    x = F[Frame.POINT] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
+    y = F[Frame.POINT + 1] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])
+    z = F[Frame.POINT + 2] - work.origin[2] - wa * (work.pos3[a, 2] - work.pos2[a, 2])
     if b >= 0:
         x -= wb * (work.pos3[b, 0] - work.pos2[b, 0])
         y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])

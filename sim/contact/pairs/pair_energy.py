@@ -2,7 +2,7 @@
 
 An impulse acts along the normal at the end of a step. Where shapes that were apart have passed through one another, or
 an element was chosen that is none there, that normal points where the bodies came from, and the step gives them energy
-that they never had. So no solution is accepted whose impulses do both, over all near collisions j, P: where they act,
+that they never had. So no solution is accepted whose impulses do both, over all active collisions j, P: where they act,
 
     sum f.(u + u')/2 > allowed,    sum f.u' > allowed,    u, u' the relative velocities at P before and after
 
@@ -21,6 +21,7 @@ from sim.contact.pairs.previous_features import least_size, overlap_before, roun
 from sim.contact.pairs.string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
+from sim.model.columns import Bounce, Cone, RelativePose
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.options import Options
@@ -61,7 +62,7 @@ def power_after(model: Model, work: Work, h: float, j: int) -> float:
 @kernel
 def _overlapped(model: Model, work: Work, j: int) -> float:
     """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond what is rounding [m]."""
-    return max(0.0, -(work.pair_before[j, 12] + overlap_before(model, j)))
+    return max(0.0, -(work.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
 
 
 @optional(Slot.PAIR_SLACK, default=0.0)
@@ -72,7 +73,7 @@ def pair_slack(model: Model, work: Work) -> float:
         if model.pair_feature[j] == 0:
             overlap = _overlapped(model, work, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
         if not is_absent(work, j):
-            total += work.cone[model.contact_height.shape[0] + j, 1] * overlap
+            total += work.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
     return total
 
 
@@ -88,11 +89,16 @@ def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
             size = least_size(model, j)
             overlap = _overlapped(model, work, j)
             slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
-            counts = work.pair_apart[j] == 0.0 and overlap < _THROWN * size
-        if not counts or is_absent(work, j) or is_taut(model, work, j) or work.bounce[ground + j, 1] > 0.0:
+            counts = work.pair_activation[j] == 0.0 and overlap < _THROWN * size
+        if (
+            not counts
+            or is_absent(work, j)
+            or is_taut(model, work, j)
+            or work.bounce[ground + j, Bounce.RESTITUTION] > 0.0
+        ):
             continue
         gain += impulse_work(model, work, h, ground + j)
         power += power_after(model, work, h, j)
-        allowed += (2.0 * options.kappa + work.cone[ground + j, 1] * slack) / h
+        allowed += (2.0 * options.kappa + work.cone[ground + j, Cone.IMPULSE] * slack) / h
     least = min(gain, power)
     return least > allowed and least > allowed + 0.5 * _SHARE * twice_kinetic(model, work, h, v)

@@ -8,11 +8,12 @@ Everything moves with b, plus what the motion of a relative to b does:
 from __future__ import annotations
 
 from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
+from sim.model.columns import Frame, Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
-from solvers.rotation import Vec3, cross
+from solvers.rotation import Vec3, cross, three
 from solvers.types import Vector
 
 
@@ -41,11 +42,11 @@ def frame_turn(g: Vector, out: Vector) -> None:
 
     t2.dt1 = (n x a).dn / (1 + a.n), a the pole of `tangents`
     """
-    nx, ny, nz = g[1], g[2], g[3]
+    nx, ny, nz = three(g, Witness.NORMAL)
     spin = 1.0 / max(1.0 + POLE[0] * nx + POLE[1] * ny + POLE[2] * nz, 1e-12)
     sx, sy, sz = cross(nx, ny, nz, POLE[0], POLE[1], POLE[2])
     for k in range(6):
-        x, y, z = g[7 + k], g[13 + k], g[19 + k]
+        x, y, z = g[Witness.NORMAL_RATE + k], g[Witness.NORMAL_RATE + 6 + k], g[Witness.NORMAL_RATE + 12 + k]
         a, b, c = cross(nx, ny, nz, x, y, z)
         s = spin * (sx * x + sy * y + sz * z)
         out[k] = a + nx * s
@@ -94,7 +95,7 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
     Omega = work.pair_turn[j]
     M = work.pair_shift[j]
     F = work.pair_frame[j]
-    px, py, pz = F[9] - o[0], F[10] - o[1], F[11] - o[2]
+    px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
     Ca = work.pair_Ca[j]
     Cb = work.pair_Cb[j]
     n = gap_normal(model, work, j)
@@ -104,15 +105,15 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
         Ca[3 + k] = m[k]
         Cb[k] = -n[k]
         Cb[3 + k] = -m[k]
-    va = point_velocity(work, h, a, F[9], F[10], F[11])
-    vb = point_velocity(work, h, b, F[9], F[10], F[11])
+    va = point_velocity(work, h, a, *three(F, Frame.POINT))
+    vb = point_velocity(work, h, b, *three(F, Frame.POINT))
     q = 2.0 / h
     wx, wy, wz = q * work.turn[a, 1], q * work.turn[a, 2], q * work.turn[a, 3]
     if b >= 0:
         wx -= q * work.turn[b, 1]
         wy -= q * work.turn[b, 2]
         wz -= q * work.turn[b, 3]
-    ra = (F[9] - work.pos3[a, 0], F[10] - work.pos3[a, 1], F[11] - work.pos3[a, 2])
+    ra = (F[Frame.POINT] - work.pos3[a, 0], F[Frame.POINT + 1] - work.pos3[a, 1], F[Frame.POINT + 2] - work.pos3[a, 2])
     for e in range(1, 3):
         t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
         rows = work.pair_rows
@@ -120,7 +121,11 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
         for k in range(6):
             rows[1, k] = 0.0
         if b >= 0:
-            rb = (F[9] - work.pos3[b, 0], F[10] - work.pos3[b, 1], F[11] - work.pos3[b, 2])
+            rb = (
+                F[Frame.POINT] - work.pos3[b, 0],
+                F[Frame.POINT + 1] - work.pos3[b, 1],
+                F[Frame.POINT + 2] - work.pos3[b, 2],
+            )
             _slip_rows(work, h, b, -1.0, rb, t, rows[1])
         gp = cross(t[0], t[1], t[2], wx, wy, wz)
         gm = cross(px, py, pz, gp[0], gp[1], gp[2])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.pair_contact import is_absent
+from sim.model.columns import Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -18,6 +19,6 @@ def report_pairs(model: Model, work: Work, out: Matrix) -> None:
         c = model.contact_height.shape[0] + j
         report_contact(model, work, c, work.pair_frame[j], out[c])
         if is_absent(work, j):
-            out[c, 6] = work.pair_out[j, 0]
+            out[c, 6] = work.pair_out[j, Witness.GAP]
             for e in range(3):
                 out[c, e] = 0.0

@@ -8,15 +8,16 @@ with the impulses condensed, d(gamma, beta) = W (C_a zeta_a + C_b zeta_b). Rows 
 from __future__ import annotations
 
 from sim.contact.contact_law import condense_contact, contact_constant, contact_error, contact_impulse
-from sim.contact.pairs.inactive_pairs import add_far_pairs
+from sim.contact.pairs.inactive_pairs import add_inactive_pairs
 from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, pair_arm, pair_force, shares
 from sim.contact.pairs.pair_jacobian import pair_jacobian
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
+from sim.model.columns import Frame
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
@@ -70,7 +71,7 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
         e = pair_force(work, j, g[0], g[1], g[2])
         u = unit_vector(k - 3)
         r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
-        p = point_shift(k, F[9] - o[0], F[10] - o[1], F[11] - o[2])
+        p = point_shift(k, F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2])
         x = centre_shift(work, work.pos3, b, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
@@ -79,19 +80,19 @@ def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
 
 @optional(Slot.CONDENSE_PAIRS)
 def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
-    """coupling_K of the near pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
+    """coupling_K of the active pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
         if work.coupling_live[k] == 1:
             for e in range(36):
                 work.coupling_K[2 * k, e] = 0.0
                 work.coupling_K[2 * k + 1, e] = 0.0
-    for m in range(work.counts[0], work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            pair_jacobian(model, work, h, c - ground)
-            condense_contact(model, work, h, c, kappa, share, form)
-            if not is_absent(work, c - ground):
-                add_pair_stiffness(model, work, c - ground, share)
+    for m in range(work.active_ground_count[0], work.active_count[0]):
+        c = work.active[m]
+        pair_jacobian(model, work, h, c - ground)
+        condense_contact(model, work, h, c, kappa, share, form)
+        if not is_absent(work, c - ground):
+            add_pair_stiffness(model, work, c - ground, share)
 
 
 @optional(Slot.APPLY_PAIRS, default=0.0)
@@ -99,26 +100,26 @@ def apply_pairs(model: Model, work: Work) -> float:
     """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
     ground = model.contact_height.shape[0]
     r = 0.0
-    for m in range(work.counts[0], work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            n, t1, t2 = contact_impulse(model, work, c)
-            if not is_absent(work, c - ground):
-                add_pair_wrench(model, work, c - ground, n, t1, t2, work.wrench)
-            r = max(r, contact_error(model, work, c))
-    add_far_pairs(work)
+    for m in range(work.active_ground_count[0], work.active_count[0]):
+        c = work.active[m]
+        n, t1, t2 = contact_impulse(model, work, c)
+        if not is_absent(work, c - ground):
+            add_pair_wrench(model, work, c - ground, n, t1, t2, work.wrench)
+        r = max(r, contact_error(model, work, c))
+    add_inactive_pairs(work)
     return r
 
 
 @optional(Slot.PAIR_CONSTANTS)
-def pair_constants(model: Model, work: Work, goal: Goal) -> None:
-    """wrench -= constant parts of the impulses of the near pairs, for the goal of this Newton step."""
+def pair_constants(model: Model, work: Work, target: NewtonTarget) -> None:
+    """wrench -= constant parts of the impulses of the active pairs, for the target of this Newton step."""
     ground = model.contact_height.shape[0]
-    for m in range(work.counts[0], work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            contact_constant(model, work, c, goal)
-            w = work.contact_w[c]
-            if not is_absent(work, c - ground):
-                add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)
+    for m in range(work.active_ground_count[0], work.active_count[0]):
+        c = work.active[m]
+        contact_constant(model, work, c, target)
+        w = work.contact_w[c]
+        if not is_absent(work, c - ground):
+            add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)
 
 
 @kernel
@@ -143,7 +144,11 @@ def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> 
             continue
         sign = 1.0 if side == 0 else -1.0
         w = work.turn[i]
-        r = (F[9] - work.pos3[i, 0], F[10] - work.pos3[i, 1], F[11] - work.pos3[i, 2])
+        r = (
+            F[Frame.POINT] - work.pos3[i, 0],
+            F[Frame.POINT + 1] - work.pos3[i, 1],
+            F[Frame.POINT + 2] - work.pos3[i, 2],
+        )
         for k in range(6):
             x = centre_shift(work, work.pos2, i, k)
             e = unit_vector(k - 3)

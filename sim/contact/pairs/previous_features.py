@@ -11,11 +11,12 @@ from sim.contact.collision.box import to_a, to_b
 from sim.contact.collision.kept import elsewhere
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
+from sim.model.columns import Cone, Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, three
 from solvers.types import Matrix, Vector
 
 NEAR = 1e-3  # part of the smallest size of two shapes below which a gap is one that presses
@@ -85,7 +86,7 @@ def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
     have changed places, p' = R'^T (R p + r - r').
     """
     R, r = pose[:9], (pose[9], pose[10], pose[11])
-    p = (out[4], out[5], out[6])
+    p = three(out, Witness.POINT)
     if kind < SWAPPED:
         q = to_b(before[:9], to_a(R, (p[0] - r[0], p[1] - r[1], p[2] - r[2])))
         return p[0] - q[0] - before[9], p[1] - q[1] - before[10], p[2] - q[2] - before[11]
@@ -103,32 +104,32 @@ def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector
     the points seem to have been closer than they were by that angle times their motion.
     """
     moved = moved_since(kind, out, pose, before)
-    if work.pair_free[1] == 1:
+    if work.overlap_allowed[0] == 1:
         turn = 0.0
         for k in range(9):
             turn += (pose[k] - before[k]) ** 2
         least -= sqrt(0.5 * turn * dot(moved, moved))
-    return out[0] - dot((out[1], out[2], out[3]), moved) < least
+    return out[Witness.GAP] - dot(three(out, Witness.NORMAL), moved) < least
 
 
 @kernel
 def remember(model: Model, work: Work, first: int) -> None:
-    """pair_kept: the elements of the points of a collision that press; 0 for the others."""
+    """pair_previous: the features of the points of a collision that press; 0 for the others."""
     close = NEAR * least_size(model, first)
     ground = model.contact_height.shape[0]
     for j in range(first, last_point(model, first)):
-        pressing = work.pair_code[j] != 0 and work.cone[ground + j, 0] < close
-        work.pair_kept[j] = work.pair_code[j] if pressing else 0
+        pressing = work.pair_code[j] != 0 and work.cone[ground + j, Cone.SLACK] < close
+        work.pair_previous[j] = work.pair_code[j] if pressing else 0
 
 
 @kernel
 def keep(model: Model, work: Work, first: int) -> None:
-    """Elements of pair_kept that were not chosen again take the places of points that there are not now."""
+    """Features of pair_previous that were not chosen again take the places of points that there are not now."""
     end = last_point(model, first)
     begin = first + room(model.pair_kind[first], model.pair_sizes[first], model.hull)
     free = begin
     for j in range(first, end):
-        kept = work.pair_kept[j]
+        kept = work.pair_previous[j]
         if kept == 0 or kept == work.pair_code[j]:
             continue
         if j < begin:

@@ -21,7 +21,6 @@ from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate
 
-_STRING = int(Pair.STRING)
 _TAUT = 1e-3  # of the length: less slack than this
 _TURN = 0.2  # [rad] of the string and of its bodies in the step before: more is too fast to follow
 
@@ -52,7 +51,7 @@ def string_before(model: Model, work: Work, j: int) -> tuple[float, Vec3]:
 @optional(Slot.IS_TAUT, default=False)
 def is_taut(model: Model, work: Work, j: int) -> bool:
     """Whether pair j is a string that is taut at configuration 2, and turns slowly enough to pull as joints do."""
-    if model.pair_kind[j] % SWAPPED != _STRING:
+    if model.pair_kind[j] % SWAPPED != Pair.STRING:
         return False
     d, _ = string_before(model, work, j)
     length = model.pair_sizes[j, 0]

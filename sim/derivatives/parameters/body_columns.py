@@ -11,14 +11,12 @@ from math import cos, sin
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.directions import At
 from sim.dynamics.joints.ball_spring import spring_turns
+from sim.model.columns import Bound
 from sim.model.data import Work
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.rotation import Quat, Vec3, cross, left_jacobian, rotate
 from solvers.types import Vector
-
-_WORLD = int(InputKind.WORLD)
-_JOINT = int(InputKind.JOINT)
 
 
 @kernel
@@ -177,8 +175,8 @@ def add_bound(model: Model, work: Work, k: int, w: float, col: int) -> None:
     """-gamma/s;  of a cone of angle t  (gamma/s) (1 - gap cot t) p + gamma cot t p"""
     d = model.limit_dof[k]
     X = work.columns
-    gamma = work.bound[k, 1]
-    ratio = gamma / work.bound[k, 0]
+    gamma = work.bound[k, Bound.IMPULSE]
+    ratio = gamma / work.bound[k, Bound.SLACK]
     if model.limit_cone[k] == 0:
         X[d, col] += w * ratio
         return
@@ -192,12 +190,12 @@ def add_bound(model: Model, work: Work, k: int, w: float, col: int) -> None:
 @kernel
 def _input_wrench(model: Model, work: Work, j: int, u: Vector) -> tuple[Vec3, Vec3]:
     """Force and torque of input j on its body, world axes; zero for one on a joint."""
-    if model.input_kind[j] == _JOINT:
+    if model.input_kind[j] == InputKind.JOINT:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     e = model.input_wrench[j]
     f = (u[j] * e[0], u[j] * e[1], u[j] * e[2])
     t = (u[j] * e[3], u[j] * e[4], u[j] * e[5])
-    if model.input_kind[j] == _WORLD:
+    if model.input_kind[j] == InputKind.WORLD:
         return f, t
     i = model.input_index[j]
     return rotate(work.rot2, i, f[0], f[1], f[2]), rotate(work.rot2, i, t[0], t[1], t[2])
@@ -209,7 +207,7 @@ def add_input(model: Model, work: Work, at: At, j: int, k: int, w: float, col: i
     g = -at.h * at.u[j]
     e = unit_vector(k % 3)
     i = model.input_index[j]
-    if model.input_kind[j] != _WORLD:
+    if model.input_kind[j] != InputKind.WORLD:
         e = rotate(work.rot2, i, e[0], e[1], e[2])
     e = (g * e[0], g * e[1], g * e[2])
     f, t = (e, (0.0, 0.0, 0.0)) if k < 3 else ((0.0, 0.0, 0.0), e)
@@ -236,7 +234,7 @@ def add_time_step(model: Model, work: Work, at: At, w: float, col: int) -> None:
         add_wrench(model, work, i, f, t, w, col)
     for j in range(model.input_kind.shape[0]):
         i = model.input_index[j]
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             X[i, col] += w * at.u[j]
         else:
             f, t = _input_wrench(model, work, j, at.u)

@@ -38,43 +38,32 @@ from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.types import IntegerMatrix, Vector
 
-_MASS, _INERTIA = int(Effect.MASS), int(Effect.INERTIA)
-_PARENT_POINT, _AXIS = int(Effect.PARENT_POINT), int(Effect.AXIS)
-_SPRING, _DAMPER, _ARMATURE = int(Effect.SPRING), int(Effect.DAMPER), int(Effect.ARMATURE)
-_REST, _BOUND, _FRICTION, _POINT = int(Effect.REST), int(Effect.BOUND), int(Effect.FRICTION), int(Effect.POINT)
-_HEIGHT, _NORMAL, _GRAVITY = int(Effect.HEIGHT), int(Effect.NORMAL), int(Effect.GRAVITY)
-_TIME_STEP, _LOOP_PARENT, _LOOP_CHILD = int(Effect.TIME_STEP), int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
-_LOOP_TURN, _SHAPE_SHIFT = int(Effect.LOOP_TURN), int(Effect.SHAPE_SHIFT)
-_RADIUS, _RESTITUTION, _INPUT = int(Effect.RADIUS), int(Effect.RESTITUTION), int(Effect.INPUT)
-_GEAR_RATIO, _GEAR_OFFSET = int(Effect.GEAR_RATIO), int(Effect.GEAR_OFFSET)
-_SHAPE_SIZE = int(Effect.SHAPE_SIZE)
-
 
 @kernel
 def add_term(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: float, col: int) -> None:
     """columns[:, col] -= w dR/d(effect i, k)"""
-    if _PARENT_POINT <= effect <= _AXIS:
+    if Effect.PARENT_POINT <= effect <= Effect.AXIS:
         add_geometry(model, work, at, effect, i, k, w, col)
-    elif effect == _MASS:
+    elif effect == Effect.MASS:
         add_mass(model, work, at.h, i, w, col)
         add_pairs_mass(model, work, i, w, col)
-    elif effect == _INERTIA:
+    elif effect == Effect.INERTIA:
         add_inertia(model, work, at.h, i, k, w, col)
-    elif effect == _SPRING:
+    elif effect == Effect.SPRING:
         add_spring(model, work, at, i, w, col)
-    elif effect == _DAMPER:
+    elif effect == Effect.DAMPER:
         work.columns[i, col] -= w * at.h * work.nu[i]
-    elif effect == _ARMATURE:
+    elif effect == Effect.ARMATURE:
         work.columns[i, col] -= w * (work.nu[i] - at.v[i])
-    elif effect == _REST:
+    elif effect == Effect.REST:
         add_rest(model, work, at, i, k, w, col)
-    elif effect == _BOUND:
+    elif effect == Effect.BOUND:
         add_bound(model, work, i, w, col)
-    elif effect == _GRAVITY:
+    elif effect == Effect.GRAVITY:
         add_gravity(model, work, at.h, k, w, col)
-    elif effect == _INPUT:
+    elif effect == Effect.INPUT:
         add_input(model, work, at, i, k, w, col)
-    elif effect == _TIME_STEP:
+    elif effect == Effect.TIME_STEP:
         add_time_step(model, work, at, w, col)
         add_slips_time_step(model, work, at.h, w, col)
     else:
@@ -85,35 +74,35 @@ def add_term(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: f
 @kernel
 def add_contact_term(model: Model, work: Work, h: float, effect: int, i: int, k: int, w: float, col: int) -> None:
     """`add_term` of effects on contacts, those of pairs among them."""
-    if effect == _FRICTION:
+    if effect == Effect.FRICTION:
         add_friction(model, work, i, w, col)
-    elif effect == _RESTITUTION:
+    elif effect == Effect.RESTITUTION:
         add_restitution(model, work, i, w, col)
-    elif effect == _POINT:
+    elif effect == Effect.POINT:
         add_point(model, work, h, i, k, w, col)
-    elif effect == _RADIUS:
+    elif effect == Effect.RADIUS:
         add_radius(model, work, h, i, w, col)
         add_surface_radius(model, work, h, i, w, col)
-    elif effect == _HEIGHT:
+    elif effect == Effect.HEIGHT:
         add_height(model, work, i, w, col)
-    elif effect == _NORMAL:
+    elif effect == Effect.NORMAL:
         add_normal(model, work, h, i, k, w, col)
 
 
 @kernel
 def add_coupled_term(model: Model, work: Work, h: float, effect: int, i: int, k: int, w: float, col: int) -> None:
     """`add_term` of effects on what couples branches: shapes of collisions, loops, gears."""
-    if effect == _SHAPE_SHIFT:
+    if effect == Effect.SHAPE_SHIFT:
         add_shapes_shift(model, work, h, i, k, w, col)
-    elif effect == _SHAPE_SIZE:
+    elif effect == Effect.SHAPE_SIZE:
         add_shapes_size(model, work, h, i, k, w, col)
-    elif effect == _LOOP_PARENT or effect == _LOOP_CHILD:
+    elif effect == Effect.LOOP_PARENT or effect == Effect.LOOP_CHILD:
         add_loop_geometry(model, work, effect, i, k, w, col)
-    elif effect == _LOOP_TURN:
+    elif effect == Effect.LOOP_TURN:
         add_loop_turn(model, work, i, k, w, col)
-    elif effect == _GEAR_RATIO:
+    elif effect == Effect.GEAR_RATIO:
         add_gear_ratio(model, work, i, w, col)
-    elif effect == _GEAR_OFFSET:
+    elif effect == Effect.GEAR_OFFSET:
         add_gear_offset(model, work, i, w, col)
 
 

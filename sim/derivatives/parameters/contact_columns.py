@@ -12,20 +12,19 @@ from sim.contact.pairs.pair_contact import is_absent, pair_arm, pair_force
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.contact.terrain_contact import centre
 from sim.derivatives.parameters.body_columns import add_wrench, moment
+from sim.model.columns import Bounce, Cone, ConeScale, Kin
 from sim.model.data import Work
 from sim.model.model import Law, Model
 from solvers.compiler import kernel
-from solvers.rotation import Vec3, cross, rotate
+from solvers.rotation import Vec3, cross, rotate, three
 from solvers.types import Vector
-
-_NONLINEAR, _LINEAR = int(Law.NONLINEAR), int(Law.LINEAR)
 
 
 @kernel
-def is_near(work: Work, c: int) -> bool:
-    """Whether contact c had a part in the step; those too far to matter have none in its derivatives either."""
-    for m in range(work.counts[2]):
-        if work.near[m, 0] <= c < work.near[m, 1]:
+def is_active(work: Work, c: int) -> bool:
+    """Whether contact c was active in the step; inactive ones have no part in its derivatives either."""
+    for m in range(work.active_count[0]):
+        if work.active[m] == c:
             return True
     return False
 
@@ -45,13 +44,13 @@ def impulse_change(work: Work, c: int, gap: float, s1: float, s2: float) -> Vec3
 def friction_change(model: Model, work: Work, c: int) -> Vec3:
     """d(impulse)/d(friction) at the present gap and slip: gamma d(beta)/d(mu gamma)."""
     q = work.contact_scale[c]
-    gamma = work.cone[c, 1]
+    gamma = work.cone[c, Cone.IMPULSE]
     law = law_of(model, c)
-    if law == _NONLINEAR:
-        return 0.0, gamma * q[0], gamma * q[1]
-    if law == _LINEAR:
-        g = gamma * work.cone[c, 2] * q[6]
-        return 0.0, g * q[4], g * q[5]
+    if law == Law.NONLINEAR:
+        return 0.0, gamma * q[ConeScale.GROWTH], gamma * q[ConeScale.GROWTH + 1]
+    if law == Law.LINEAR:
+        g = gamma * work.cone[c, Cone.FRICTION1] * q[ConeScale.RESIDUAL + 4]
+        return 0.0, g * q[ConeScale.RESIDUAL + 2], g * q[ConeScale.RESIDUAL + 3]
     return 0.0, 0.0, 0.0
 
 
@@ -72,7 +71,7 @@ def add_ground(model: Model, work: Work, c: int, df: Vec3, dr: Vec3, w: float, c
     i = model.contact_body[c]
     k = work.contact_kin[c]
     f = ground_force(work, c, contact_impulse(model, work, c))
-    a = cross(k[3], k[4], k[5], df[0], df[1], df[2])
+    a = cross(*three(k, Kin.ARM), df[0], df[1], df[2])
     b = cross(dr[0], dr[1], dr[2], f[0], f[1], f[2])
     add_wrench(model, work, i, df, moment(work, i, df, (a[0] + b[0], a[1] + b[1], a[2] + b[2])), -w, col)
 
@@ -105,17 +104,17 @@ def add_impulse(model: Model, work: Work, c: int, p: Vec3, w: float, col: int) -
 @kernel
 def add_friction(model: Model, work: Work, c: int, w: float, col: int) -> None:
     """The friction coefficient of contact c."""
-    if is_near(work, c):
+    if is_active(work, c):
         add_impulse(model, work, c, friction_change(model, work, c), w, col)
 
 
 @kernel
 def add_slips_time_step(model: Model, work: Work, h: float, w: float, col: int) -> None:
     """The slips of all contacts, which are displacements over h: -slip/h."""
-    for m in range(work.counts[2]):
-        for c in range(work.near[m, 0], work.near[m, 1]):
-            k = work.contact_kin[c]
-            add_impulse(model, work, c, impulse_change(work, c, 0.0, -k[1] / h, -k[2] / h), w, col)
+    for m in range(work.active_count[0]):
+        c = work.active[m]
+        k = work.contact_kin[c]
+        add_impulse(model, work, c, impulse_change(work, c, 0.0, -k[Kin.SLIP1] / h, -k[Kin.SLIP2] / h), w, col)
 
 
 @kernel
@@ -128,8 +127,8 @@ def turning(work: Work, h: float, i: int, r: Vec3) -> Vec3:
 
 @kernel
 def floor_change(work: Work, c: int, d1: float, d2: float) -> float:
-    """Change of the floor of an impact (contact/restitution.py), of the gaps at 1 and 2; 0 where there is none."""
-    e = work.bounce[c, 1]
+    """Change of the floor of an impact (contacts/restitution.py), of the gaps at 1 and 2; 0 where there is none."""
+    e = work.bounce[c, Bounce.RESTITUTION]
     return (1.0 - e) * d2 + e * d1 if e > 0.0 else 0.0
 
 
@@ -137,8 +136,8 @@ def floor_change(work: Work, c: int, d1: float, d2: float) -> float:
 def add_restitution(model: Model, work: Work, c: int, w: float, col: int) -> None:
     """The restitution of contact c, in an impact: its floor rises by phi1 - phi2."""
     b = work.bounce[c]
-    if is_near(work, c) and b[1] > 0.0:
-        rise = (b[14] - b[15]) * b[1] / model.contact_restitution[c]
+    if is_active(work, c) and b[Bounce.RESTITUTION] > 0.0:
+        rise = (b[Bounce.GAP1] - b[Bounce.GAP2]) * b[Bounce.RESTITUTION] / model.contact_restitution[c]
         add_impulse(model, work, c, impulse_change(work, c, -rise, 0.0, 0.0), w, col)
 
 
@@ -153,7 +152,7 @@ def add_point(model: Model, work: Work, h: float, c: int, k: int, w: float, col:
 
     gap m.e    slip t.(omega x e) + a.(t x u - ..)    dr = e - rho a x n    df = F^T W d + a x f
     """
-    if not is_near(work, c):
+    if not is_active(work, c):
         return
     i = model.contact_body[c]
     F, kin = work.contact_frame[c], work.contact_kin[c]
@@ -184,7 +183,7 @@ def add_point(model: Model, work: Work, h: float, c: int, k: int, w: float, col:
 @kernel
 def add_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -> None:
     """dr = -n    gap n.dr = -1    slip T (omega x dr);  on terrain the gap is left to surface.py"""
-    if not is_near(work, c):
+    if not is_active(work, c):
         return
     F = work.contact_frame[c]
     dr = (-F[0], -F[1], -F[2])
@@ -197,19 +196,19 @@ def add_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -
 @kernel
 def add_height(model: Model, work: Work, c: int, w: float, col: int) -> None:
     """gap -1, -n_z on terrain"""
-    if not is_near(work, c):
+    if not is_active(work, c):
         return
     b = work.bounce[c]
     gap = -1.0 - floor_change(work, c, -1.0, -1.0)
     if model.contact_terrain[c] > 0:
-        gap = -work.contact_frame[c, 2] - floor_change(work, c, -b[4], -b[10])
+        gap = -work.contact_frame[c, 2] - floor_change(work, c, -b[Bounce.ROW1 + 2], -b[Bounce.ROW2 + 2])
     add_impulse(model, work, c, impulse_change(work, c, gap, 0.0, 0.0), w, col)
 
 
 @kernel
 def add_normal(model: Model, work: Work, h: float, c: int, k: int, w: float, col: int) -> None:
     """The half-space of contact c turns by e_k about the origin:  gap dn.(x3 + R3 p)"""
-    if is_near(work, c):
+    if is_active(work, c):
         F = work.contact_frame[c]
         e = unit_vector(k)
         n = cross(e[0], e[1], e[2], F[0], F[1], F[2])
@@ -231,7 +230,7 @@ def add_turn(model: Model, work: Work, h: float, c: int, e: Vec3, gap: float, w:
     rho = model.contact_radius[c]
     dr = (-rho * n[0], -rho * n[1], -rho * n[2])
     p, q = work.pos3[i], work.pos2[i]
-    u = turning(work, h, i, (kin[3], kin[4], kin[5]))
+    u = turning(work, h, i, three(kin, Kin.ARM))
     u = (u[0] + (p[0] - q[0]) / h, u[1] + (p[1] - q[1]) / h, u[2] + (p[2] - q[2]) / h)
     eu = cross(u[0], u[1], u[2], e[0], e[1], e[2])  # (e x t).u = t.(u x e)
     v = turning(work, h, i, dr)

@@ -16,14 +16,13 @@ from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
+from sim.model.columns import Bounce
 from sim.model.data import Work
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
 from solvers.types import Matrix, Vector
 
-_PARENT_POINT, _CHILD_POINT = int(Effect.PARENT_POINT), int(Effect.CHILD_POINT)
-_ORIENTATION = int(Effect.ORIENTATION)
 _PRODUCT = 9  # row of At.twists with F
 
 
@@ -73,11 +72,11 @@ def _joint_twist(
     p = model.body_parent[i]
     e = unit_vector(k)
     b = rotate(rot, i, e[0], e[1], e[2])
-    if effect == _CHILD_POINT:
+    if effect == Effect.CHILD_POINT:
         for j in range(3):
             out[0, j] = -b[j]
         return
-    if effect == _PARENT_POINT:
+    if effect == Effect.PARENT_POINT:
         if p >= 0:
             e = rotate(rot, p, e[0], e[1], e[2])
         for r in range(3):
@@ -103,7 +102,7 @@ def _joint_twist(
     c0, c1, c2 = rotate(rot, i, c[0], c[1], c[2])
     O = work.origin
     o = (pos[i, 0] + c0 - O[0], pos[i, 1] + c1 - O[1], pos[i, 2] + c2 - O[2])
-    if effect == _ORIENTATION:
+    if effect == Effect.ORIENTATION:
         for r in range(3):
             _add_rotation(out[r], (o[0] - t[0], o[1] - t[1], o[2] - t[2]), a)
     else:
@@ -179,7 +178,7 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
                     F[r] += work.couple_B[row, r] * t / work.couple_E[row]
             add_wrench(model, work, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
     for j in range(model.pair_kind.shape[0]):
-        if work.bounce[model.contact_height.shape[0] + j, 1] > 0.0:
+        if work.bounce[model.contact_height.shape[0] + j, Bounce.RESTITUTION] > 0.0:
             _add_coupled_impact(model, work, at, j, w, col)
 
 
@@ -188,7 +187,9 @@ def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col:
     """As `add_bounce_derivatives`: a floor that the motion of one body raises pushes the other."""
     c = model.contact_height.shape[0] + j
     b = work.bounce[c]
-    rise = b[1] * _dot(b[2:8], at.twists[0]) + (1.0 - b[1]) * _dot(b[8:14], at.twists[3])
+    rise = b[Bounce.RESTITUTION] * _dot(b[Bounce.ROW1 : Bounce.ROW2], at.twists[0]) + (
+        1.0 - b[Bounce.RESTITUTION]
+    ) * _dot(b[Bounce.ROW2 : Bounce.GAP1], at.twists[3])
     f, t = gap_wrench(model, work, c)
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]

@@ -21,6 +21,7 @@ from sim.derivatives.parameters.parameter_jacobian import coordinate_rows
 from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
+from sim.model.columns import Bounce, Grid
 from sim.model.data import Work
 from sim.model.layout import model_view, work_view
 from sim.model.model import Model
@@ -38,14 +39,14 @@ def spread(model: Model, k: int, at: Vec3, s: Vec3, X: Matrix, first: int, out: 
     """
     p = model.terrain_place[k]
     start, nx, ny = model.terrain_size[k, 0], model.terrain_size[k, 1], model.terrain_size[k, 2]
-    C, S = p[0], p[1]
-    i, a = cell(p[4] * (C * (at[0] - p[2]) + S * (at[1] - p[3])), nx)
-    j, b = cell(p[5] * (C * (at[1] - p[3]) - S * (at[0] - p[2])), ny)
+    C, S = p[Grid.DIRECTION], p[Grid.DIRECTION + 1]
+    i, a = cell(p[Grid.DENSITY] * (C * (at[0] - p[Grid.ORIGIN]) + S * (at[1] - p[Grid.ORIGIN + 1])), nx)
+    j, b = cell(p[Grid.DENSITY + 1] * (C * (at[1] - p[Grid.ORIGIN + 1]) - S * (at[0] - p[Grid.ORIGIN])), ny)
     for r in range(4):
         u, du, _ = weight(r, a)
         for c in range(4):
             v, dv, _ = weight(c, b)
-            f, fs, ft = u * v, p[4] * du * v, p[5] * u * dv
+            f, fs, ft = u * v, p[Grid.DENSITY] * du * v, p[Grid.DENSITY + 1] * u * dv
             fx, fy = C * fs - S * ft, S * fs + C * ft
             if s[0] != 0.0:
                 f, fx, fy = s[0] * f + s[1] * fx + s[2] * fy, 0.0, 0.0
@@ -59,7 +60,9 @@ def spread_earlier(model: Model, work: Work, c: int, configuration: int, X: Matr
     """What the floor of an impact feels of the ground below configuration 1 or 2."""
     k = model.contact_terrain[c] - 1
     b = work.bounce[c]
-    share, phi = (b[1], b[14]) if configuration == 1 else (1.0 - b[1], b[15])
+    share, phi = (
+        (b[Bounce.RESTITUTION], b[Bounce.GAP1]) if configuration == 1 else (1.0 - b[Bounce.RESTITUTION], b[Bounce.GAP2])
+    )
     pos, rot = (work.pos1, work.rot1) if configuration == 1 else (work.pos2, work.rot2)
     at = centre(model, c, pos, rot)
     _, Fx, Fy, _, _, _ = height_field(model, k, at[0], at[1])
@@ -76,7 +79,7 @@ def spread_contacts(model: Model, work: Work, X: Matrix, out: Matrix) -> None:
         if is_on_terrain(model, work, c):
             at = centre(model, c, work.pos3, work.rot3)
             spread(model, model.contact_terrain[c] - 1, at, (0.0, 0.0, 0.0), X, 3 * c, out)
-            if work.bounce[c, 1] > 0.0:
+            if work.bounce[c, Bounce.RESTITUTION] > 0.0:
                 spread_earlier(model, work, c, 1, X, out)
                 spread_earlier(model, work, c, 2, X, out)
 

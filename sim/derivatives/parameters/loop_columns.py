@@ -15,8 +15,6 @@ from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import cross, rotate, times
 
-_LOOP_PARENT, _LOOP_CHILD = int(Effect.LOOP_PARENT), int(Effect.LOOP_CHILD)
-
 
 @kernel
 def add_loop_geometry(model: Model, work: Work, effect: int, m: int, k: int, w: float, col: int) -> None:
@@ -28,17 +26,17 @@ def add_loop_geometry(model: Model, work: Work, effect: int, m: int, k: int, w: 
     c = model.coupling_body.shape[0] - model.loop_ntrans.shape[0] + m
     a, b = model.coupling_body[c, 0], model.coupling_body[c, 1]
     e = unit_vector(k)
-    i = a if effect == _LOOP_CHILD else b
+    i = a if effect == Effect.LOOP_CHILD else b
     d2 = rotate(work.rot2, i, e[0], e[1], e[2]) if i >= 0 else e
     d3 = rotate(work.rot3, i, e[0], e[1], e[2]) if i >= 0 else e
-    sign = 1.0 if effect == _LOOP_CHILD else -1.0
+    sign = 1.0 if effect == Effect.LOOP_CHILD else -1.0
     loop_frame(model, work, m, b, work.pos3, work.rot3)
     first = model.coupling_row[c]
     for r in range(3 - model.loop_ntrans[m]):
         u = model.loop_axes[m, 3 * r : 3 * r + 3]
         t = times(work.loop_frame[m], u[0], u[1], u[2])
         work.couple_panel[first + r, col] += w * sign * (t[0] * d3[0] + t[1] * d3[1] + t[2] * d3[2])
-    if effect == _LOOP_PARENT:
+    if effect == Effect.LOOP_PARENT:
         return
     loop_frame(model, work, m, b, work.pos2, work.rot2)
     for r in range(3 - model.loop_ntrans[m]):

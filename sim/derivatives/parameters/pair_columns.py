@@ -7,7 +7,7 @@ from sim.contact.contact_law import contact_impulse
 from sim.contact.pairs.pair_contact import is_absent, pair_force
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
-from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_near, turning
+from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.data import Work
 from sim.model.model import Model
@@ -82,7 +82,7 @@ def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
 @kernel
 def is_felt(model: Model, work: Work, j: int) -> bool:
     """Whether pair j had a part in the step."""
-    return not is_absent(work, j) and is_near(work, model.contact_height.shape[0] + j)
+    return not is_absent(work, j) and is_active(work, model.contact_height.shape[0] + j)
 
 
 @kernel

@@ -22,8 +22,6 @@ from solvers.compiler import Table, kernel
 from solvers.rotation import left_jacobian
 from solvers.types import IntegerMatrix, Matrix, Vector
 
-_TIME_STEP = int(Effect.TIME_STEP)
-
 
 @kernel
 def add_time_rates(work: Work, at: At, A: Matrix, w: float, m: int) -> None:
@@ -74,11 +72,11 @@ def parameter_jacobian(
         solve_panel(model, work)
         solve_coupling_panel(model, work)
         for t in range(start, end):
-            if terms[t, 0] == _TIME_STEP:
+            if terms[t, 0] == Effect.TIME_STEP:
                 add_time_rates(work, at, A, weights[t], terms[t, 3] - first)
         coordinate_rows(model, work, at.h, first, min(width, out.shape[1] - first), out)
         for t in range(start, end):
-            if terms[t, 0] == _TIME_STEP:
+            if terms[t, 0] == Effect.TIME_STEP:
                 for d in range(nv):
                     out[d, terms[t, 3]] += weights[t] * work.nu[d]
         first += width

@@ -15,6 +15,7 @@ from sim.contact.pairs.string import is_taut
 from sim.derivatives.parameters.directions import SIDE, Size
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
 from sim.derivatives.parameters.string_columns import add_moved_end
+from sim.model.columns import Bounce, Witness
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
@@ -22,17 +23,13 @@ from solvers.compiler import kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
-_BALL, _ROD, _SIDE_X, _SIDE_Z = int(Size.BALL), int(Size.ROD), int(Size.SIDE_X), int(Size.SIDE_Z)
-_RIM, _LENGTH, _SCALE, _STRING = int(Size.RIM), int(Size.LENGTH), int(Size.SCALE), int(Size.STRING)
-_POLYTOPES, _ON_CYLINDER = int(Pair.POLYTOPE_POLYTOPE), int(Pair.POLYTOPE_CYLINDER)
-
 
 @kernel
 def shape_sizes(model: Model, j: int, side: int) -> tuple[float, float]:
     """(radius, half length) of the shape of a (side 0) or b, of a capsule or cylinder."""
     kind = model.pair_kind[j]
     o = 4 * side if kind < SWAPPED else 4 * (1 - side)
-    if kind % SWAPPED == _POLYTOPES or (kind % SWAPPED == _ON_CYLINDER and o == 0):
+    if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE or (kind % SWAPPED == Pair.POLYTOPE_CYLINDER and o == 0):
         return model.pair_sizes[j, o + 1], 0.0
     return model.pair_sizes[j, o], model.pair_sizes[j, o + 1]
 
@@ -55,9 +52,9 @@ def element_shift(
     """
     side, way = which // SIDE, which % SIDE
     out = 1.0 if side == 0 else -1.0  # n points into a, and out of b
-    if way == _BALL:
+    if way == Size.BALL:
         return -out * n[0], -out * n[1], -out * n[2]
-    if way == _STRING:  # both ends by half of it
+    if way == Size.STRING:  # both ends by half of it
         return 0.5 * out * n[0], 0.5 * out * n[1], 0.5 * out * n[2]
     first = j - model.pair_feature[j]
     s = 2 * first + side
@@ -65,13 +62,13 @@ def element_shift(
     rot = work.rot1 if configuration == 1 else (work.rot2 if configuration == 2 else work.rot3)
     place_shape(model, work, s, model.coupling_body[model.pair_coupling[j], side], pos, rot)
     radius, half = shape_sizes(model, j, side)
-    r = 0.5 * phi + (radius if way == _ROD else 0.0)  # from the middle to the surface, or to the segment inside
+    r = 0.5 * phi + (radius if way == Size.ROD else 0.0)  # from the middle to the surface, or to the segment inside
     o = row(work.shape_pos[s], 0)
     x = (p[0] + out * r * n[0] - o[0], p[1] + out * r * n[1] - o[1], p[2] + out * r * n[2] - o[2])
-    if way == _SCALE:
+    if way == Size.SCALE:
         return x
-    axis, end = axis_and_side(work, s, way - _SIDE_X if _SIDE_X <= way <= _SIDE_Z else 2, x)
-    if way == _RIM:
+    axis, end = axis_and_side(work, s, way - Size.SIDE_X.value if Size.SIDE_X <= way <= Size.SIDE_Z else 2, x)
+    if way == Size.RIM:
         z = end * half
         return (x[0] - z * axis[0]) / radius, (x[1] - z * axis[1]) / radius, (x[2] - z * axis[2]) / radius
     return end * axis[0], end * axis[1], end * axis[2]
@@ -95,11 +92,11 @@ def add_shapes_size(model: Model, work: Work, h: float, first: int, which: int, 
             c = model.contact_height.shape[0] + j
             b = work.bounce[c]
             floor = 0.0
-            if b[1] > 0.0:
+            if b[Bounce.RESTITUTION] > 0.0:
                 e1, e2 = earlier_shift(model, work, j, which, b, 1), earlier_shift(model, work, j, which, b, 2)
                 floor = pair_floor(work, c, which // SIDE, e1, e2)
             p = row(work.pair_frame[j], 9)
-            e = element_shift(model, work, j, which, work.pair_out[j, 0], gap_normal(model, work, j), p, 3)
+            e = element_shift(model, work, j, which, work.pair_out[j, Witness.GAP], gap_normal(model, work, j), p, 3)
             if is_taut(model, work, j):  # where it pulls along stays
                 add_moved_end(model, work, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
             else:

@@ -9,7 +9,8 @@ from math import sqrt
 
 from sim.contact.height_field import field_values, height_field
 from sim.contact.terrain_contact import centre, frame_turn
-from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_near
+from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_active
+from sim.model.columns import Bounce, Kin
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -20,7 +21,7 @@ from solvers.types import Matrix
 @kernel
 def is_on_terrain(model: Model, work: Work, c: int) -> bool:
     """Whether a height field has a part in the contact, and the contact in the step."""
-    return model.contact_terrain[c] > 0 and is_near(work, c)
+    return model.contact_terrain[c] > 0 and is_active(work, c)
 
 
 @kernel
@@ -32,7 +33,9 @@ def add_ground_place(model: Model, work: Work, h: float, c: int, k: int, col: in
     if k == 0:
         add_impulse(model, work, c, impulse_change(work, c, -n[2], 0.0, 0.0), 1.0, col)
         return
-    phi = work.contact_kin[c, 0] + work.bounce[c, 0]  # contact_kin has the gap above the floor of an impact
+    phi = (
+        work.contact_kin[c, Kin.GAP] + work.bounce[c, Bounce.FLOOR]
+    )  # contact_kin has the gap above the floor of an impact
     turn = frame_turn(n, -1.0 if k == 1 else 0.0, -1.0 if k == 2 else 0.0)
     add_turn(model, work, h, c, turn, phi * n[2] * n[k - 1], 1.0, col)
 
@@ -57,8 +60,8 @@ def add_surface_radius(model: Model, work: Work, h: float, c: int, w: float, col
     G, Gx, Gy, _, _, _ = field_values(model, model.terrain_rates, model.contact_terrain[c] - 1, x, y)
     n = work.contact_frame[c]
     b = work.bounce[c]
-    gap = -n[2] * (G - (work.contact_kin[c, 0] + b[0]) * (n[0] * Gx + n[1] * Gy))
-    if b[1] > 0.0:
-        d1 = earlier_rate(model, c, b[14], work.pos1, work.rot1)
-        gap -= floor_change(work, c, d1, earlier_rate(model, c, b[15], work.pos2, work.rot2))
+    gap = -n[2] * (G - (work.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]) * (n[0] * Gx + n[1] * Gy))
+    if b[Bounce.RESTITUTION] > 0.0:
+        d1 = earlier_rate(model, c, b[Bounce.GAP1], work.pos1, work.rot1)
+        gap -= floor_change(work, c, d1, earlier_rate(model, c, b[Bounce.GAP2], work.pos2, work.rot2))
     add_turn(model, work, h, c, frame_turn(n, -Gx, -Gy), gap, w, col)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
+from sim.model.columns import Bound, BoundRow
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -51,9 +52,9 @@ def cone_gap(model: Model, work: Work, h: float, k: int) -> None:
     scale = 1.0 / sin(model.limit_bound[k])
     x, y, z = cross(v[0], v[1], v[2], b[0], b[1], b[2])
     work.bound_gap[k] = scale * (v[0] * b[0] + v[1] * b[1] + v[2] * b[2] - cos(model.limit_bound[k]))
-    work.bound_row[k, 0] = scale * x
-    work.bound_row[k, 1] = scale * y
-    work.bound_row[k, 2] = scale * z
+    work.bound_row[k, BoundRow.TORQUE] = scale * x
+    work.bound_row[k, BoundRow.TORQUE + 1] = scale * y
+    work.bound_row[k, BoundRow.TORQUE + 2] = scale * z
 
 
 @optional(Slot.CONE_BLOCK)
@@ -66,15 +67,17 @@ def cone_block(model: Model, work: Work, h: float, k: int) -> None:
     v, b = _cone_axes(model, work, h, k)
     J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
     p = work.bound_row[k]
+    x, y, z = p[BoundRow.TORQUE], p[BoundRow.TORQUE + 1], p[BoundRow.TORQUE + 2]
     for j in range(3):
-        p[3 + j] = h * (J[j] * p[0] + J[3 + j] * p[1] + J[6 + j] * p[2])
+        p[BoundRow.RATE + j] = h * (J[j] * x + J[3 + j] * y + J[6 + j] * z)
     dot = v[0] * b[0] + v[1] * b[1] + v[2] * b[2]
-    ratio = work.bound[k, 1] / work.bound[k, 0]
-    g = h * work.bound[k, 1] / sin(model.limit_bound[k])
+    ratio = work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
+    g = h * work.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
     for j in range(3):
         bJ = b[0] * J[j] + b[1] * J[3 + j] + b[2] * J[6 + j]
         for r in range(3):
-            work.joint_block[i, first + r * n + j] += ratio * p[r] * p[3 + j] - g * (v[r] * bJ - dot * J[3 * r + j])
+            bent = g * (v[r] * bJ - dot * J[3 * r + j])
+            work.joint_block[i, first + r * n + j] += ratio * p[r] * p[BoundRow.RATE + j] - bent
 
 
 @optional(Slot.CONE_DERIVATIVE)
@@ -83,8 +86,8 @@ def cone_derivative(model: Model, work: Work, h: float, k: int) -> None:
     d = model.limit_dof[k]
     v, b = _cone_axes(model, work, h, k)
     p = work.bound_row[k]
-    ratio = work.bound[k, 1] / work.bound[k, 0]
-    g = work.bound[k, 1] / sin(model.limit_bound[k])
+    ratio = work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
+    g = work.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
     dot = v[0] * b[0] + v[1] * b[1] + v[2] * b[2]
     for r in range(3):
         for j in range(3):

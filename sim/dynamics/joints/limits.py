@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.dynamics.joints.terms import add_limit_impulse
+from sim.model.columns import Bound, BoundRow
 from sim.model.data import Work
 from sim.model.model import Model
-from sim.model.options import Goal
+from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, return_pair
@@ -40,7 +41,7 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
         if model.limit_cone[k]:
             cone_block(model, work, h, k)
         else:
-            work.joint_block[i, a * n + a] += h * work.bound[k, 1] / work.bound[k, 0]
+            work.joint_block[i, a * n + a] += h * work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
 
 
 @optional(Slot.ADD_LIMIT_DERIVATIVES)
@@ -51,19 +52,19 @@ def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
             cone_derivative(model, work, h, k)
         else:
             d = model.limit_dof[k]
-            work.dR_dq[d, d] += work.bound[k, 1] / work.bound[k, 0]
+            work.dR_dq[d, d] += work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
 
 
 @kernel
-def limit_constants(model: Model, work: Work, goal: Goal) -> None:
+def limit_constants(model: Model, work: Work, target: NewtonTarget) -> None:
     """dnu += (impulse of size w), with d gamma = w - (gamma/s) d gap; w kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
-        s = work.bound[k, 0]
-        g = work.bound[k, 1]
-        r = goal.kappa - s * g
-        if goal.corrected > 0.0:
-            r -= goal.corrected * work.bound_step[k, 0] * work.bound_step[k, 1]
-        w = (r - g * goal.share * (work.bound_gap[k] - s)) / s
+        s = work.bound[k, Bound.SLACK]
+        g = work.bound[k, Bound.IMPULSE]
+        r = target.kappa - s * g
+        if target.corrected > 0.0:
+            r -= target.corrected * work.bound_step[k, Bound.SLACK] * work.bound_step[k, Bound.IMPULSE]
+        w = (r - g * target.share * (work.bound_gap[k] - s)) / s
         work.bound_w[k] = w
         add_limit_impulse(model, work, k, w, work.dnu)
 
@@ -76,11 +77,11 @@ def resume_limits(model: Model, work: Work, weight: float, kappa: float, predict
     """
     for k in range(model.limit_dof.shape[0]):
         b = work.bound[k]
-        impulse = b[1] if predicted else work.bound_trial[k, 1]
+        impulse = b[Bound.IMPULSE] if predicted else work.bound_trial[k, Bound.IMPULSE]
         if predicted and weight * impulse * impulse > kappa:
-            b[0] = kappa / impulse
+            b[Bound.SLACK] = kappa / impulse
         else:
-            b[0], b[1] = onto_path(work.bound_gap[k], impulse, weight, kappa)
+            b[Bound.SLACK], b[Bound.IMPULSE] = onto_path(work.bound_gap[k], impulse, weight, kappa)
 
 
 @kernel
@@ -94,12 +95,16 @@ def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None
 def recover_limits(model: Model, work: Work, h: float, share: float) -> None:
     """bound_step from dnu."""
     for k in range(model.limit_dof.shape[0]):
-        s = work.bound[k, 0]
+        s = work.bound[k, Bound.SLACK]
         d = model.limit_dof[k]
         if model.limit_cone[k]:
             c = work.bound_row[k]
-            t = c[3] * work.dnu[d] + c[4] * work.dnu[d + 1] + c[5] * work.dnu[d + 2]
+            t = (
+                c[BoundRow.RATE] * work.dnu[d]
+                + c[BoundRow.RATE + 1] * work.dnu[d + 1]
+                + c[BoundRow.RATE + 2] * work.dnu[d + 2]
+            )
         else:
             t = model.limit_sign[k] * h * work.dnu[d]
-        work.bound_step[k, 0] = t + share * (work.bound_gap[k] - s)
-        work.bound_step[k, 1] = work.bound_w[k] - work.bound[k, 1] / s * t
+        work.bound_step[k, Bound.SLACK] = t + share * (work.bound_gap[k] - s)
+        work.bound_step[k, Bound.IMPULSE] = work.bound_w[k] - work.bound[k, Bound.IMPULSE] / s * t

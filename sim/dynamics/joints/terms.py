@@ -15,8 +15,6 @@ from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.types import Vector
 
-_JOINT = int(InputKind.JOINT)
-
 
 @kernel
 def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> None:
@@ -39,7 +37,7 @@ def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: 
                 r += h * model.dof_spring[e] * mid
             work.residual[e] += r
     for j in range(u.shape[0]):
-        if model.input_kind[j] == _JOINT:
+        if model.input_kind[j] == InputKind.JOINT:
             work.residual[model.input_index[j]] -= h * u[j]
 
 

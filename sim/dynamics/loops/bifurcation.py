@@ -51,7 +51,7 @@ def _next_pivot(work: Work, first: int, last: int) -> tuple[int, int, float, flo
     for r in range(first, last):
         if work.loop_used[r] != 0:
             continue
-        change = max(change, _largest(work.loop_lead[r]))
+        change = max(change, _largest(work.bifurcation_direction[r]))
         w = work.couple_Y[r]
         for c in range(w.shape[0]):
             if abs(w[c]) > best:
@@ -64,7 +64,7 @@ def _next_pivot(work: Work, first: int, last: int) -> tuple[int, int, float, flo
 def _eliminate(work: Work, first: int, last: int, p: int, c: int) -> None:
     """Row p out of the rows that are left: w and dw combined as w says, and dw modulo the row p."""
     w = work.couple_Y[p]
-    dw = work.loop_lead[p]
+    dw = work.bifurcation_direction[p]
     work.loop_used[p] = 1
     for r in range(first, last):
         if work.loop_used[r] != 0:
@@ -72,45 +72,45 @@ def _eliminate(work: Work, first: int, last: int, p: int, c: int) -> None:
         f = work.couple_Y[r, c] / w[c]
         for d in range(w.shape[0]):
             work.couple_Y[r, d] -= f * w[d]
-            work.loop_lead[r, d] -= f * dw[d]
+            work.bifurcation_direction[r, d] -= f * dw[d]
         work.couple_Y[r, c] = 0.0
-        f = work.loop_lead[r, c] / w[c]
+        f = work.bifurcation_direction[r, c] / w[c]
         for d in range(w.shape[0]):
-            work.loop_lead[r, d] -= f * w[d]
+            work.bifurcation_direction[r, d] -= f * w[d]
 
 
 @kernel
 def _set_rows(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
-    """couple_Y = w at configuration 2 and loop_lead = dw, row by row; loop_scale = sizes of dw."""
-    for row in range(work.loop_lead.shape[0]):
-        for d in range(work.loop_lead.shape[1]):
+    """couple_Y = w at configuration 2 and bifurcation_direction = dw, row by row; loop_scale = sizes of dw."""
+    for row in range(work.bifurcation_direction.shape[0]):
+        for d in range(work.bifurcation_direction.shape[1]):
             work.couple_Y[row, d] = 0.0
-            work.loop_lead[row, d] = 0.0
+            work.bifurcation_direction[row, d] = 0.0
     tree_moves(model, work, Increment(q, v, h), True)
     turn_bodies(work, work.rot3)
     _add_directions(model, work, work.S2, work.couple_B, 1.0, work.couple_Y)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, work, m, work.pos3, work.rot3, work.couple_G)
-    _add_directions(model, work, work.S3, work.couple_G, 0.5, work.loop_lead)
+    _add_directions(model, work, work.S3, work.couple_G, 0.5, work.bifurcation_direction)
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, work, m, work.pos1, work.rot1, work.couple_G)
-    _add_directions(model, work, work.S1, work.couple_G, -0.5, work.loop_lead)
+    _add_directions(model, work, work.S1, work.couple_G, -0.5, work.bifurcation_direction)
 
 
 @kernel
 def lead_loops(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
-    """loop_lead[row] = dw where it takes the place of a row of couple_B, which is 0 then; loop_led: how many.
+    """bifurcation_direction[row] = dw where it takes the place of a row of couple_B, which is 0 then; their number.
 
     q: (nq,) configuration 2; v: (nv,) a velocity that leads to 3; couple_B: directions at configuration 2.
     """
-    work.loop_led[0] = 0
+    work.bifurcation_count[0] = 0
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     first, last = int(model.coupling_row[pairs]), int(model.coupling_row[model.coupling_body.shape[0]])
     _set_rows(model, work, h, q, v)
     size = 0.0
     for row in range(first, last):
         work.loop_used[row] = 0
-        work.loop_scale[row] = _largest(work.loop_lead[row])
+        work.loop_scale[row] = _largest(work.bifurcation_direction[row])
         size = max(size, _largest(work.couple_Y[row]))
     for _ in range(first, last):
         row, col, best, change = _next_pivot(work, first, last)
@@ -118,10 +118,10 @@ def lead_loops(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None
             break
         _eliminate(work, first, last, row, col)
     for row in range(first, last):
-        dw = _largest(work.loop_lead[row])
+        dw = _largest(work.bifurcation_direction[row])
         led = work.loop_used[row] == 0 and dw > max(_SPOKEN * work.loop_scale[row], _ROUNDING * size)
-        for d in range(work.loop_lead.shape[1]):
-            work.loop_lead[row, d] = work.loop_lead[row, d] / dw if led else 0.0
+        for d in range(work.bifurcation_direction.shape[1]):
+            work.bifurcation_direction[row, d] = work.bifurcation_direction[row, d] / dw if led else 0.0
         for c in range(6):
             work.couple_B[row, c] = 0.0 if led else work.couple_B[row, c]
-        work.loop_led[0] += 1 if led else 0
+        work.bifurcation_count[0] += 1 if led else 0

@@ -19,6 +19,7 @@ from sim.dynamics.energy import factor_mass_matrix
 from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops, start_loops
 from sim.dynamics.loops.loop_velocity import close_velocity
+from sim.model.columns import CoupleRank
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -26,7 +27,6 @@ from solvers.compiler import kernel, optional
 from solvers.status import Status
 from solvers.types import Vector
 
-_SOLVED = int(Status.SOLVED)
 _CLOSER = 0.5  # share of a least pivot
 _REGULAR = 5e-3  # a pivot above this is far from where branches meet
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
@@ -35,22 +35,26 @@ _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were n
 @optional(Slot.LOOPS_REGULAR, default=True)
 def loops_regular(model: Model, work: Work) -> bool:
     """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
-    work.loop_led[0] = 0
-    if work.counts[3] == 0:
-        work.couple_rank[3] = 1e300
+    work.bifurcation_count[0] = 0
+    if work.carried_steps[0] == 0:
+        work.couple_rank[CoupleRank.DEFICIENCY] = 1e300
         return False
-    deficiency = work.couple_rank[1] - work.couple_rank[0]
-    work.couple_rank[3] = min(work.couple_rank[3], deficiency)
-    regular = deficiency == work.couple_rank[3] and work.couple_rank[2] > _REGULAR
-    work.couple_rank[2] = 0.0
+    deficiency = work.couple_rank[CoupleRank.SIZE] - work.couple_rank[CoupleRank.RANK]
+    work.couple_rank[CoupleRank.DEFICIENCY] = min(work.couple_rank[CoupleRank.DEFICIENCY], deficiency)
+    regular = deficiency == work.couple_rank[CoupleRank.DEFICIENCY] and work.couple_rank[CoupleRank.PIVOT] > _REGULAR
+    work.couple_rank[CoupleRank.PIVOT] = 0.0
     return regular
 
 
 @optional(Slot.STAY_REGULAR, default=True)
 def stay_regular(model: Model, work: Work, status: int) -> bool:
     """Whether this step is as far, too; if not, the forces of loops are zero again."""
-    deficiency = work.couple_rank[1] - work.couple_rank[0]
-    if status == _SOLVED and work.couple_rank[2] > _REGULAR and deficiency <= work.couple_rank[3]:
+    deficiency = work.couple_rank[CoupleRank.SIZE] - work.couple_rank[CoupleRank.RANK]
+    if (
+        status == Status.SOLVED
+        and work.couple_rank[CoupleRank.PIVOT] > _REGULAR
+        and deficiency <= work.couple_rank[CoupleRank.DEFICIENCY]
+    ):
         return True
     start_loops(model, work, False)
     return False
@@ -78,7 +82,7 @@ def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, gues
     for d in range(v.shape[0]):
         if across < _ACROSS * whole:
             work.loop_velocity[d] += work.loop_velocity[d] - v[d]
-    work.loop_pivot[0] = work.couple_rank[2]
+    work.loop_pivot[0] = work.couple_rank[CoupleRank.PIVOT]
     _no_step(work)
     return not given
 
@@ -86,7 +90,7 @@ def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, gues
 @optional(Slot.LEAD_AGAIN, default=False)
 def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
-    if work.loop_led[0] == 0:
+    if work.bifurcation_count[0] == 0:
         return False
     for d in range(work.nu.shape[0]):
         work.loop_velocity[d] = work.nu[d]
@@ -102,7 +106,7 @@ def meet_ahead(model: Model, work: Work) -> bool:
 
     Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
     """
-    if work.loop_led[0] > 0 or not work.couple_rank[2] < _CLOSER * work.loop_pivot[0]:
+    if work.bifurcation_count[0] > 0 or not work.couple_rank[CoupleRank.PIVOT] < _CLOSER * work.loop_pivot[0]:
         return False
     for d in range(work.nu.shape[0]):
         work.loop_kept[d] = work.nu[d]
@@ -121,7 +125,7 @@ def is_farther(model: Model, work: Work, status: int) -> bool:
         found += (work.nu[d] - work.loop_velocity[d]) ** 2
         work.loop_start[d] = work.loop_kept[d]
     _no_step(work)
-    return status != _SOLVED or found > (1.0 + 1e-6) * kept
+    return status != Status.SOLVED or found > (1.0 + 1e-6) * kept
 
 
 @kernel

@@ -135,9 +135,9 @@ def unit_impulse(model: Model, work: Work, p: int, out: Vector) -> None:
         out[d] = 0.0
     add_along_path(model, work.S2, model.coupling_body[k, 0], 1.0, work.couple_B[row], out)
     add_along_path(model, work.S2, model.coupling_body[k, 1], -1.0, work.couple_B[row], out)
-    if work.loop_led[0] > 0:
+    if work.bifurcation_count[0] > 0:
         for d in range(out.shape[0]):
-            out[d] += work.loop_lead[row, d]
+            out[d] += work.bifurcation_direction[row, d]
 
 
 @kernel
@@ -146,7 +146,7 @@ def row_response(model: Model, work: Work, p: int, y: Vector) -> float:
     row, k = work.couple_live[p, 0], work.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
         return gear_response(model, work, k - model.coupling_body.shape[0], y)
-    led = dot(work.loop_lead[row], y) if work.loop_led[1] > 0 else 0.0
+    led = dot(work.bifurcation_direction[row], y) if work.bifurcation_replaces[0] > 0 else 0.0
     return response(model, work, k, row) + led
 
 

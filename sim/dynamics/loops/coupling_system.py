@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from sim.dynamics.elimination import solve
 from sim.dynamics.loops.constraint_rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
+from sim.model.columns import CoupleRank
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -68,11 +69,11 @@ def factor_coupling(model: Model, work: Work) -> bool:
         work.couple_scale[p] = scale_row(T, p, work.couple_scale[p])
     least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
     rank = full_lu_factor(T, work.couple_pivots, least)
-    work.couple_rank[0] = rank
-    work.couple_rank[1] = n
-    work.couple_rank[2] = 1.0
+    work.couple_rank[CoupleRank.RANK] = rank
+    work.couple_rank[CoupleRank.SIZE] = n
+    work.couple_rank[CoupleRank.PIVOT] = 1.0
     for p in range(rank):
-        work.couple_rank[2] = min(work.couple_rank[2], abs(T[p, p]))
+        work.couple_rank[CoupleRank.PIVOT] = min(work.couple_rank[CoupleRank.PIVOT], abs(T[p, p]))
     return rank >= pairs
 
 
@@ -82,12 +83,12 @@ def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
 
     share: part of the loop gaps to close.
     """
-    n = int(work.couple_rank[1])
+    n = int(work.couple_rank[CoupleRank.SIZE])
     x = work.couple_x[:n]
     for p in range(n):
         gap = share * work.couple_gap[work.couple_live[p, 0]]
         x[p, 0] = work.couple_scale[p] * (gap + row_response(model, work, p, out))
-    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), x)
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[CoupleRank.RANK]), x)
     for row in range(work.couple_step.shape[0]):
         work.couple_step[row] = 0.0
     for p in range(n):
@@ -116,13 +117,13 @@ def body_twists(model: Model, work: Work, y: Vector) -> None:
 @optional(Slot.SOLVE_COUPLING_PANEL)
 def solve_coupling_panel(model: Model, work: Work) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
-    n = int(work.couple_rank[1])
+    n = int(work.couple_rank[CoupleRank.SIZE])
     X = work.couple_panel[:n]
     for p in range(n):
         add_columns(model, work, p, X[p])
         for m in range(X.shape[1]):
             X[p, m] *= work.couple_scale[p]
-    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[0]), X)
+    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[CoupleRank.RANK]), X)
     for p in range(n):
         Y = work.couple_Y[work.couple_live[p, 0]]
         for d in range(work.columns.shape[0]):

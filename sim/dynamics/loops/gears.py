@@ -38,10 +38,10 @@ def apply_gears(model: Model, work: Work, h: float) -> float:
         work.residual[a] -= work.couple_force[row]
         work.residual[b] += model.gear_ratio[k] * work.couple_force[row]
         error = max(error, abs(work.couple_gap[row]))
-    if work.loop_led[0] > 0:
+    if work.bifurcation_count[0] > 0:
         for row in range(gear_row(model, 0)):
             for d in range(work.residual.shape[0]):
-                work.residual[d] -= work.couple_force[row] * work.loop_lead[row, d]
+                work.residual[d] -= work.couple_force[row] * work.bifurcation_direction[row, d]
     return error
 
 

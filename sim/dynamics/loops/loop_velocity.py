@@ -10,6 +10,7 @@ from __future__ import annotations
 from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops
 from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
+from sim.model.columns import CoupleRank
 from sim.model.data import Work
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -42,16 +43,19 @@ def close_velocity(model: Model, work: Work, h: float, q: Vector, v: Vector, out
     of G are those of bifurcation.py.   out: (nv,).
     """
     direct_loops(model, work)
-    work.loop_led[0] = 0
+    work.bifurcation_count[0] = 0
     _set_rows(model, work)
     solved = factor_coupling(model, work)
     loops = model.loop_ntrans.shape[0] > 0
-    if loops and (work.couple_rank[0] < work.couple_rank[1] or work.couple_rank[2] < _WEAK):
+    if loops and (
+        work.couple_rank[CoupleRank.RANK] < work.couple_rank[CoupleRank.SIZE]
+        or work.couple_rank[CoupleRank.PIVOT] < _WEAK
+    ):
         lead_loops(model, work, h, q, v)
         _set_rows(model, work)
-        work.loop_led[1] = 1
+        work.bifurcation_replaces[0] = 1
         solved = factor_coupling(model, work)
     if solved:
         body_twists(model, work, out)
         solve_coupling(model, work, 0.0, out)
-    work.loop_led[1] = 0
+    work.bifurcation_replaces[0] = 0
