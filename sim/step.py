@@ -6,9 +6,9 @@ from sim.contact.contact_report import worst_contact
 from sim.dynamics.loops.closure import start_loops
 from sim.dynamics.loops.loop_work import loops_gained
 from sim.dynamics.momentum_balance import begin_step
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Guess, Options, Outcome
+from sim.model.options import Guess, Outcome, StepOptions
 from sim.model.slots import Slot
 from sim.solve.energy_balance import step_gained
 from sim.solve.loop_branch import solve_loops
@@ -20,7 +20,7 @@ from solvers.types import Vector
 
 @optional(Slot.STEP, default=int(Status.NOT_FINITE))
 def step(
-    model: Model, work: Work, options: Options, x: Vector, u: Vector, guess: Guess, out: Vector, report: Vector
+    model: Model, data: Data, options: StepOptions, x: Vector, u: Vector, guess: Guess, out: Vector, report: Vector
 ) -> int:
     """out = state after one step from x = (q, v) under the input u; returns the Status.
 
@@ -28,52 +28,54 @@ def step(
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
     last iterate when the status is not SOLVED; nobody must use it.
     """
-    nq = work.theta1.shape[0]
+    nq = data.theta1.shape[0]
     q = x[:nq]
     v = x[nq:]
     r = Outcome(Status.ANGULAR_STEP.value, 0, 1e300, 0.0)
-    if begin_step(model, work, options.h, q, v, u):
-        start_loops(model, work, guess.impulses)
+    if begin_step(model, data, options.h, q, v, u):
+        start_loops(model, data, guess.impulses)
         if model.loop_ntrans.shape[0] > 0:
-            r = solve_loops(model, work, options, q, v, u, guess)
+            r = solve_loops(model, data, options, q, v, u, guess)
         else:
-            r = solve_step(model, work, options, q, v, u, guess)
-        r = _checked(model, work, options, (q, v, u), r)
-    status = _write(work, r, out)
+            r = solve_step(model, data, options, q, v, u, guess)
+        r = _checked(model, data, options, (q, v, u), r)
+    status = _write(data, r, out)
     report[0] = status
     report[1] = r.iterations
     report[2] = r.residual
     report[3] = r.violation
     report[4] = -1.0
     if status != Status.SOLVED and r.iterations > 0:
-        report[4] = worst_contact(model, work, options.kappa)
-    work.carried_steps[0] = work.carried_steps[0] + 1 if status == Status.SOLVED else 0
+        report[4] = worst_contact(model, data, options.kappa)
+    data.carried_steps[0] = data.carried_steps[0] + 1 if status == Status.SOLVED else 0
     return status
 
 
 @inlined
-def _checked(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], r: Outcome) -> Outcome:
+def _checked(
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], r: Outcome
+) -> Outcome:
     """The outcome of a step, refused where the forces of loops gave energy (loop_work.py), or it gained some.
 
     inputs: (q, v, u). The interior point asks for the latter of every solution it finds.
     """
-    if r.status == Status.SOLVED and loops_gained(model, work, options, inputs[1]):
+    if r.status == Status.SOLVED and loops_gained(model, data, options, inputs[1]):
         return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)
     smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
-    if r.status == Status.SOLVED and smooth and step_gained(model, work, options, inputs):
+    if r.status == Status.SOLVED and smooth and step_gained(model, data, options, inputs):
         return Outcome(Status.ENERGY_STEP.value, r.iterations, r.residual, r.violation)
     return r
 
 
 @inlined
-def _write(work: Work, r: Outcome, out: Vector) -> int:
+def _write(data: Data, r: Outcome, out: Vector) -> int:
     """out = (q3, v25); returns the status, NOT_FINITE where a component is not."""
-    nq = work.theta3.shape[0]
+    nq = data.theta3.shape[0]
     total = 0.0
     for k in range(nq):
-        out[k] = work.theta3[k]
+        out[k] = data.theta3[k]
         total += out[k]
-    for k in range(work.nu.shape[0]):
-        out[nq + k] = work.nu[k]
+    for k in range(data.nu.shape[0]):
+        out[nq + k] = data.nu[k]
         total += out[nq + k]
     return r.status if abs(total) < 1e300 else Status.NOT_FINITE.value

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.report.clock import interleave
 from dojo_opt.report.lean_scenes import Scene
-from sim.model.layout import allocate_work, sizes_of
+from sim.model.layout import allocate_data, sizes_of
 from sim.model.model import Law
 
 KNOTS = 50  # steps per call
@@ -99,7 +99,7 @@ def _sizes(scene: Scene, solved: bool) -> tuple[int, int, int, int]:
     laws = {name: Law(int(law)) for name, law in zip(sim.mechanism.contact_names, sim.model.contact_law, strict=True)}
     near = sum(_VARIABLES[law] for name, law in laws.items() if name not in far)
     near += 2 * len(sim.model.limit_dof)
-    size = sum(a.nbytes for a in sim.model) + sum(a.nbytes for a in allocate_work(sizes_of(sim.model)))
+    size = sum(a.nbytes for a in sim.model) + sum(a.nbytes for a in allocate_data(sizes_of(sim.model)))
     return sim.nv, near, len(far), size
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.model.columns import Cone, ConeScale, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.types import Vector
@@ -35,10 +35,10 @@ def cone_slip(b0: float, x: float, y: float, kappa: float) -> tuple[float, float
 
 
 @kernel
-def start_cone(model: Model, work: Work, c: int, kappa: float) -> None:
+def start_cone(model: Model, data: Data, c: int, kappa: float) -> None:
     """beta on the central path of kappa at the present slip and normal impulse."""
-    z = work.cone[c]
-    k = work.contact_kin[c]
+    z = data.cone[c]
+    k = data.contact_kin[c]
     b0 = model.contact_friction[c] * z[Cone.IMPULSE]
     psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     z[Cone.FRICTION1] = -b0 * k[Kin.SLIP1] / psi
@@ -46,10 +46,10 @@ def start_cone(model: Model, work: Work, c: int, kappa: float) -> None:
 
 
 @kernel
-def cone_violation(model: Model, work: Work, c: int, kappa: float) -> float:
+def cone_violation(model: Model, data: Data, c: int, kappa: float) -> float:
     """|mu gamma v_t + psi beta|, in units of kappa."""
-    z = work.cone[c]
-    k = work.contact_kin[c]
+    z = data.cone[c]
+    k = data.contact_kin[c]
     b0 = model.contact_friction[c] * z[Cone.IMPULSE]
     psi, _ = cone_slip(b0, k[Kin.SLIP1], k[Kin.SLIP2], kappa)
     return max(abs(b0 * k[Kin.SLIP1] + psi * z[Cone.FRICTION1]), abs(b0 * k[Kin.SLIP2] + psi * z[Cone.FRICTION2]))
@@ -65,16 +65,16 @@ def within_cone(b0: float, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
-def condense_cone(model: Model, work: Work, c: int, kappa: float, share: float, linear: bool) -> None:
+def condense_cone(model: Model, data: Data, c: int, kappa: float, share: float, linear: bool) -> None:
     """d(beta)/d(gap, slip) by the law linearised at kappa, in the form that suits the contact.
 
     Far from the solution the violation that the line search looks at, that of the first form, may grow along a step of
     the other.
     """
-    z = work.cone[c]
-    k = work.contact_kin[c]
-    W = work.contact_W[c]
-    q = work.contact_scale[c]
+    z = data.cone[c]
+    k = data.contact_kin[c]
+    W = data.contact_W[c]
+    q = data.contact_scale[c]
     mu = model.contact_friction[c]
     b0 = mu * z[Cone.IMPULSE]
     room = b0 * b0 - z[Cone.FRICTION1] * z[Cone.FRICTION1] - z[Cone.FRICTION2] * z[Cone.FRICTION2]
@@ -133,20 +133,20 @@ def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: floa
 
 
 @kernel
-def cone_constant(model: Model, work: Work, c: int) -> None:
+def cone_constant(model: Model, data: Data, c: int) -> None:
     """Friction part of contact_w, after its normal part."""
-    w = work.contact_w[c]
-    q = work.contact_scale[c]
+    w = data.contact_w[c]
+    q = data.contact_scale[c]
     b = model.contact_friction[c] * w[0]
     w[1] = b * q[ConeScale.GROWTH] - q[ConeScale.RESIDUAL]
     w[2] = b * q[ConeScale.GROWTH + 1] - q[ConeScale.RESIDUAL + 1]
 
 
 @kernel
-def recover_cone(work: Work, c: int, a: float, x: float, y: float) -> None:
+def recover_cone(data: Data, c: int, a: float, x: float, y: float) -> None:
     """Step of beta from the rates (a, x, y) of gap and slip."""
-    d = work.cone_step[c]
-    W = work.contact_W[c]
-    w = work.contact_w[c]
+    d = data.cone_step[c]
+    W = data.contact_W[c]
+    w = data.contact_w[c]
     d[Cone.FRICTION1] = W[3] * a + W[4] * x + W[5] * y + w[1]
     d[Cone.FRICTION2] = W[6] * a + W[7] * x + W[8] * y + w[2]

@@ -21,7 +21,7 @@ from sim.contact.pyramid import (
 )
 from sim.contact.softening import soften
 from sim.model.columns import Bounce, Cone, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
 from solvers.compiler import kernel
@@ -37,38 +37,38 @@ def law_of(model: Model, c: int) -> int:
 
 
 @kernel
-def start_contact(model: Model, work: Work, c: int, kappa: float, floor: float) -> None:
+def start_contact(model: Model, data: Data, c: int, kappa: float, floor: float) -> None:
     """Variables of contact c on the central path of kappa at its gap (at least `floor`) and slip: gamma = kappa / s."""
-    z = work.cone[c]
-    z[Cone.SLACK] = max(work.contact_kin[c, Kin.GAP], floor)
+    z = data.cone[c]
+    z[Cone.SLACK] = max(data.contact_kin[c, Kin.GAP], floor)
     z[Cone.IMPULSE] = kappa / z[Cone.SLACK]
-    _start_friction(model, work, c, kappa)
+    _start_friction(model, data, c, kappa)
 
 
 @kernel
-def resume_contact(model: Model, work: Work, h: float, c: int, kappa: float, predicted: bool) -> None:
+def resume_contact(model: Model, data: Data, h: float, c: int, kappa: float, predicted: bool) -> None:
     """Variables of contact c on the central path of kappa, near its gap and the impulse that it had (in cone_trial).
 
     predicted: near the impulse that it has now; where that presses, it stays, with its friction, and gives the slack.
     """
-    z = work.cone[c]
+    z = data.cone[c]
     weight = h * _response(model, c)
-    impulse = z[Cone.IMPULSE] if predicted else work.cone_trial[c, Cone.IMPULSE]
+    impulse = z[Cone.IMPULSE] if predicted else data.cone_trial[c, Cone.IMPULSE]
     if predicted and weight * impulse * impulse > kappa:
         z[Cone.SLACK] = kappa / impulse
     else:
-        z[Cone.SLACK], z[Cone.IMPULSE] = onto_path(work.contact_kin[c, Kin.GAP], impulse, weight, kappa)
-        _start_friction(model, work, c, kappa)
+        z[Cone.SLACK], z[Cone.IMPULSE] = onto_path(data.contact_kin[c, Kin.GAP], impulse, weight, kappa)
+        _start_friction(model, data, c, kappa)
 
 
 @kernel
-def _start_friction(model: Model, work: Work, c: int, kappa: float) -> None:
+def _start_friction(model: Model, data: Data, c: int, kappa: float) -> None:
     """Friction of contact c on the central path of kappa at its slip."""
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        start_cone(model, work, c, kappa)
+        start_cone(model, data, c, kappa)
     elif law == Law.LINEAR:
-        start_pyramid(model, work, c, kappa)
+        start_pyramid(model, data, c, kappa)
 
 
 @kernel
@@ -81,18 +81,18 @@ def _response(model: Model, c: int) -> float:
 
 
 @kernel
-def contact_error(model: Model, work: Work, c: int) -> float:
+def contact_error(model: Model, data: Data, c: int) -> float:
     """Largest equality residual of contact c: |gap - s|, and those of the pyramid."""
-    r = abs(work.contact_kin[c, Kin.GAP] - work.cone[c, Cone.SLACK])
+    r = abs(data.contact_kin[c, Kin.GAP] - data.cone[c, Cone.SLACK])
     if law_of(model, c) == Law.LINEAR:
-        r = max(r, pyramid_error(model, work, c))
+        r = max(r, pyramid_error(model, data, c))
     return r
 
 
 @kernel
-def contact_impulse(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+def contact_impulse(model: Model, data: Data, c: int) -> tuple[float, float, float]:
     """Impulse (normal, t1, t2) of the present cone variables."""
-    z = work.cone[c]
+    z = data.cone[c]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
         return z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
@@ -106,147 +106,147 @@ def contact_impulse(model: Model, work: Work, c: int) -> tuple[float, float, flo
 
 
 @kernel
-def contact_products(model: Model, work: Work, c: int) -> tuple[float, float, float, float]:
+def contact_products(model: Model, data: Data, c: int) -> tuple[float, float, float, float]:
     """(sum, count, low, high) of the complementarity products of contact c; all equal kappa on the central path."""
-    p = work.cone[c, Cone.SLACK] * work.cone[c, Cone.IMPULSE]
+    p = data.cone[c, Cone.SLACK] * data.cone[c, Cone.IMPULSE]
     if law_of(model, c) == Law.LINEAR:
-        total, lo, hi = pyramid_products(model, work, c)
+        total, lo, hi = pyramid_products(model, data, c)
         return p + total, 6.0, min(p, lo), max(p, hi)
     return p, 1.0, p, p
 
 
 @kernel
-def slip_violation(model: Model, work: Work, c: int, kappa: float) -> float:
+def slip_violation(model: Model, data: Data, c: int, kappa: float) -> float:
     """Violation of the law of the exact cone, in units of kappa; 0 for the others."""
-    return cone_violation(model, work, c, kappa) if law_of(model, c) == Law.NONLINEAR else 0.0
+    return cone_violation(model, data, c, kappa) if law_of(model, c) == Law.NONLINEAR else 0.0
 
 
 @kernel
-def slip_noise(model: Model, work: Work, h: float) -> float:
+def slip_noise(model: Model, data: Data, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0
-    for m in range(work.active_count[0]):
-        c = work.active[m]
+    for m in range(data.active_count[0]):
+        c = data.active[m]
         i = model.contact_body[c]
-        k = work.contact_kin[c]
-        length = abs(work.pos3[i, 0]) + abs(work.pos3[i, 1]) + abs(work.pos3[i, 2])
+        k = data.contact_kin[c]
+        length = abs(data.pos3[i, 0]) + abs(data.pos3[i, 1]) + abs(data.pos3[i, 2])
         length += abs(k[Kin.ARM]) + abs(k[Kin.ARM + 1]) + abs(k[Kin.ARM + 2])
         speed = length / h + abs(k[Kin.SLIP1]) + abs(k[Kin.SLIP2])
-        e = max(e, 4e-16 * model.contact_friction[c] * work.cone[c, Cone.IMPULSE] * speed)
+        e = max(e, 4e-16 * model.contact_friction[c] * data.cone[c, Cone.IMPULSE] * speed)
     return e
 
 
 @kernel
-def contact_products_ahead(model: Model, work: Work, c: int, alpha: float) -> tuple[float, float]:
+def contact_products_ahead(model: Model, data: Data, c: int, alpha: float) -> tuple[float, float]:
     """(sum, count) of the complementarity products after a step of length alpha."""
-    z = work.cone[c]
-    d = work.cone_step[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
     p = (z[Cone.SLACK] + alpha * d[Cone.SLACK]) * (z[Cone.IMPULSE] + alpha * d[Cone.IMPULSE])
     if law_of(model, c) == Law.LINEAR:
-        return p + pyramid_products_ahead(model, work, c, alpha), 6.0
+        return p + pyramid_products_ahead(model, data, c, alpha), 6.0
     return p, 1.0
 
 
 @kernel
-def keep_in_cone(model: Model, work: Work, c: int) -> None:
+def keep_in_cone(model: Model, data: Data, c: int) -> None:
     """Shorten the friction of the exact cone to mu gamma."""
     if law_of(model, c) == Law.NONLINEAR:
-        z = work.cone[c]
+        z = data.cone[c]
         z[Cone.FRICTION1], z[Cone.FRICTION2] = within_cone(
             model.contact_friction[c] * z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
         )
 
 
 @kernel
-def contact_boundary(model: Model, work: Work, c: int) -> float:
+def contact_boundary(model: Model, data: Data, c: int) -> float:
     """Largest step that keeps the cone variables of contact c in their cones, or 1e30."""
-    z = work.cone[c]
-    d = work.cone_step[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
     a = min(orthant_step(z[Cone.SLACK], d[Cone.SLACK]), orthant_step(z[Cone.IMPULSE], d[Cone.IMPULSE]))
     if law_of(model, c) == Law.LINEAR:
-        a = min(a, pyramid_boundary(model, work, c))
+        a = min(a, pyramid_boundary(model, data, c))
     return a
 
 
 @kernel
-def return_contact(model: Model, work: Work, h: float, c: int, kappa: float) -> None:
+def return_contact(model: Model, data: Data, h: float, c: int, kappa: float) -> None:
     """The pairs of contact c that left their cones put back onto the central path of kappa.
 
     Gaps weigh against impulses as h/m, slips as 1/m.
     """
     weight = _response(model, c)
-    return_pair(work.cone[c], work.cone_trial[c], 0, 1, h * weight, kappa)
+    return_pair(data.cone[c], data.cone_trial[c], 0, 1, h * weight, kappa)
     if law_of(model, c) == Law.LINEAR:
-        return_pyramid(model, work, c, weight, kappa)
+        return_pyramid(model, data, c, weight, kappa)
 
 
 @kernel
-def condense_contact(model: Model, work: Work, h: float, c: int, kappa: float, share: float, form: int) -> None:
+def condense_contact(model: Model, data: Data, h: float, c: int, kappa: float, share: float, form: int) -> None:
     """W = d(impulse)/d(gap, slip) by the law linearised at kappa, W_nn = -gamma/s; fills contact_W, contact_scale.
 
     share: of the growth of the friction with the normal impulse, 1 for the derivative of the exact cone.
     form: in the LINEAR one a contact that sticks takes the form of its law that is linear in the slip; the SOFT one is
     that of derivatives (softening.py).
     """
-    W = work.contact_W[c]
+    W = data.contact_W[c]
     for e in range(9):
         W[e] = 0.0
-    W[0] = -work.cone[c, Cone.IMPULSE] / work.cone[c, Cone.SLACK]
+    W[0] = -data.cone[c, Cone.IMPULSE] / data.cone[c, Cone.SLACK]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        condense_cone(model, work, c, kappa, share, form == LawForm.LINEAR)
+        condense_cone(model, data, c, kappa, share, form == LawForm.LINEAR)
     elif law == Law.LINEAR:
-        condense_pyramid(model, work, c)
+        condense_pyramid(model, data, c)
     if form == LawForm.SOFT:
-        soften(model, work, h, c)
+        soften(model, data, h, c)
 
 
 @kernel
-def contact_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
+def contact_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> None:
     """contact_w: the constant part of d(impulse) = W d(gap, slip) + w for the target.
 
     `target.corrected`: how much of the second-order term of the affine step now in cone_step is subtracted (Mehrotra).
     """
-    z = work.cone[c]
-    d = work.cone_step[c]
-    w = work.contact_w[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
+    w = data.contact_w[c]
     r = target.kappa - z[Cone.SLACK] * z[Cone.IMPULSE]
     if target.corrected > 0.0:
         r -= target.corrected * d[Cone.SLACK] * d[Cone.IMPULSE]
-    w[0] = (r - z[Cone.IMPULSE] * target.share * (work.contact_kin[c, Kin.GAP] - z[Cone.SLACK])) / z[Cone.SLACK]
+    w[0] = (r - z[Cone.IMPULSE] * target.share * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])) / z[Cone.SLACK]
     w[1] = 0.0
     w[2] = 0.0
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        cone_constant(model, work, c)
+        cone_constant(model, data, c)
     elif law == Law.LINEAR:
-        pyramid_constant(model, work, c, target)
+        pyramid_constant(model, data, c, target)
 
 
 @kernel
-def recover_contact(model: Model, work: Work, c: int, rate: Vec3, share: float) -> None:
+def recover_contact(model: Model, data: Data, c: int, rate: Vec3, share: float) -> None:
     """cone_step of contact c, where its gap and slip change by `rate`: contact_rate, or pair_rate between bodies."""
-    z = work.cone[c]
-    d = work.cone_step[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
     a, x, y = rate
-    d[Cone.SLACK] = a + share * (work.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
-    d[Cone.IMPULSE] = work.contact_W[c, 0] * a + work.contact_w[c, 0]
+    d[Cone.SLACK] = a + share * (data.contact_kin[c, Kin.GAP] - z[Cone.SLACK])
+    d[Cone.IMPULSE] = data.contact_W[c, 0] * a + data.contact_w[c, 0]
     law = law_of(model, c)
     if law == Law.NONLINEAR:
-        recover_cone(work, c, a, x, y)
+        recover_cone(data, c, a, x, y)
     elif law == Law.LINEAR:
-        recover_pyramid(model, work, c, x, y, share)
+        recover_pyramid(model, data, c, x, y, share)
 
 
 @kernel
-def report_contact(model: Model, work: Work, c: int, F: Vector, out: Vector) -> None:
+def report_contact(model: Model, data: Data, c: int, F: Vector, out: Vector) -> None:
     """One row, with the frame F of its normal and tangents."""
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    fn, f1, f2 = contact_impulse(model, work, c)
+    k = data.contact_kin[c]
+    fn, f1, f2 = contact_impulse(model, data, c)
     for e in range(3):
         out[e] = F[e] * fn + F[3 + e] * f1 + F[6 + e] * f2
-        out[3 + e] = work.pos3[i, e] + k[Kin.ARM + e]
+        out[3 + e] = data.pos3[i, e] + k[Kin.ARM + e]
         out[8 + e] = F[e]
-    out[6] = k[Kin.GAP] + work.bounce[c, Bounce.FLOOR]
+    out[6] = k[Kin.GAP] + data.bounce[c, Bounce.FLOOR]
     out[7] = (k[Kin.SLIP1] * k[Kin.SLIP1] + k[Kin.SLIP2] * k[Kin.SLIP2]) ** 0.5

@@ -7,7 +7,7 @@ from sim.contact.ground_contact import contact_kinematics
 from sim.contact.inactive import sunk_contact
 from sim.contact.pairs.pair_report import report_pairs
 from sim.model.columns import Bound
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import optional
@@ -15,7 +15,7 @@ from solvers.types import Matrix
 
 
 @optional(Slot.WORST_CONTACT, default=-1.0)
-def worst_contact(model: Model, work: Work, kappa: float) -> float:
+def worst_contact(model: Model, data: Data, kappa: float) -> float:
     """Index of the contact that cannot leave the ground, or of the one furthest from its law; -1 when a limit is worse
     or there is none.
     """
@@ -25,10 +25,10 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
     worst = -1.0
     error = 0.0
     for k in range(model.limit_dof.shape[0]):
-        error = max(error, abs(work.bound_gap[k] - work.bound[k, Bound.SLACK]))
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        e = contact_error(model, work, c) + slip_violation(model, work, c, kappa)
+        error = max(error, abs(data.bound_gap[k] - data.bound[k, Bound.SLACK]))
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        e = contact_error(model, data, c) + slip_violation(model, data, c, kappa)
         if e > error:
             error = e
             worst = float(c)
@@ -36,17 +36,17 @@ def worst_contact(model: Model, work: Work, kappa: float) -> float:
 
 
 @optional(Slot.REPORT_CONTACTS)
-def report_contacts(model: Model, work: Work, h: float, out: Matrix) -> None:
+def report_contacts(model: Model, data: Data, h: float, out: Matrix) -> None:
     """out[c] = impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3), after a step.
 
     (ncontact, 11)
     """
-    for m in range(work.inactive_count[0]):
-        first = work.inactive_first[m]
+    for m in range(data.inactive_count[0]):
+        first = data.inactive_first[m]
         for c in range(first, model.cluster_end[first]):
-            contact_kinematics(model, work, h, c)
+            contact_kinematics(model, data, h, c)
     for c in range(model.contact_height.shape[0]):
         if model.contact_hold[c] != 0:
-            contact_kinematics(model, work, h, c)
-        report_contact(model, work, c, work.contact_frame[c], out[c])
-    report_pairs(model, work, out)
+            contact_kinematics(model, data, h, c)
+        report_contact(model, data, c, data.contact_frame[c], out[c])
+    report_pairs(model, data, out)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from sim.contact.terrain_contact import place_on_terrain, turn_on_terrain
 from sim.model.columns import Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import cross, put_three, rotate, three, transposed_times
@@ -23,26 +23,26 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def contact_kinematics(model: Model, work: Work, h: float, c: int) -> None:
+def contact_kinematics(model: Model, data: Data, h: float, c: int) -> None:
     """Gap, slip and arms at configuration 3 of contact c."""
     g = 2.0 / h
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    f = work.contact_frame[c]
+    k = data.contact_kin[c]
+    f = data.contact_frame[c]
     curved = model.contact_terrain[c] > 0
     if curved:
-        place_on_terrain(model, work, c)
+        place_on_terrain(model, data, c)
     point = model.contact_point[c]
-    px, py, pz = rotate(work.rot3, i, point[0], point[1], point[2])
+    px, py, pz = rotate(data.rot3, i, point[0], point[1], point[2])
     rho = model.contact_radius[c]
     x, y, z = px - rho * f[0], py - rho * f[1], pz - rho * f[2]
-    ox, oy, oz = g * work.turn[i, 1], g * work.turn[i, 2], g * work.turn[i, 3]
+    ox, oy, oz = g * data.turn[i, 1], g * data.turn[i, 2], g * data.turn[i, 3]
     vx, vy, vz = cross(ox, oy, oz, x, y, z)
-    vx += (work.pos3[i, 0] - work.pos2[i, 0]) / h
-    vy += (work.pos3[i, 1] - work.pos2[i, 1]) / h
-    vz += (work.pos3[i, 2] - work.pos2[i, 2]) / h
+    vx += (data.pos3[i, 0] - data.pos2[i, 0]) / h
+    vy += (data.pos3[i, 1] - data.pos2[i, 1]) / h
+    vz += (data.pos3[i, 2] - data.pos2[i, 2]) / h
     if not curved:
-        X, Y, Z = work.pos3[i, 0] + x, work.pos3[i, 1] + y, work.pos3[i, 2] + z
+        X, Y, Z = data.pos3[i, 0] + x, data.pos3[i, 1] + y, data.pos3[i, 2] + z
         k[Kin.GAP] = f[0] * X + f[1] * Y + f[2] * Z - model.contact_height[c]
     k[Kin.SLIP1] = f[3] * vx + f[4] * vy + f[5] * vz
     k[Kin.SLIP2] = f[6] * vx + f[7] * vy + f[8] * vz
@@ -51,7 +51,7 @@ def contact_kinematics(model: Model, work: Work, h: float, c: int) -> None:
 
 
 @kernel
-def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
+def contact_jacobian(model: Model, data: Data, h: float, c: int) -> None:
     """d(gap, slip)/d(twist of configuration 3), about O: by the translation, and by the rotation
 
     gap     n        (d3 + R3 p) x n
@@ -60,14 +60,14 @@ def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
     and what a terrain adds because its frame changes from place to place.
     """
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    f = work.contact_frame[c]
-    dx = work.pos3[i, 0] - work.origin[0]
-    dy = work.pos3[i, 1] - work.origin[1]
-    dz = work.pos3[i, 2] - work.origin[2]
+    k = data.contact_kin[c]
+    f = data.contact_frame[c]
+    dx = data.pos3[i, 0] - data.origin[0]
+    dy = data.pos3[i, 1] - data.origin[1]
+    dz = data.pos3[i, 2] - data.origin[2]
     px, py, pz = three(k, Kin.POINT)
     put_three(cross(dx + px, dy + py, dz + pz, f[0], f[1], f[2]), Kin.BY_ROTATION, k)
-    w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
+    w, sx, sy, sz = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]
     g = 2.0 / h
     for e in range(3):
         k[Kin.BY_TRANSLATION + e] = f[e]
@@ -84,18 +84,18 @@ def contact_jacobian(model: Model, work: Work, h: float, c: int) -> None:
         k[Kin.BY_ROTATION + 1 + 3 * e] = (ay + w * yy + by) / h - g * my
         k[Kin.BY_ROTATION + 2 + 3 * e] = (az + w * yz + bz) / h - g * mz
     if model.contact_terrain[c] > 0:
-        turn_on_terrain(model, work, h, c)
+        turn_on_terrain(model, data, h, c)
 
 
 @kernel
-def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+def add_contact_wrench(model: Model, data: Data, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= wrench about O of the impulse n fn + t1 f1 + t2 f2 at contact c (accumulated)."""
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
-    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
-    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
-    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
+    k = data.contact_kin[c]
+    x, y, z = transposed_times(data.contact_frame[c], fn, f1, f2)
+    ax = data.pos2[i, 0] - data.origin[0] + k[Kin.ARM]
+    ay = data.pos2[i, 1] - data.origin[1] + k[Kin.ARM + 1]
+    az = data.pos2[i, 2] - data.origin[2] + k[Kin.ARM + 2]
     tx, ty, tz = cross(ax, ay, az, x, y, z)
     out[i, 0] -= x
     out[i, 1] -= y
@@ -106,19 +106,19 @@ def add_contact_wrench(model: Model, work: Work, c: int, fn: float, f1: float, f
 
 
 @kernel
-def add_contact_law(model: Model, work: Work, c: int, out: Matrix) -> None:
+def add_contact_law(model: Model, data: Data, c: int, out: Matrix) -> None:
     """out[body] -= B^T W C, about O (accumulated):
 
     C = d(gap, slip)/d(twist), W = d(impulse)/d(gap, slip), B^T the map from impulse to wrench.
     """
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    F = work.contact_frame[c]
-    W = work.contact_W[c]
+    k = data.contact_kin[c]
+    F = data.contact_frame[c]
+    W = data.contact_W[c]
     A = out[i]
-    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
-    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
-    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
+    ax = data.pos2[i, 0] - data.origin[0] + k[Kin.ARM]
+    ay = data.pos2[i, 1] - data.origin[1] + k[Kin.ARM + 1]
+    az = data.pos2[i, 2] - data.origin[2] + k[Kin.ARM + 2]
     x0, y0, z0 = transposed_times(F, W[0], W[3], W[6])  # columns of F^T W
     x1, y1, z1 = transposed_times(F, W[1], W[4], W[7])
     x2, y2, z2 = transposed_times(F, W[2], W[5], W[8])
@@ -137,11 +137,11 @@ def add_contact_law(model: Model, work: Work, c: int, out: Matrix) -> None:
 
 
 @kernel
-def add_contact_turn(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+def add_contact_turn(model: Model, data: Data, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= [f] [R3 p] on rotations: the arm of the impulse turns with the body, d(r x f) = [f] [R3 p] dphi."""
-    k = work.contact_kin[c]
+    k = data.contact_kin[c]
     A = out[model.contact_body[c]]
-    x, y, z = transposed_times(work.contact_frame[c], fn, f1, f2)
+    x, y, z = transposed_times(data.contact_frame[c], fn, f1, f2)
     px, py, pz = three(k, Kin.POINT)
     dot = x * px + y * py + z * pz
     A[21] -= px * x - dot
@@ -163,8 +163,8 @@ def _rate(k: Vector, row: int, t: Vector) -> float:
 
 
 @kernel
-def contact_rate(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+def contact_rate(model: Model, data: Data, c: int) -> tuple[float, float, float]:
     """d(gap, slip) = C twist, with the twists of the last solve."""
-    k = work.contact_kin[c]
-    t = work.twist[model.contact_body[c]]
+    k = data.contact_kin[c]
+    t = data.twist[model.contact_body[c]]
     return _rate(k, 0, t), _rate(k, 1, t), _rate(k, 2, t)

@@ -31,9 +31,9 @@ from sim.contact.terrain_contact import terrain_gap
 from sim.mechanism.confined import SUNK
 from sim.mechanism.pack_clusters import STIFFNESS
 from sim.model.columns import Cluster, Inactive
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Options
+from sim.model.options import StepOptions
 from solvers.compiler import kernel
 from solvers.rotation import rotate, three
 
@@ -48,13 +48,13 @@ def highest(model: Model, c: int) -> float:
 
 
 @kernel
-def cluster_gap(model: Model, work: Work, c: int, height: float, third: bool) -> float:
+def cluster_gap(model: Model, data: Data, c: int, height: float, third: bool) -> float:
     """Lower bound of the gaps of the cluster that begins at contact c, at configuration 3 or 2.   height: `highest`."""
     if model.contact_terrain[c] > 0:
-        return terrain_gap(model, work, c, third)
+        return terrain_gap(model, data, c, third)
     i = model.contact_body[c]
-    pos = work.pos3 if third else work.pos2
-    rot = work.rot3 if third else work.rot2
+    pos = data.pos3 if third else data.pos2
+    rot = data.rot3 if third else data.rot2
     n = model.contact_frame[c]
     p = model.cluster[c]
     x, y, z = rotate(rot, i, *three(p, Cluster.CENTRE))
@@ -71,66 +71,66 @@ def sunk_contact(model: Model) -> int:
 
 
 @kernel
-def choose_active(model: Model, work: Work, options: Options) -> None:
+def choose_active(model: Model, data: Data, options: StepOptions) -> None:
     """Sort contacts into active and inactive ones, from configuration 2 and the motion that led there.
 
     Impulses of the step before stand until the motion changes them; a motion that begins forgets them (rollout.py).
     """
-    known = work.inactive_kappa[0] == options.kappa
-    work.inactive_kappa[0] = options.kappa
+    known = data.inactive_kappa[0] == options.kappa
+    data.inactive_kappa[0] = options.kappa
     count = model.contact_height.shape[0]
     least = STIFFNESS * options.tolerance / (max(1, count) * options.kappa)
-    work.active_ground_count[0] = 0
-    work.inactive_count[0] = 0
+    data.active_ground_count[0] = 0
+    data.inactive_count[0] = 0
     c = 0
     while c < count:
         i = model.contact_body[c]
         n = model.contact_frame[c]
-        most = n[0] * work.pos2[i, 0] + n[1] * work.pos2[i, 1] + n[2] * work.pos2[i, 2] - model.contact_height[c]
+        most = n[0] * data.pos2[i, 0] + n[1] * data.pos2[i, 1] + n[2] * data.pos2[i, 2] - model.contact_height[c]
         most = 0.5 * (most + model.cluster[c, Cluster.ARM])  # no contact has more: a quick no, for most
         if model.contact_terrain[c] > 0:
             most = 1e9
         a = 0.0
         if most > 0.0 and _stiffness(model, options.h, c, most) <= least * most * most:
-            a = _half_gap_ahead(model, work, c)
+            a = _half_gap_ahead(model, data, c)
             if not (a > 0.0 and _stiffness(model, options.h, c, a) <= least * a * a):
                 a = 0.0
-        work.inactive[c, Inactive.ACTIVATION] = a
+        data.inactive[c, Inactive.ACTIVATION] = a
         if a == 0.0 or not known:
-            work.inactive[c, Inactive.LEAST_GAP] = 0.0
-        _enlist(model, work, c)
+            data.inactive[c, Inactive.LEAST_GAP] = 0.0
+        _enlist(model, data, c)
         c = model.cluster_end[c]
-    work.active_count[0] = work.active_ground_count[0]
-    enlist_pairs(model, work)
-    work.inactive_share[0] = options.tolerance / max(1, work.inactive_count[0])
+    data.active_count[0] = data.active_ground_count[0]
+    enlist_pairs(model, data)
+    data.inactive_share[0] = options.tolerance / max(1, data.inactive_count[0])
 
 
 @kernel
-def _enlist(model: Model, work: Work, c: int) -> None:
+def _enlist(model: Model, data: Data, c: int) -> None:
     """Append a cluster to inactive_first, or its contacts to `active`; what cannot move is in neither."""
     if model.contact_hold[c] != 0:
         return
-    if work.inactive[c, Inactive.ACTIVATION] > 0.0:
-        work.inactive_first[work.inactive_count[0]] = c
-        work.inactive_count[0] += 1
+    if data.inactive[c, Inactive.ACTIVATION] > 0.0:
+        data.inactive_first[data.inactive_count[0]] = c
+        data.inactive_count[0] += 1
         return
-    n = work.active_ground_count[0]
+    n = data.active_ground_count[0]
     for k in range(c, model.cluster_end[c]):
-        work.active[n] = k
+        data.active[n] = k
         n += 1
-    work.active_ground_count[0] = n
+    data.active_ground_count[0] = n
 
 
 @kernel
-def _half_gap_ahead(model: Model, work: Work, c: int) -> float:
+def _half_gap_ahead(model: Model, data: Data, c: int) -> float:
     """Half the gap that a cluster has after one more step like the last one, or less."""
     i = model.contact_body[c]
     travel = 0.0
     for k in range(3):
-        travel += abs(work.move_in[i, k]) + 2.0 * model.cluster[c, Cluster.ARM] * abs(work.turn_in[i, 1 + k])
+        travel += abs(data.move_in[i, k]) + 2.0 * model.cluster[c, Cluster.ARM] * abs(data.turn_in[i, 1 + k])
     height = highest(model, c)
-    work.inactive[c, Inactive.HEIGHT] = height
-    return 0.5 * (cluster_gap(model, work, c, height, False) - travel)
+    data.inactive[c, Inactive.HEIGHT] = height
+    return 0.5 * (cluster_gap(model, data, c, height, False) - travel)
 
 
 @kernel
@@ -142,21 +142,21 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
 
 
 @kernel
-def has_activated(model: Model, work: Work) -> bool:
+def has_activated(model: Model, data: Data) -> bool:
     """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
-    found = pairs_came_near(model, work)
-    for m in range(work.inactive_count[0]):
-        c = work.inactive_first[m]
-        if cluster_gap(model, work, c, work.inactive[c, Inactive.HEIGHT], True) < work.inactive[c, Inactive.ACTIVATION]:
+    found = pairs_came_near(model, data)
+    for m in range(data.inactive_count[0]):
+        c = data.inactive_first[m]
+        if cluster_gap(model, data, c, data.inactive[c, Inactive.HEIGHT], True) < data.inactive[c, Inactive.ACTIVATION]:
             found = True
-            work.inactive[c, Inactive.ACTIVATION] = 0.0
-            work.inactive[c, Inactive.LEAST_GAP] = 0.0
+            data.inactive[c, Inactive.ACTIVATION] = 0.0
+            data.inactive[c, Inactive.LEAST_GAP] = 0.0
     if found:
-        work.active_ground_count[0] = 0
-        work.inactive_count[0] = 0
+        data.active_ground_count[0] = 0
+        data.inactive_count[0] = 0
         for c in range(model.contact_height.shape[0]):
             if model.cluster_end[c] > 0:
-                _enlist(model, work, c)
-        work.active_count[0] = work.active_ground_count[0]
-        enlist_pairs(model, work)
+                _enlist(model, data, c)
+        data.active_count[0] = data.active_ground_count[0]
+        enlist_pairs(model, data)
     return found

@@ -13,30 +13,30 @@ from sim.contact.inactive_bounds import ANGLE, NEARER, bound_changes, keep_motio
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.dynamics.displacements import third_quaternion
 from sim.model.columns import Cluster, Cone, Inactive, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Law, Model
 from solvers.compiler import inlined, kernel
 from solvers.rotation import cross, put_three, rotate, three, transposed_times
 
 
 @kernel
-def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
+def changes(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
     """Bounds of the change of an inactive cluster's wrench since its law was evaluated: by that law, by turned arms."""
     i = model.contact_body[c]
-    row = work.inactive[c]
+    row = data.inactive[c]
     if row[Inactive.LEAST_GAP] == 0.0:
         return 1e300, 0.0
     dx = 0.0
     dv = 0.0
     dw = 0.0
     w = 0.0
-    q = third_quaternion(work, i)
+    q = third_quaternion(data, i)
     dq = abs(q[0] - row[Inactive.QUATERNION])
     for k in range(3):
-        omega = 2.0 / h * work.turn[i, 1 + k]
-        dx += abs(work.pos3[i, k] - row[Inactive.POSITION + k])
+        omega = 2.0 / h * data.turn[i, 1 + k]
+        dx += abs(data.pos3[i, k] - row[Inactive.POSITION + k])
         dq += abs(q[1 + k] - row[Inactive.QUATERNION + 1 + k])
-        dv += abs(work.move[i, k] / h - row[Inactive.VELOCITY + k])
+        dv += abs(data.move[i, k] / h - row[Inactive.VELOCITY + k])
         dw += abs(omega - row[Inactive.ANGULAR + k])
         w += abs(omega)
     arm = model.cluster[c, Cluster.ARM]
@@ -48,20 +48,20 @@ def changes(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
 
 
 @kernel
-def update_inactive(model: Model, work: Work, h: float) -> None:
+def update_inactive(model: Model, data: Data, h: float) -> None:
     """Impulses of the inactive clusters at configuration 3, to a share of the tolerance: turned or evaluated again."""
-    share = work.inactive_share[0]
-    for m in range(work.inactive_count[0]):
-        c = work.inactive_first[m]
-        law, arms = changes(model, work, h, c)
+    share = data.inactive_share[0]
+    for m in range(data.inactive_count[0]):
+        c = data.inactive_first[m]
+        law, arms = changes(model, data, h, c)
         if model.contact_terrain[c] > 0:
             if not law + arms <= share:
-                evaluate_on_terrain(model, work, h, c)
+                evaluate_on_terrain(model, data, h, c)
         elif not law <= share:
-            _evaluate(model, work, h, c)
-        elif work.inactive[c, Inactive.TURNED] > 0.0 or law + arms > share:
-            work.inactive[c, Inactive.TURNED] = 1.0
-            turn_arms(model, work, c)
+            _evaluate(model, data, h, c)
+        elif data.inactive[c, Inactive.TURNED] > 0.0 or law + arms > share:
+            data.inactive[c, Inactive.TURNED] = 1.0
+            turn_arms(model, data, c)
 
 
 @inlined
@@ -73,15 +73,15 @@ def _cone_impulse(mu: float, kappa: float, gap: float, x: float, y: float) -> tu
 
 
 @kernel
-def turn_arms(model: Model, work: Work, c: int) -> None:
+def turn_arms(model: Model, data: Data, c: int) -> None:
     """Inactive.MOMENT, that of the impulses of the last evaluation, at configuration 3:
 
     (R sum gamma p) x n + (R sum beta p) x t - sum rho beta n x t
     """
     i = model.contact_body[c]
-    row = work.inactive[c]
+    row = data.inactive[c]
     f = model.contact_frame[c]
-    R = work.rot3
+    R = data.rot3
     nx, ny, nz = cross(*rotate(R, i, *three(row, Inactive.ARMS)), f[0], f[1], f[2])
     ax, ay, az = cross(*rotate(R, i, *three(row, Inactive.ARMS + 3)), f[3], f[4], f[5])
     bx, by, bz = cross(*rotate(R, i, *three(row, Inactive.ARMS + 6)), f[6], f[7], f[8])
@@ -92,16 +92,16 @@ def turn_arms(model: Model, work: Work, c: int) -> None:
 
 
 @kernel
-def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
+def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     """The row of `inactive` and the cone variables of a cluster at configuration 3: affine in p and the radius rho,
 
     gap    n.x3 - height + (R^T n).p - rho              slip    t.v + (R^T (t x omega)).p - rho (t x omega).n
     """
     i = model.contact_body[c]
-    row = work.inactive[c]
-    keep_motion(work, h, i, row)
+    row = data.inactive[c]
+    keep_motion(data, h, i, row)
     f = model.contact_frame[c]
-    R = work.rot3
+    R = data.rot3
     x, y, z = cross(f[3], f[4], f[5], *three(row, Inactive.ANGULAR))
     a0, a1, a2 = transposed_times(R[i], x, y, z)
     ra = f[0] * x + f[1] * y + f[2] * z
@@ -114,7 +114,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     vb = f[6] * row[Inactive.VELOCITY] + f[7] * row[Inactive.VELOCITY + 1] + f[8] * row[Inactive.VELOCITY + 2]
     N, X, Y, rX, rY = 0.0, 0.0, 0.0, 0.0, 0.0
     N0, N1, N2, X0, X1, X2, Y0, Y1, Y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    kappa = work.inactive_kappa[0]
+    kappa = data.inactive_kappa[0]
     least = 1e300
     for k in range(c, model.cluster_end[c]):
         p = model.contact_point[k]
@@ -124,13 +124,13 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
         x = va + a0 * p[0] + a1 * p[1] + a2 * p[2] - rho * ra
         y = vb + b0 * p[0] + b1 * p[1] + b2 * p[2] - rho * rb
         if model.contact_law[k] == Law.LINEAR:
-            kin = work.contact_kin[k]
+            kin = data.contact_kin[k]
             kin[Kin.GAP], kin[Kin.SLIP1], kin[Kin.SLIP2] = gap, x, y
-            start_contact(model, work, k, kappa, row[Inactive.ACTIVATION])
-            fn, fx, fy = contact_impulse(model, work, k)
+            start_contact(model, data, k, kappa, row[Inactive.ACTIVATION])
+            fn, fx, fy = contact_impulse(model, data, k)
         else:
             fn, fx, fy = _cone_impulse(model.contact_friction[k], kappa, gap, x, y)
-            z = work.cone[k]
+            z = data.cone[k]
             z[Cone.SLACK], z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = gap, fn, fx, fy
         N, X, Y = N + fn, X + fx, Y + fy
         rX, rY = rX + rho * fx, rY + rho * fy
@@ -138,7 +138,7 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
         X0, X1, X2 = X0 + fx * p[0], X1 + fx * p[1], X2 + fx * p[2]
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
     row[Inactive.LEAST_GAP] = least
-    bound_changes(model, work, c, (1.0 - NEARER) * least)
+    bound_changes(model, data, c, (1.0 - NEARER) * least)
     turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
     row[Inactive.BY_TURN] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
     for k in range(3):
@@ -147,20 +147,20 @@ def _evaluate(model: Model, work: Work, h: float, c: int) -> None:
     put_three((X0, X1, X2), Inactive.ARMS + 3, row)
     put_three((Y0, Y1, Y2), Inactive.ARMS + 6, row)
     row[Inactive.RADIUS_ARMS], row[Inactive.RADIUS_ARMS + 1], row[Inactive.TURNED] = rX, rY, 0.0
-    turn_arms(model, work, c)
+    turn_arms(model, data, c)
 
 
 @kernel
-def add_inactive_wrenches(model: Model, work: Work) -> None:
+def add_inactive_wrenches(model: Model, data: Data) -> None:
     """wrench -= impulses of the inactive clusters, about O."""
-    for m in range(work.inactive_count[0]):
-        c = work.inactive_first[m]
+    for m in range(data.inactive_count[0]):
+        c = data.inactive_first[m]
         i = model.contact_body[c]
-        row = work.inactive[c]
+        row = data.inactive[c]
         x, y, z = three(row, Inactive.FORCE)
-        o = work.origin
-        tx, ty, tz = cross(work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], x, y, z)
-        A = work.wrench[i]
+        o = data.origin
+        tx, ty, tz = cross(data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2], x, y, z)
+        A = data.wrench[i]
         A[0] -= x
         A[1] -= y
         A[2] -= z

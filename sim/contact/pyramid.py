@@ -10,7 +10,7 @@ g = 1/(s_psi + psi sum k_i), in contact_scale: PyramidScale.
 from __future__ import annotations
 
 from sim.model.columns import Kin, Pyramid, PyramidScale
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
@@ -48,10 +48,10 @@ def _pyramid_slip(x: float, y: float, a: float) -> float:
 
 
 @optional(Slot.START_PYRAMID)
-def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
+def start_pyramid(model: Model, data: Data, c: int, kappa: float) -> None:
     """Variables on the central path of kappa at the present slip and gap slack."""
-    z = work.cone[c]
-    k = work.contact_kin[c]
+    z = data.cone[c]
+    k = data.contact_kin[c]
     psi = _pyramid_slip(k[Kin.SLIP1], k[Kin.SLIP2], z[Pyramid.SLACK] / model.contact_friction[c])
     z[Pyramid.SPEED] = psi
     z[Pyramid.CAP] = kappa / psi
@@ -61,9 +61,9 @@ def start_pyramid(model: Model, work: Work, c: int, kappa: float) -> None:
 
 
 @kernel
-def cap_error(model: Model, work: Work, c: int) -> float:
+def cap_error(model: Model, data: Data, c: int) -> float:
     """mu gamma - sum beta - s_psi of the pyramid."""
-    z = work.cone[c]
+    z = data.cone[c]
     return (
         model.contact_friction[c] * z[Pyramid.IMPULSE]
         - z[Pyramid.FRICTION]
@@ -75,20 +75,20 @@ def cap_error(model: Model, work: Work, c: int) -> float:
 
 
 @optional(Slot.PYRAMID_ERROR, default=0.0)
-def pyramid_error(model: Model, work: Work, c: int) -> float:
+def pyramid_error(model: Model, data: Data, c: int) -> float:
     """Largest of |s_psi - (mu gamma - sum beta)| and |s_i - (d_i.v_t + psi)|."""
-    z = work.cone[c]
-    k = work.contact_kin[c]
-    r = abs(cap_error(model, work, c))
+    z = data.cone[c]
+    k = data.contact_kin[c]
+    r = abs(cap_error(model, data, c))
     for e in range(4):
         r = max(r, abs(side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e]))
     return r
 
 
 @optional(Slot.PYRAMID_PRODUCTS, default=(0.0, 0.0, 0.0))
-def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, float]:
+def pyramid_products(model: Model, data: Data, c: int) -> tuple[float, float, float]:
     """(sum, low, high) of the five products."""
-    z = work.cone[c]
+    z = data.cone[c]
     total = z[Pyramid.SPEED] * z[Pyramid.CAP]
     lo = total
     hi = total
@@ -101,10 +101,10 @@ def pyramid_products(model: Model, work: Work, c: int) -> tuple[float, float, fl
 
 
 @optional(Slot.PYRAMID_PRODUCTS_AHEAD, default=0.0)
-def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> float:
+def pyramid_products_ahead(model: Model, data: Data, c: int, alpha: float) -> float:
     """Sum of the five products after a step of length alpha."""
-    z = work.cone[c]
-    d = work.cone_step[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
     total = (z[Pyramid.SPEED] + alpha * d[Pyramid.SPEED]) * (z[Pyramid.CAP] + alpha * d[Pyramid.CAP])
     for e in range(4):
         total += (z[Pyramid.FRICTION + e] + alpha * d[Pyramid.FRICTION + e]) * (
@@ -114,33 +114,33 @@ def pyramid_products_ahead(model: Model, work: Work, c: int, alpha: float) -> fl
 
 
 @optional(Slot.PYRAMID_BOUNDARY, default=1e30)
-def pyramid_boundary(model: Model, work: Work, c: int) -> float:
+def pyramid_boundary(model: Model, data: Data, c: int) -> float:
     """Largest step that keeps all ten variables positive, or 1e30."""
     a = 1e30
     for e in range(2, 12):
-        a = min(a, orthant_step(work.cone[c, e], work.cone_step[c, e]))
+        a = min(a, orthant_step(data.cone[c, e], data.cone_step[c, e]))
     return a
 
 
 @optional(Slot.RETURN_PYRAMID)
-def return_pyramid(model: Model, work: Work, c: int, weight: float, kappa: float) -> None:
+def return_pyramid(model: Model, data: Data, c: int, weight: float, kappa: float) -> None:
     """The five pairs put back onto the central path of kappa where they left their cones."""
-    return_pair(work.cone[c], work.cone_trial[c], 2, 3, weight, kappa)
+    return_pair(data.cone[c], data.cone_trial[c], 2, 3, weight, kappa)
     for e in range(4):
-        return_pair(work.cone[c], work.cone_trial[c], 8 + e, 4 + e, weight, kappa)
+        return_pair(data.cone[c], data.cone_trial[c], 8 + e, 4 + e, weight, kappa)
 
 
 @optional(Slot.CONDENSE_PYRAMID)
-def condense_pyramid(model: Model, work: Work, c: int) -> None:
+def condense_pyramid(model: Model, data: Data, c: int) -> None:
     """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4).
 
     On the diagonal K and psi g e^2 nearly cancel where the contact slides, but not as sums of what is positive:
 
         (k1 + k2) (s_psi + psi (k3 + k4)) g + 4 psi k1 k2 g
     """
-    z = work.cone[c]
-    W = work.contact_W[c]
-    q = work.contact_scale[c]
+    z = data.cone[c]
+    W = data.contact_W[c]
+    q = data.contact_scale[c]
     mu = model.contact_friction[c]
     total = 0.0
     for e in range(4):
@@ -162,13 +162,13 @@ def condense_pyramid(model: Model, work: Work, c: int) -> None:
 
 
 @optional(Slot.PYRAMID_CONSTANT)
-def pyramid_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> None:
+def pyramid_constant(model: Model, data: Data, c: int, target: NewtonTarget) -> None:
     """Friction part of contact_w, after its normal part."""
-    z = work.cone[c]
-    d = work.cone_step[c]
-    k = work.contact_kin[c]
-    w = work.contact_w[c]
-    q = work.contact_scale[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
+    k = data.contact_kin[c]
+    w = data.contact_w[c]
+    q = data.contact_scale[c]
     total = 0.0
     for e in range(4):
         r = target.kappa - z[Pyramid.FRICTION + e] * z[Pyramid.SLIP + e]
@@ -180,7 +180,7 @@ def pyramid_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> 
     r = target.kappa - z[Pyramid.SPEED] * z[Pyramid.CAP]
     if target.corrected > 0.0:
         r -= target.corrected * d[Pyramid.SPEED] * d[Pyramid.CAP]
-    total -= target.share * cap_error(model, work, c)
+    total -= target.share * cap_error(model, data, c)
     q[PyramidScale.SPEED] = (r + z[Pyramid.SPEED] * total) * q[PyramidScale.INVERSE]
     p = q[PyramidScale.SPEED] - z[Pyramid.SPEED] * q[PyramidScale.INVERSE] * model.contact_friction[c] * w[0]
     w[1] = q[PyramidScale.FRICTION] - q[PyramidScale.FRICTION + 1] - q[PyramidScale.SUM] * p
@@ -188,12 +188,12 @@ def pyramid_constant(model: Model, work: Work, c: int, target: NewtonTarget) -> 
 
 
 @optional(Slot.RECOVER_PYRAMID)
-def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share: float) -> None:
+def recover_pyramid(model: Model, data: Data, c: int, x: float, y: float, share: float) -> None:
     """Steps of the ten variables from the rates (x, y) of the slip, after the step of gamma."""
-    z = work.cone[c]
-    d = work.cone_step[c]
-    k = work.contact_kin[c]
-    q = work.contact_scale[c]
+    z = data.cone[c]
+    d = data.cone_step[c]
+    k = data.contact_kin[c]
+    q = data.contact_scale[c]
     mu = model.contact_friction[c]
     p = q[PyramidScale.SPEED] - z[Pyramid.SPEED] * q[PyramidScale.INVERSE] * (
         mu * d[Pyramid.IMPULSE] + q[PyramidScale.SUM] * x + q[PyramidScale.SUM + 1] * y
@@ -205,4 +205,4 @@ def recover_pyramid(model: Model, work: Work, c: int, x: float, y: float, share:
         d[Pyramid.FRICTION + e] = q[PyramidScale.FRICTION + e] - q[e] * t
         d[Pyramid.SLIP + e] = t + share * (side(e, k[Kin.SLIP1], k[Kin.SLIP2]) + z[Pyramid.SPEED] - z[Pyramid.SLIP + e])
         total += d[Pyramid.FRICTION + e]
-    d[Pyramid.CAP] = mu * d[Pyramid.IMPULSE] - total + share * cap_error(model, work, c)
+    d[Pyramid.CAP] = mu * d[Pyramid.IMPULSE] - total + share * cap_error(model, data, c)

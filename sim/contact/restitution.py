@@ -37,7 +37,7 @@ from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
 from sim.model.columns import Bounce, Frame, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
@@ -50,127 +50,127 @@ _NEVER = 1e9  # [m]
 
 
 @kernel
-def look_back(model: Model, work: Work, h: float, configuration: int) -> None:
+def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
     """Gaps of the active contacts at an earlier configuration, and their rows; configuration 3 is used up."""
     first = configuration == 1
-    pos = work.pos1 if first else work.pos2
-    rot = work.rot1 if first else work.rot2
+    pos = data.pos1 if first else data.pos2
+    rot = data.rot1 if first else data.rot2
     for i in range(pos.shape[0]):
         for k in range(3):
-            work.pos3[i, k] = pos[i, k]
+            data.pos3[i, k] = pos[i, k]
         for k in range(9):
-            work.rot3[i, k] = rot[i, k]
-    for m in range(work.active_ground_count[0]):
-        contact_kinematics(model, work, h, work.active[m])
-    work.feature_choice[0] = FeatureChoice.EVERY_POSE  # what touched there, whatever it is now
-    pair_kinematics(model, work, h)
-    work.feature_choice[0] = FeatureChoice.ONCE
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        b = work.bounce[c]
-        k = work.contact_kin[c]
+            data.rot3[i, k] = rot[i, k]
+    for m in range(data.active_ground_count[0]):
+        contact_kinematics(model, data, h, data.active[m])
+    data.feature_choice[0] = FeatureChoice.EVERY_POSE  # what touched there, whatever it is now
+    pair_kinematics(model, data, h)
+    data.feature_choice[0] = FeatureChoice.ONCE
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        b = data.bounce[c]
+        k = data.contact_kin[c]
         b[14 if first else 15] = k[Kin.GAP]
         row = b[Bounce.ROW1 : Bounce.ROW2] if first else b[Bounce.ROW2 : Bounce.GAP1]
         if c < model.contact_height.shape[0]:
-            contact_jacobian(model, work, h, c)
+            contact_jacobian(model, data, h, c)
             for r in range(3):
                 row[r], row[3 + r] = k[Kin.BY_TRANSLATION + r], k[Kin.BY_ROTATION + r]
             continue
-        F = work.pair_frame[c - model.contact_height.shape[0]]
-        o = work.origin
-        n = gap_normal(model, work, c - model.contact_height.shape[0])
+        F = data.pair_frame[c - model.contact_height.shape[0]]
+        o = data.origin
+        n = gap_normal(model, data, c - model.contact_height.shape[0])
         row[0], row[1], row[2] = n
         row[3], row[4], row[5] = cross(
             F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2], n[0], n[1], n[2]
         )
         for r in range(3):
             b[16 + r if first else 19 + r] = F[Frame.POINT + r]
-        if is_absent(work, c - model.contact_height.shape[0]):  # no impact of what was not there
+        if is_absent(data, c - model.contact_height.shape[0]):  # no impact of what was not there
             b[14 if first else 15] = -_NEVER if first else _NEVER
 
 
 @kernel
-def least_closing(model: Model, work: Work, h: float, c: int) -> float:
+def least_closing(model: Model, data: Data, h: float, c: int) -> float:
     """How much a gap closes in a step, at least, in an impact [m]."""
     g = model.gravity
     fall = 4.0 * h * h * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
     m = model.body_mass[model.contact_body[c]]
-    return h * sqrt(max(fall, work.inactive_kappa[0] / (h * m) if m > 0.0 else 0.0))
+    return h * sqrt(max(fall, data.inactive_kappa[0] / (h * m) if m > 0.0 else 0.0))
 
 
 @kernel
-def raise_floors(model: Model, work: Work, h: float, share: float) -> None:
+def raise_floors(model: Model, data: Data, h: float, share: float) -> None:
     """Floors of the impacts of this step, with a share of the restitution."""
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        b = work.bounce[c]
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        b = data.bounce[c]
         e = share * model.contact_restitution[c]
         floor = (1.0 - e) * b[Bounce.GAP2] + e * b[Bounce.GAP1]
-        fast = b[Bounce.GAP1] - b[Bounce.GAP2] > least_closing(model, work, h, c)
+        fast = b[Bounce.GAP1] - b[Bounce.GAP2] > least_closing(model, data, h, c)
         impact = e > 0.0 and fast and 2.0 * b[Bounce.GAP2] < b[Bounce.GAP1] and floor > 0.0
         b[Bounce.FLOOR] = floor if impact else 0.0
         b[Bounce.RESTITUTION] = e if impact else 0.0
 
 
 @optional(Slot.FIND_IMPACTS)
-def find_impacts(model: Model, work: Work, h: float) -> None:
+def find_impacts(model: Model, data: Data, h: float) -> None:
     """Which active contacts are impacts in this step, and their floors."""
-    for c in range(work.bounce.shape[0]):
-        work.bounce[c, Bounce.FLOOR] = 0.0
-        work.bounce[c, Bounce.RESTITUTION] = 0.0
-    work.bounce_share[0] = 1.0
-    look_back(model, work, h, 1)
-    look_back(model, work, h, 2)
-    raise_floors(model, work, h, 1.0)
+    for c in range(data.bounce.shape[0]):
+        data.bounce[c, Bounce.FLOOR] = 0.0
+        data.bounce[c, Bounce.RESTITUTION] = 0.0
+    data.bounce_share[0] = 1.0
+    look_back(model, data, h, 1)
+    look_back(model, data, h, 2)
+    raise_floors(model, data, h, 1.0)
 
 
 @optional(Slot.SUBTRACT_FLOORS)
-def subtract_floors(model: Model, work: Work) -> None:
+def subtract_floors(model: Model, data: Data) -> None:
     """contact_kin: gaps above the floors."""
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        work.contact_kin[c, Kin.GAP] -= work.bounce[c, Bounce.FLOOR]
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        data.contact_kin[c, Kin.GAP] -= data.bounce[c, Bounce.FLOOR]
 
 
 @kernel
-def velocity_sum(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+def velocity_sum(data: Data, h: float, i: int, x: float, y: float, z: float) -> Vec3:
     """Velocity of the point (x, y, z) of body i at configuration 2 over the interval 1-2, plus that over 2-3; 0 for the
     world.
     """
     if i < 0:
         return 0.0, 0.0, 0.0
-    before, after = work.turn_in[i], work.turn[i]
-    m, n, o = work.move_in[i], work.move[i], work.pos2[i]
+    before, after = data.turn_in[i], data.turn[i]
+    m, n, o = data.move_in[i], data.move[i], data.pos2[i]
     wx, wy, wz = before[1] + after[1], before[2] + after[2], before[3] + after[3]
     vx, vy, vz = cross(wx, wy, wz, x - o[0], y - o[1], z - o[2])
     return (m[0] + n[0] + 2.0 * vx) / h, (m[1] + n[1] + 2.0 * vy) / h, (m[2] + n[2] + 2.0 * vz) / h
 
 
 @kernel
-def impulse_work(model: Model, work: Work, h: float, c: int) -> float:
+def impulse_work(model: Model, data: Data, h: float, c: int) -> float:
     """1/2 f.(u + u') of contact c at the point P where its impulse f acts, at configuration 2."""
     ground = model.contact_height.shape[0]
     a = model.contact_body[c]
-    fn, f1, f2 = contact_impulse(model, work, c)
+    fn, f1, f2 = contact_impulse(model, data, c)
     if c < ground:
-        k = work.contact_kin[c]
-        p = work.pos2[a]
-        x, y, z = velocity_sum(work, h, a, p[0] + k[Kin.ARM], p[1] + k[Kin.ARM + 1], p[2] + k[Kin.ARM + 2])
-        fx, fy, fz = transposed_times(work.contact_frame[c], fn, f1, f2)
+        k = data.contact_kin[c]
+        p = data.pos2[a]
+        x, y, z = velocity_sum(data, h, a, p[0] + k[Kin.ARM], p[1] + k[Kin.ARM + 1], p[2] + k[Kin.ARM + 2])
+        fx, fy, fz = transposed_times(data.contact_frame[c], fn, f1, f2)
         return 0.5 * (fx * x + fy * y + fz * z)
-    if is_absent(work, c - ground):
+    if is_absent(data, c - ground):
         return 0.0
-    o = work.origin
-    rx, ry, rz = pair_arm(model, work, c - ground)
-    x, y, z = velocity_sum(work, h, a, o[0] + rx, o[1] + ry, o[2] + rz)
+    o = data.origin
+    rx, ry, rz = pair_arm(model, data, c - ground)
+    x, y, z = velocity_sum(data, h, a, o[0] + rx, o[1] + ry, o[2] + rz)
     b = model.coupling_body[model.pair_coupling[c - ground], 1]
-    u, v, w = velocity_sum(work, h, b, o[0] + rx, o[1] + ry, o[2] + rz)
-    fx, fy, fz = pair_force(work, c - ground, fn, f1, f2)
+    u, v, w = velocity_sum(data, h, b, o[0] + rx, o[1] + ry, o[2] + rz)
+    fx, fy, fz = pair_force(data, c - ground, fn, f1, f2)
     return 0.5 * (fx * (x - u) + fy * (y - v) + fz * (z - w))
 
 
 @optional(Slot.IMPACTS_GAINED, default=False)
-def impacts_gained(model: Model, work: Work, h: float) -> bool:
+def impacts_gained(model: Model, data: Data, h: float) -> bool:
     """Whether there were impacts, and the impulses of the solved step did work; floors are lower then.
 
     Lowering all rebounds by a part r takes some r/2 sum of gamma e |v_n'|. Parts are powers of 1/2: between them the
@@ -179,21 +179,21 @@ def impacts_gained(model: Model, work: Work, h: float) -> bool:
     gain = 0.0
     size = 0.0
     rebound = 0.0
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        b = work.bounce[c]
-        fn, _, _ = contact_impulse(model, work, c)
-        gain += impulse_work(model, work, h, c)
-        gap = work.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        b = data.bounce[c]
+        fn, _, _ = contact_impulse(model, data, c)
+        gain += impulse_work(model, data, h, c)
+        gap = data.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]
         size += 0.5 * fn * (abs(gap - b[Bounce.GAP2]) + abs(b[Bounce.GAP2] - b[Bounce.GAP1])) / h
         rebound += 0.5 * fn * b[Bounce.RESTITUTION] * abs(b[Bounce.GAP2] - b[Bounce.GAP1]) / h
     if not rebound > 0.0 or not gain > _NOISE * size:
         return False
-    least = max(gain / rebound, 2.0 * (1.0 - work.bounce_share[0]))
+    least = max(gain / rebound, 2.0 * (1.0 - data.bounce_share[0]))
     lost = _FINEST
     while lost < least:
         lost *= 2.0
     share = max(1.0 - lost, 0.0)
-    work.bounce_share[0] = share
-    raise_floors(model, work, h, share)
+    data.bounce_share[0] = share
+    raise_floors(model, data, h, share)
     return True

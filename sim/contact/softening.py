@@ -19,7 +19,7 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.model.columns import Bounce, Cone, ConeScale, Frame, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Law, Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, three
@@ -43,51 +43,51 @@ def free_response(model: Model, i: int) -> float:
 
 
 @kernel
-def speed_before(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+def speed_before(data: Data, h: float, i: int, x: float, y: float, z: float) -> Vec3:
     """Velocity over interval 1-2 of the point of body i at the arm (x, y, z) from its centre of mass; 0: the world."""
     if i < 0:
         return 0.0, 0.0, 0.0
-    s, d = work.turn_in[i], work.move_in[i]
+    s, d = data.turn_in[i], data.move_in[i]
     u, v, w = cross(2.0 * s[1], 2.0 * s[2], 2.0 * s[3], x, y, z)
     return (d[0] + u) / h, (d[1] + v) / h, (d[2] + w) / h
 
 
 @kernel
-def responses(model: Model, work: Work, h: float, c: int) -> tuple[float, float]:
+def responses(model: Model, data: Data, h: float, c: int) -> tuple[float, float]:
     """M and G of contact c [m/s per N s]."""
-    k = work.contact_kin[c]
+    k = data.contact_kin[c]
     a = model.contact_body[c]
     M = free_response(model, a)
-    x, y, z = speed_before(work, h, a, *three(k, Kin.ARM))
+    x, y, z = speed_before(data, h, a, *three(k, Kin.ARM))
     j = c - model.contact_height.shape[0]
     if j >= 0:
         b = model.coupling_body[model.pair_coupling[j], 1]
         if b >= 0:
             M += free_response(model, b)
-            p, o = work.pair_frame[j], work.pos3[b]
+            p, o = data.pair_frame[j], data.pos3[b]
             u, v, w = speed_before(
-                work, h, b, p[Frame.POINT] - o[0], p[Frame.POINT + 1] - o[1], p[Frame.POINT + 2] - o[2]
+                data, h, b, p[Frame.POINT] - o[0], p[Frame.POINT + 1] - o[1], p[Frame.POINT + 2] - o[2]
             )
             x, y, z = x - u, y - v, z - w
     g = model.gravity
     speed = sqrt(x * x + y * y + z * z) + h * sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    return M, max(min(M, speed / work.cone[c, Cone.IMPULSE]), _LEAST * M)
+    return M, max(min(M, speed / data.cone[c, Cone.IMPULSE]), _LEAST * M)
 
 
 @kernel
-def soften(model: Model, work: Work, h: float, c: int) -> None:
+def soften(model: Model, data: Data, h: float, c: int) -> None:
     """W of contact c becomes W', its derivative by friction (contact_scale) what it is then; contact_hard: M W'."""
-    W = work.contact_W[c]
+    W = data.contact_W[c]
     q = (
-        work.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
+        data.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]
         if model.contact_law[c] == Law.LINEAR
-        else work.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
+        else data.contact_scale[c, ConeScale.GROWTH : ConeScale.RESIDUAL]
     )
-    M, G = responses(model, work, h, c)
-    d = (_PART if work.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
+    M, G = responses(model, data, h, c)
+    d = (_PART if data.bounce[c, Bounce.RESTITUTION] == 0.0 else _PART_OF_IMPACTS) * sqrt(M * G)
     _compose(W, q, h * d if -h * d * W[0] > 1.0 else 0.0, d if -d * min(W[4], W[8]) > 1.0 else 0.0)
     hard = max(-h * W[0], -W[4], -W[8])
-    work.contact_hard[0] = max(work.contact_hard[0], M * hard)
+    data.contact_hard[0] = max(data.contact_hard[0], M * hard)
 
 
 @kernel

@@ -19,7 +19,7 @@ from math import sqrt
 
 from sim.contact.height_field import height_field
 from sim.model.columns import Bounce, Grid, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -46,20 +46,20 @@ def centre(model: Model, c: int, pos: Matrix, rot: Matrix) -> Vec3:
 
 
 @optional(Slot.PLACE_ON_TERRAIN)
-def place_on_terrain(model: Model, work: Work, c: int) -> None:
+def place_on_terrain(model: Model, data: Data, c: int) -> None:
     """Gap and contact_frame of contact c at configuration 3."""
-    x, y, z = centre(model, c, work.pos3, work.rot3)
+    x, y, z = centre(model, c, data.pos3, data.rot3)
     F, Fx, Fy, _xx, _xy, _yy = height_field(model, model.contact_terrain[c] - 1, x, y)
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
-    upright_frame(-i * Fx, -i * Fy, i, work.contact_frame[c])
-    work.contact_kin[c, Kin.GAP] = i * (z - F - model.contact_height[c])
+    upright_frame(-i * Fx, -i * Fy, i, data.contact_frame[c])
+    data.contact_kin[c, Kin.GAP] = i * (z - F - model.contact_height[c])
 
 
 @optional(Slot.TERRAIN_GAP, default=0.0)
-def terrain_gap(model: Model, work: Work, c: int, third: bool) -> float:
+def terrain_gap(model: Model, data: Data, c: int, third: bool) -> float:
     """Lower bound of the distance of contact c at configuration 3 or 2."""
     k = model.contact_terrain[c] - 1
-    x, y, z = centre(model, c, work.pos3, work.rot3) if third else centre(model, c, work.pos2, work.rot2)
+    x, y, z = centre(model, c, data.pos3, data.rot3) if third else centre(model, c, data.pos2, data.rot2)
     F = height_field(model, k, x, y)[0]
     return (z - F - model.contact_height[c]) / model.terrain_place[k, Grid.SLOPE]
 
@@ -83,36 +83,36 @@ def frame_turn(n: Vector, gx: float, gy: float) -> Vec3:
 
 
 @optional(Slot.TURN_ON_TERRAIN)
-def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
+def turn_on_terrain(model: Model, data: Data, h: float, c: int) -> None:
     """contact_turn = Omega, rotation of the frame by the twist about O; (gap, slip) rows of contact_kin on terrain.
 
     gap     m, (c - O) x m
     slip    those of a fixed frame, and  Omega^T (t x u - rho n x (t x omega))
     """
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    f = work.contact_frame[c]
-    x, y, z = centre(model, c, work.pos3, work.rot3)
+    k = data.contact_kin[c]
+    f = data.contact_frame[c]
+    x, y, z = centre(model, c, data.pos3, data.rot3)
     _F, Fx, Fy, Fxx, Fxy, Fyy = height_field(model, model.contact_terrain[c] - 1, x, y)
     e1, e2 = turn_columns(f[:3], Fxx, Fxy, Fyy)
-    ax, ay, az = x - work.origin[0], y - work.origin[1], z - work.origin[2]
-    W = work.contact_turn[c]
+    ax, ay, az = x - data.origin[0], y - data.origin[1], z - data.origin[2]
+    W = data.contact_turn[c]
     for r in range(3):
         u, v = e1[r], e2[r]
         W[6 * r], W[6 * r + 1], W[6 * r + 2] = u, v, 0.0
         W[6 * r + 3], W[6 * r + 4], W[6 * r + 5] = -az * v, az * u, ax * v - ay * u
     g = (
-        (k[Kin.GAP] + work.bounce[c, Bounce.FLOOR]) * f[2] * f[2]
+        (k[Kin.GAP] + data.bounce[c, Bounce.FLOOR]) * f[2] * f[2]
     )  # contact_kin has the gap above the floor of an impact
     mx, my, mz = f[0] - g * (Fxx * Fx + Fxy * Fy), f[1] - g * (Fxy * Fx + Fyy * Fy), f[2]
     k[Kin.BY_TRANSLATION], k[Kin.BY_TRANSLATION + 1], k[Kin.BY_TRANSLATION + 2] = mx, my, mz
     k[Kin.BY_ROTATION], k[Kin.BY_ROTATION + 1], k[Kin.BY_ROTATION + 2] = cross(ax, ay, az, mx, my, mz)
     q = 2.0 / h
-    o = (q * work.turn[i, 1], q * work.turn[i, 2], q * work.turn[i, 3])
+    o = (q * data.turn[i, 1], q * data.turn[i, 2], q * data.turn[i, 3])
     u0, u1, u2 = cross(o[0], o[1], o[2], *three(k, Kin.ARM))
-    u0 += (work.pos3[i, 0] - work.pos2[i, 0]) / h
-    u1 += (work.pos3[i, 1] - work.pos2[i, 1]) / h
-    u2 += (work.pos3[i, 2] - work.pos2[i, 2]) / h
+    u0 += (data.pos3[i, 0] - data.pos2[i, 0]) / h
+    u1 += (data.pos3[i, 1] - data.pos2[i, 1]) / h
+    u2 += (data.pos3[i, 2] - data.pos2[i, 2]) / h
     rho = model.contact_radius[c]
     for e in range(1, 3):
         t0, t1, t2 = f[3 * e], f[3 * e + 1], f[3 * e + 2]
@@ -126,21 +126,21 @@ def turn_on_terrain(model: Model, work: Work, h: float, c: int) -> None:
 
 
 @optional(Slot.ADD_FRAME_MATRIX)
-def add_frame_matrix(model: Model, work: Work, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+def add_frame_matrix(model: Model, data: Data, c: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[body] -= d(wrench about O)/d(twist) by the turning of the frame, of the impulse f = n fn + t1 f1 + t2 f2:
 
     (Omega x f,  a x (Omega x f) - rho (Omega x n) x f),   a: from O to where the impulse acts
     """
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    F = work.contact_frame[c]
-    W = work.contact_turn[c]
+    k = data.contact_kin[c]
+    F = data.contact_frame[c]
+    W = data.contact_turn[c]
     A = out[i]
     x, y, z = transposed_times(F, fn, f1, f2)
     rho = model.contact_radius[c]
-    ax = work.pos2[i, 0] - work.origin[0] + k[Kin.ARM]
-    ay = work.pos2[i, 1] - work.origin[1] + k[Kin.ARM + 1]
-    az = work.pos2[i, 2] - work.origin[2] + k[Kin.ARM + 2]
+    ax = data.pos2[i, 0] - data.origin[0] + k[Kin.ARM]
+    ay = data.pos2[i, 1] - data.origin[1] + k[Kin.ARM + 1]
+    az = data.pos2[i, 2] - data.origin[2] + k[Kin.ARM + 2]
     for j in range(6):
         d = cross(W[j], W[6 + j], W[12 + j], x, y, z)
         n = cross(W[j], W[6 + j], W[12 + j], F[0], F[1], F[2])

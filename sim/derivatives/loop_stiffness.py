@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.contact.pairs.wrench_columns import add_wrench_column, point_shift, unit_vector
 from sim.dynamics.loops.closure import child_point, loop_frame, relative_rotation
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate, times
@@ -12,22 +12,22 @@ from solvers.types import Matrix
 
 
 @kernel
-def loop_stiffness(model: Model, work: Work, m: int, K2: Matrix) -> Vec3:
+def loop_stiffness(model: Model, data: Data, m: int, K2: Matrix) -> Vec3:
     """K2 (2, 36) += d(G2^T f) by the twists of a and b at configuration 2; returns the force on a."""
     k = model.coupling_body.shape[0] - model.loop_ntrans.shape[0] + m
     a = model.coupling_body[k, 0]
     b = model.coupling_body[k, 1]
     row = model.coupling_row[k]
-    loop_frame(model, work, m, b, work.pos2, work.rot2)
-    A = child_point(model, m, a, work.pos2, work.rot2)
-    o = work.origin
+    loop_frame(model, data, m, b, data.pos2, data.rot2)
+    A = child_point(model, m, a, data.pos2, data.rot2)
+    o = data.origin
     P = (A[0] - o[0], A[1] - o[1], A[2] - o[2])
     fx, fy, fz = 0.0, 0.0, 0.0
     for _ in range(3 - model.loop_ntrans[m]):
-        g = work.couple_force[row]
-        fx += g * work.couple_B[row, 0]
-        fy += g * work.couple_B[row, 1]
-        fz += g * work.couple_B[row, 2]
+        g = data.couple_force[row]
+        fx += g * data.couple_B[row, 0]
+        fy += g * data.couple_B[row, 1]
+        fz += g * data.couple_B[row, 2]
         row += 1
     f = (fx, fy, fz)
     zero = (0.0, 0.0, 0.0)
@@ -38,22 +38,22 @@ def loop_stiffness(model: Model, work: Work, m: int, K2: Matrix) -> Vec3:
         if c < 3:
             continue
         for side in range(2):
-            d = _torque_rate(model, work, m, a, row, e, side)
+            d = _torque_rate(model, data, m, a, row, e, side)
             for r in range(3):
                 K2[side, 18 + 6 * r + c] += d[r]
     return f
 
 
 @kernel
-def _torque_rate(model: Model, work: Work, m: int, a: int, row: int, e: Vec3, side: int) -> Vec3:
+def _torque_rate(model: Model, data: Data, m: int, a: int, row: int, e: Vec3, side: int) -> Vec3:
     """Change of the constraint torque of loop m when a (side 0) or b (side 1) turns by e at configuration 2."""
-    Q = work.loop_frame[m]
+    Q = data.loop_frame[m]
     if model.loop_nrot[m] == 1:
         s = model.loop_axis[m]
-        r = rotate(work.rot2, a, s[6], s[7], s[8])
+        r = rotate(data.rot2, a, s[6], s[7], s[8])
         x, y, z = 0.0, 0.0, 0.0
         for i in range(2):
-            g = work.couple_force[row + i]
+            g = data.couple_force[row + i]
             t = times(Q, g * s[3 * i], g * s[3 * i + 1], g * s[3 * i + 2])
             x += t[0]
             y += t[1]
@@ -65,9 +65,9 @@ def _torque_rate(model: Model, work: Work, m: int, a: int, row: int, e: Vec3, si
         return cross(r[0], r[1], r[2], d[0], d[1], d[2])
     if model.loop_nrot[m] != 0:
         return 0.0, 0.0, 0.0
-    E = work.loop_turn[m]
-    relative_rotation(Q, work.rot2, a, E)
-    f = (work.couple_force[row], work.couple_force[row + 1], work.couple_force[row + 2])
+    E = data.loop_turn[m]
+    relative_rotation(Q, data.rot2, a, E)
+    f = (data.couple_force[row], data.couple_force[row + 1], data.couple_force[row + 2])
     sign = 1.0 if side == 0 else -1.0
     p = (  # Q^T e
         sign * (Q[0] * e[0] + Q[3] * e[1] + Q[6] * e[2]),

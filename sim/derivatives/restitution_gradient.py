@@ -4,7 +4,7 @@
 
 of the branch that was taken. Much of it cancels: a body that starts a little higher lands as much later, and bounces as
 fast. So of impacts on the ground the changes of gap, floor and slip by a column are summed before the stiffness of the
-contact, up to 1e8 times the inertia over h, multiplies them: it is in the matrix that is eliminated, work.A, but not in
+contact, up to 1e8 times the inertia over h, multiplies them: it is in the matrix that is eliminated, data.A, but not in
 A2 and A3. Scenes without restitution do not compile these kernels.
 """
 
@@ -15,7 +15,7 @@ from sim.contact.pairs.pair_contact import pair_arm, pair_force
 from sim.contact.pairs.pair_stiffness import slip_rate
 from sim.derivatives.coupling_gradient import add_column
 from sim.model.columns import Bounce, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -25,49 +25,49 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def gap_wrench(model: Model, work: Work, c: int) -> tuple[Vec3, Vec3]:
+def gap_wrench(model: Model, data: Data, c: int) -> tuple[Vec3, Vec3]:
     """Wrench about O, on the first body, of contact c per unit of its gap, by its condensed law."""
-    W = work.contact_W[c]
+    W = data.contact_W[c]
     ground = model.contact_height.shape[0]
     if c >= ground:
-        f = pair_force(work, c - ground, W[0], W[3], W[6])
-        a = pair_arm(model, work, c - ground)
+        f = pair_force(data, c - ground, W[0], W[3], W[6])
+        a = pair_arm(model, data, c - ground)
     else:
-        k = work.contact_kin[c]
+        k = data.contact_kin[c]
         i = model.contact_body[c]
-        f = transposed_times(work.contact_frame[c], W[0], W[3], W[6])
-        o = work.origin
-        p = work.pos2[i]
+        f = transposed_times(data.contact_frame[c], W[0], W[3], W[6])
+        o = data.origin
+        p = data.pos2[i]
         a = (p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2])
     return f, cross(a[0], a[1], a[2], f[0], f[1], f[2])
 
 
 @optional(Slot.ADD_BOUNCE_COMPOSITES, default=False)
-def add_bounce_composites(model: Model, work: Work) -> bool:
+def add_bounce_composites(model: Model, data: Data) -> bool:
     """Of pairs A1 += e w d(phi1), A2 += (1 - e) w d(phi2) of the bodies of impacts, w the wrench per gap, all about O.
 
     A = A3 with the laws of impacts on the ground, if there are any; returns whether.
     """
     impacts = False
     ground = model.contact_height.shape[0]
-    for i in range(work.A.shape[0]):
+    for i in range(data.A.shape[0]):
         for k in range(36):
-            work.A[i, k] = work.A3[i, k]
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        b = work.bounce[c]
+            data.A[i, k] = data.A3[i, k]
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        b = data.bounce[c]
         if b[Bounce.RESTITUTION] == 0.0:
             continue
         if c < ground:
             impacts = True
-            add_contact_law(model, work, c, work.A)
+            add_contact_law(model, data, c, data.A)
             continue
-        f, t = gap_wrench(model, work, c)
+        f, t = gap_wrench(model, data, c)
         for side in range(2):
             i = model.coupling_body[model.pair_coupling[c - ground], side]
             if i >= 0:
-                _add_outer(work.A1[i], f, t, b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2])
-                _add_outer(work.A2[i], f, t, 1.0 - b[Bounce.RESTITUTION], b[Bounce.ROW2 : Bounce.GAP1])
+                _add_outer(data.A1[i], f, t, b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2])
+                _add_outer(data.A2[i], f, t, 1.0 - b[Bounce.RESTITUTION], b[Bounce.ROW2 : Bounce.GAP1])
     return impacts
 
 
@@ -82,37 +82,37 @@ def _add_outer(A: Vector, f: Vec3, t: Vec3, scale: float, row: Vector) -> None:
 
 
 @optional(Slot.ADD_BOUNCE_DERIVATIVES)
-def add_bounce_derivatives(model: Model, work: Work, h: float) -> None:
+def add_bounce_derivatives(model: Model, data: Data, h: float) -> None:
     """dR_dq, dR_dv of impacts with the ground; of pairs, -= the same across the two bodies."""
     ground = model.contact_height.shape[0]
-    for m in range(work.active_ground_count[0]):
-        c = work.active[m]
-        if work.bounce[c, Bounce.RESTITUTION] != 0.0:
-            _add_ground(model, work, h, c)
-            _add_composites(model, work, h, c)
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        if data.bounce[c, Bounce.RESTITUTION] != 0.0:
+            _add_ground(model, data, h, c)
+            _add_composites(model, data, h, c)
     for j in range(model.pair_kind.shape[0]):
-        b = work.bounce[ground + j]
+        b = data.bounce[ground + j]
         one = model.coupling_body[model.pair_coupling[j], 0]
         two = model.coupling_body[model.pair_coupling[j], 1]
         if b[Bounce.RESTITUTION] == 0.0 or two < 0:
             continue
-        f, t = gap_wrench(model, work, ground + j)
+        f, t = gap_wrench(model, data, ground + j)
         for side in range(2):
             i = one if side == 0 else two
             k = two if side == 0 else one
-            join(work.couple_wrench, f, t)
-            _across(model, work, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], work.S1, work.dR_dq)
-            _across(model, work, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], work.S1, work.dR_dv)
-            _across(model, work, (i, k), b[Bounce.RESTITUTION] - 1.0, b[Bounce.ROW2 : Bounce.GAP1], work.S2, work.dR_dq)
+            join(data.couple_wrench, f, t)
+            _across(model, data, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], data.S1, data.dR_dq)
+            _across(model, data, (i, k), -b[Bounce.RESTITUTION], b[Bounce.ROW1 : Bounce.ROW2], data.S1, data.dR_dv)
+            _across(model, data, (i, k), b[Bounce.RESTITUTION] - 1.0, b[Bounce.ROW2 : Bounce.GAP1], data.S2, data.dR_dq)
 
 
 @kernel
-def _rates(model: Model, work: Work, h: float, c: int, twists: tuple[Vector, Vector, Vector]) -> Vec3:
+def _rates(model: Model, data: Data, h: float, c: int, twists: tuple[Vector, Vector, Vector]) -> Vec3:
     """d(gap - floor, slip) of an impact on the ground by the twists of configurations 1, 2 and 3."""
     s1, s, t = twists
-    b, k, F = work.bounce[c], work.contact_kin[c], work.contact_frame[c]
+    b, k, F = data.bounce[c], data.contact_kin[c], data.contact_frame[c]
     i = model.contact_body[c]
-    o, p = work.origin, work.pos2[i]
+    o, p = data.origin, data.pos2[i]
     e = (s[3], s[4], s[5])
     u, v, w = cross(s[3], s[4], s[5], p[0] - o[0], p[1] - o[1], p[2] - o[2])
     x = (s[0] + u, s[1] + v, s[2] + w)
@@ -126,81 +126,81 @@ def _rates(model: Model, work: Work, h: float, c: int, twists: tuple[Vector, Vec
     one = (
         dot(k[Kin.BY_TRANSLATION + 3 : Kin.BY_TRANSLATION + 6], t[:3])
         + dot(k[Kin.BY_ROTATION + 3 : Kin.BY_ROTATION + 6], t[3:])
-        + slip_rate(F[3], F[4], F[5], r, work.turn[i], x, e) / h
+        + slip_rate(F[3], F[4], F[5], r, data.turn[i], x, e) / h
     )
     two = (
         dot(k[Kin.BY_TRANSLATION + 6 : Kin.BY_TRANSLATION + 9], t[:3])
         + dot(k[Kin.BY_ROTATION + 6 : Kin.BY_TRANSLATION], t[3:])
-        + slip_rate(F[6], F[7], F[8], r, work.turn[i], x, e) / h
+        + slip_rate(F[6], F[7], F[8], r, data.turn[i], x, e) / h
     )
     return gap, one, two
 
 
 @kernel
-def _impulse_wrench(model: Model, work: Work, c: int, g: Vec3) -> None:
+def _impulse_wrench(model: Model, data: Data, c: int, g: Vec3) -> None:
     """couple_wrench = what W (gap, slip) does about O."""
-    W, k, o = work.contact_W[c], work.contact_kin[c], work.origin
-    p = work.pos2[model.contact_body[c]]
+    W, k, o = data.contact_W[c], data.contact_kin[c], data.origin
+    p = data.pos2[model.contact_body[c]]
     fn = W[0] * g[0] + W[1] * g[1] + W[2] * g[2]
     f1 = W[3] * g[0] + W[4] * g[1] + W[5] * g[2]
     f2 = W[6] * g[0] + W[7] * g[1] + W[8] * g[2]
-    f = transposed_times(work.contact_frame[c], fn, f1, f2)
+    f = transposed_times(data.contact_frame[c], fn, f1, f2)
     t = cross(p[0] - o[0] + k[Kin.ARM], p[1] - o[1] + k[Kin.ARM + 1], p[2] - o[2] + k[Kin.ARM + 2], f[0], f[1], f[2])
-    join(work.couple_wrench, f, t)
+    join(data.couple_wrench, f, t)
 
 
 @kernel
-def _add_ground(model: Model, work: Work, h: float, c: int) -> None:
+def _add_ground(model: Model, data: Data, h: float, c: int) -> None:
     """dR_dq -= S2_j.w, w the wrench by the rates of gap and slip, dR_dv -= that by configuration 1, of one contact."""
-    none = work.pair_rows[0]
+    none = data.pair_rows[0]
     for k in range(6):
         none[k] = 0.0
     i = model.contact_body[c]
     while i >= 0:
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            s1 = work.S1[d]
-            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, work.S2[d], work.S3[d])))
-            add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dq)
-            _impulse_wrench(model, work, c, _rates(model, work, h, c, (s1, none, none)))
-            add_column(model, work, model.contact_body[c], -1.0, d, work.dR_dv)
+            s1 = data.S1[d]
+            _impulse_wrench(model, data, c, _rates(model, data, h, c, (s1, data.S2[d], data.S3[d])))
+            add_column(model, data, model.contact_body[c], -1.0, d, data.dR_dq)
+            _impulse_wrench(model, data, c, _rates(model, data, h, c, (s1, none, none)))
+            add_column(model, data, model.contact_body[c], -1.0, d, data.dR_dv)
         i = model.body_parent[i]
 
 
 @kernel
-def _add_composites(model: Model, work: Work, h: float, c: int) -> None:
+def _add_composites(model: Model, data: Data, h: float, c: int) -> None:
     """A1, A2, A3 of the body of one contact and those above it, once they are composites: for parameters."""
-    none, unit = work.pair_rows[0], work.pair_rows[1]
+    none, unit = data.pair_rows[0], data.pair_rows[1]
     for k in range(6):
         none[k] = unit[k] = 0.0
     for k in range(6):
         unit[k] = 1.0
-        _impulse_wrench(model, work, c, _rates(model, work, h, c, (unit, none, none)))
-        _subtract_column(model, work, c, k, work.A1)
-        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, unit, none)))
-        _subtract_column(model, work, c, k, work.A2)
-        _impulse_wrench(model, work, c, _rates(model, work, h, c, (none, none, unit)))
-        _subtract_column(model, work, c, k, work.A3)
+        _impulse_wrench(model, data, c, _rates(model, data, h, c, (unit, none, none)))
+        _subtract_column(model, data, c, k, data.A1)
+        _impulse_wrench(model, data, c, _rates(model, data, h, c, (none, unit, none)))
+        _subtract_column(model, data, c, k, data.A2)
+        _impulse_wrench(model, data, c, _rates(model, data, h, c, (none, none, unit)))
+        _subtract_column(model, data, c, k, data.A3)
         unit[k] = 0.0
 
 
 @kernel
-def _subtract_column(model: Model, work: Work, c: int, k: int, A: Matrix) -> None:
+def _subtract_column(model: Model, data: Data, c: int, k: int, A: Matrix) -> None:
     """Column k of A[i] -= couple_wrench, i from the body of contact c up to the root."""
     i = model.contact_body[c]
     while i >= 0:
         for r in range(6):
-            A[i, 6 * r + k] -= work.couple_wrench[r]
+            A[i, 6 * r + k] -= data.couple_wrench[r]
         i = model.body_parent[i]
 
 
 @kernel
 def _across(
-    model: Model, work: Work, bodies: tuple[int, int], scale: float, row: Vector, S: Matrix, out: Matrix
+    model: Model, data: Data, bodies: tuple[int, int], scale: float, row: Vector, S: Matrix, out: Matrix
 ) -> None:
     """out[j, k] += scale (S2[j].w) (row.S[k]), w in couple_wrench; j and k from the bodies up to the root."""
     k = bodies[1]
     while k >= 0:
         for e in range(model.body_vadr[k], model.body_vadr[k + 1]):
             x = scale * dot(row, S[e])
-            add_column(model, work, bodies[0], x, e, out)
+            add_column(model, data, bodies[0], x, e, out)
         k = model.body_parent[k]

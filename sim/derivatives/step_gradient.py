@@ -18,7 +18,7 @@ from sim.dynamics.joints.terms import add_spring_derivatives, add_swing_curvatur
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling_panel
 from sim.dynamics.pose_jacobians import inertial_jacobians, pose2_to_origin, sum_composites
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from sim.model.slots import Slot
 from sim.solve.inequalities import add_stiffness
@@ -29,109 +29,109 @@ from solvers.types import Matrix, Vector
 
 
 @optional(Slot.GRADIENT, default=False)
-def gradient(model: Model, work: Work, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix) -> bool:
-    """A = dx3/dx2 (2 nv, 2 nv), B = dx3/du (2 nv, nu) of the step now in `work`, solved at kappa.  False if singular.
+def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vector, A: Matrix, B: Matrix) -> bool:
+    """A = dx3/dx2 (2 nv, 2 nv), B = dx3/du (2 nv, nu) of the step now in `data`, solved at kappa.  False if singular.
 
-    Needs work as a step leaves it: configurations, residual wrenches and cone variables at the solution.
+    Needs the Data as a step leaves it: configurations, residual wrenches and cone variables at the solution.
     """
-    inertial_jacobians(model, work, h)
-    velocity_columns(model, work.S3, work.nu, h, work.S3nu)
-    joint_blocks(model, work, h, q, v)
-    all_near(model, work)
-    add_stiffness(model, work, h, kappa)
-    pose2_to_origin(work)
-    bounces = add_bounce_composites(model, work)
-    if not factor_of(model, work, work.A if bounces else work.A3):
+    inertial_jacobians(model, data, h)
+    velocity_columns(model, data.S3, data.nu, h, data.S3nu)
+    joint_blocks(model, data, h, q, v)
+    all_near(model, data)
+    add_stiffness(model, data, h, kappa)
+    pose2_to_origin(data)
+    bounces = add_bounce_composites(model, data)
+    if not factor_of(model, data, data.A if bounces else data.A3):
         return False
-    add_coupling_composites(model, work, h)
-    sum_composites(model, work)
-    residual_derivatives(model, work, h)
-    add_swing_curvature(model, work, q)  # before `factor_coupling`, whose solves use up work.subtree
-    add_bounce_derivatives(model, work, h)
-    add_coupling_derivatives(model, work)
-    if not factor_coupling(model, work):
+    add_coupling_composites(model, data, h)
+    sum_composites(model, data)
+    residual_derivatives(model, data, h)
+    add_swing_curvature(model, data, q)  # before `factor_coupling`, whose solves use up data.subtree
+    add_bounce_derivatives(model, data, h)
+    add_coupling_derivatives(model, data)
+    if not factor_coupling(model, data):
         return False
-    add_spring_derivatives(model, work, h, q, v)
-    _joint_columns(model, work, h, v)
-    _input_columns(model, work, h)
-    solve_panel(model, work)
-    solve_coupling_panel(model, work)
-    _next_state(model, work, h, A, B)
+    add_spring_derivatives(model, data, h, q, v)
+    _joint_columns(model, data, h, v)
+    _input_columns(model, data, h)
+    solve_panel(model, data)
+    solve_coupling_panel(model, data)
+    _next_state(model, data, h, A, B)
     return True
 
 
 @kernel
-def _joint_columns(model: Model, work: Work, h: float, v: Vector) -> None:
+def _joint_columns(model: Model, data: Data, h: float, v: Vector) -> None:
     """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T).
 
     What the lanes of dR_dq and dR_dv write behind their columns are the places of dR_dv, and of the inputs.
     """
     nv = v.shape[0]
-    add_limit_derivatives(model, work, h)
+    add_limit_derivatives(model, data, h)
     for d in range(nv):
         for k in range(0, nv, LANES):
-            store(work.columns, d, k, -1.0 * load(work.dR_dq, d, k))
+            store(data.columns, d, k, -1.0 * load(data.dR_dq, d, k))
         for k in range(0, nv, LANES):
-            store(work.columns, d, nv + k, h * load(work.dR_dv, d, k))
+            store(data.columns, d, nv + k, h * load(data.dR_dv, d, k))
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
             e = model.body_vadr[i + 1] - 3
             J = left_jacobian(h * v[e], h * v[e + 1], h * v[e + 2])
             for d in range(nv):
-                x = work.columns[d, nv + e : nv + e + 3]
+                x = data.columns[d, nv + e : nv + e + 3]
                 a, b, c = x[0], x[1], x[2]
                 for r in range(3):
                     x[r] = a * J[3 * r] + b * J[3 * r + 1] + c * J[3 * r + 2]
 
 
 @kernel
-def _input_columns(model: Model, work: Work, h: float) -> None:
+def _input_columns(model: Model, data: Data, h: float) -> None:
     """columns[:, 2 nv:] = -dR/du: h at the dof of a joint input, h S2^T wrench above the body of the others."""
-    nv = work.columns.shape[0]
+    nv = data.columns.shape[0]
     nu = model.input_kind.shape[0]
     for d in range(nv):
         for k in range(0, nu, LANES):
-            store(work.columns, d, 2 * nv + k, spread(0.0))
+            store(data.columns, d, 2 * nv + k, spread(0.0))
     for j in range(nu):
         col = 2 * nv + j
         if model.input_kind[j] == InputKind.JOINT:
-            work.columns[model.input_index[j], col] = h
+            data.columns[model.input_index[j], col] = h
             continue
-        w = work.couple_wrench
-        input_wrench(model, work, j, w)
+        w = data.couple_wrench
+        input_wrench(model, data, j, w)
         i = model.input_index[j]
         while i >= 0:
             for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                s = work.S2[d]
-                work.columns[d, col] = h * (
+                s = data.S2[d]
+                data.columns[d, col] = h * (
                     s[0] * w[0] + s[1] * w[1] + s[2] * w[2] + s[3] * w[3] + s[4] * w[4] + s[5] * w[5]
                 )
             i = model.body_parent[i]
 
 
 @kernel
-def _next_state(model: Model, work: Work, h: float, A: Matrix, B: Matrix) -> None:
+def _next_state(model: Model, data: Data, h: float, A: Matrix, B: Matrix) -> None:
     """A, B from dv25 = columns:  dq3 = dq2 + h dv25, and R(h w)^T dphi2 + h J(h w)^T dw for quaternion joints."""
-    nv = work.columns.shape[0]
+    nv = data.columns.shape[0]
     for d in range(nv):
-        _combine(work.columns, d, 0, (h, 0.0, 0.0), 1, A, d)
-        _combine(work.columns, d, 2 * nv, (h, 0.0, 0.0), 1, B, d)
+        _combine(data.columns, d, 0, (h, 0.0, 0.0), 1, A, d)
+        _combine(data.columns, d, 2 * nv, (h, 0.0, 0.0), 1, B, d)
         A[d, d] += 1.0
     for d in range(nv):
-        _combine(work.columns, d, 0, (1.0, 0.0, 0.0), 1, A, nv + d)
-        _combine(work.columns, d, 2 * nv, (1.0, 0.0, 0.0), 1, B, nv + d)
+        _combine(data.columns, d, 0, (1.0, 0.0, 0.0), 1, A, nv + d)
+        _combine(data.columns, d, 2 * nv, (1.0, 0.0, 0.0), 1, B, nv + d)
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] != 3:
             continue
         d = model.body_vadr[i + 1] - 3
-        x, y, z = h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2]
+        x, y, z = h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2]
         J = left_jacobian(x, y, z)
         e = quat_exp(x, y, z)
         R = quat_matrix(e[0], e[1], e[2], e[3])
         for r in range(3):
             f = (h * J[r], h * J[3 + r], h * J[6 + r])
-            _combine(work.columns, d, 0, f, 3, A, d + r)
-            _combine(work.columns, d, 2 * nv, f, 3, B, d + r)
+            _combine(data.columns, d, 0, f, 3, A, d + r)
+            _combine(data.columns, d, 2 * nv, f, 3, B, d + r)
             for k in range(3):
                 A[d + r, d + k] += R[3 * k + r]
 

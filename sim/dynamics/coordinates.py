@@ -12,8 +12,8 @@ from math import atan2, pi
 from sim.dynamics.displacements import move_back
 from sim.dynamics.joints.swing_coordinates import swing_component, swing_of
 from sim.dynamics.kinematics import tree_poses
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 from solvers.rotation import Quat, Vec3, quat_exp, quat_log, quat_matrix, quat_mul, rotate, transposed_times
@@ -21,55 +21,55 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def node_poses(model: Model, work: Work, h: float, x: Vector) -> None:
+def node_poses(model: Model, data: Data, h: float, x: Vector) -> None:
     """Poses and joint columns at configurations 2 and 1 of a state, about the origin of the world, and moves."""
     nv = model.dof_body.shape[0]
     nq = x.shape[0] - nv
     for k in range(3):
-        work.origin[k] = 0.0
-    tree_poses(model, work, x[:nq])
-    move_back(model, work, h, x[:nq], x[nq:])
+        data.origin[k] = 0.0
+    tree_poses(model, data, x[:nq])
+    move_back(model, data, h, x[:nq], x[nq:])
 
 
 @kernel
-def body_turn(work: Work, i: int) -> Vec3:
+def body_turn(data: Data, i: int) -> Vec3:
     """log(q1^* q2) of body i: its rotation over the last interval, body axes [rad]."""
-    t = work.turn_in[i]
+    t = data.turn_in[i]
     x, y, z = quat_log(t[0], t[1], t[2], t[3])
-    return transposed_times(work.rot2[i], x, y, z)
+    return transposed_times(data.rot2[i], x, y, z)
 
 
 @kernel
-def maximal_state(model: Model, work: Work, h: float, x: Vector, out: Matrix) -> None:
+def maximal_state(model: Model, data: Data, h: float, x: Vector, out: Matrix) -> None:
     """out[i] = [x2, (x2 - x1)/h, q2, log(q1^* q2)/h].   out: (nbody, 13)."""
-    node_poses(model, work, h, x)
+    node_poses(model, data, h, x)
     for i in range(model.body_parent.shape[0]):
-        w = body_turn(work, i)
+        w = body_turn(data, i)
         for k in range(3):
-            out[i, k] = work.pos2[i, k]
-            out[i, 3 + k] = work.move_in[i, k] / h
+            out[i, k] = data.pos2[i, k]
+            out[i, 3 + k] = data.move_in[i, k] / h
             out[i, 10 + k] = w[k] / h
         for k in range(4):
-            out[i, 6 + k] = work.quat2[i, k]
+            out[i, 6 + k] = data.quat2[i, k]
 
 
 @kernel
-def poses_of_maximal(work: Work, h: float, z: Matrix) -> None:
+def poses_of_maximal(data: Data, h: float, z: Matrix) -> None:
     """Configurations 2 and 1 of the bodies: x1 = x2 - h vel, q1 = q2 exp(-h omega)."""
     for i in range(z.shape[0]):
         for k in range(3):
-            work.pos2[i, k] = z[i, k]
-            work.pos1[i, k] = z[i, k] - h * z[i, 3 + k]
+            data.pos2[i, k] = z[i, k]
+            data.pos1[i, k] = z[i, k] - h * z[i, 3 + k]
         e = quat_exp(-h * z[i, 10], -h * z[i, 11], -h * z[i, 12])
         r = quat_mul(z[i, 6], z[i, 7], z[i, 8], z[i, 9], e[0], e[1], e[2], e[3])
         R2 = quat_matrix(z[i, 6], z[i, 7], z[i, 8], z[i, 9])
         R1 = quat_matrix(r[0], r[1], r[2], r[3])
         for k in range(4):
-            work.quat2[i, k] = z[i, 6 + k]
-            work.quat1[i, k] = r[k]
+            data.quat2[i, k] = z[i, 6 + k]
+            data.quat1[i, k] = r[k]
         for k in range(9):
-            work.rot2[i, k] = R2[k]
-            work.rot1[i, k] = R1[k]
+            data.rot2[i, k] = R2[k]
+            data.rot1[i, k] = R1[k]
 
 
 @kernel
@@ -120,7 +120,7 @@ def _relative(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix) -> t
 
 
 @kernel
-def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) -> None:
+def minimal_state(model: Model, data: Data, h: float, z: Matrix, out: Vector) -> None:
     """out = x with maximal_state(x) = z; angles of one-axis joints in [-pi, pi].
 
         translations    q_k = R(Q) t_k . d                   v = (q2 - q1)/h
@@ -132,12 +132,12 @@ def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) ->
     its free directions is kept.   z: (nbody, 13); out: (nq + nv,).
     """
     nq = out.shape[0] - model.dof_body.shape[0]
-    poses_of_maximal(work, h, z)
+    poses_of_maximal(data, h, z)
     for i in range(model.body_parent.shape[0]):
         a = model.body_qadr[i]
         d = nq + model.body_vadr[i]
-        d2, Q2, r2 = _relative(model, i, work.pos2, work.quat2, work.rot2)
-        d1, Q1, r1 = _relative(model, i, work.pos1, work.quat1, work.rot1)
+        d2, Q2, r2 = _relative(model, i, data.pos2, data.quat2, data.rot2)
+        d1, Q1, r1 = _relative(model, i, data.pos1, data.quat1, data.rot1)
         for k in range(model.joint_ntrans[i]):
             t2 = translation_axis(model, i, k, Q2)
             t1 = translation_axis(model, i, k, Q1)
@@ -165,20 +165,20 @@ def minimal_state(model: Model, work: Work, h: float, z: Matrix, out: Vector) ->
 
 
 @kernel
-def maximal_states(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
+def maximal_states(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """`maximal_state` row by row.   xs: (n, nx); out: (n * nbody, 13)."""
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     nbody = model.body_parent.shape[0]
     for t in range(xs.shape[0]):
-        maximal_state(model, work, h, xs[t], out[t * nbody : (t + 1) * nbody])
+        maximal_state(model, data, h, xs[t], out[t * nbody : (t + 1) * nbody])
 
 
 @kernel
-def minimal_states(model_at: Table, work_at: Table, h: float, zs: Matrix, out: Matrix) -> None:
+def minimal_states(model_at: Table, data_at: Table, h: float, zs: Matrix, out: Matrix) -> None:
     """`minimal_state` row by row.   zs: (n * nbody, 13); out: (n, nx)."""
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     nbody = model.body_parent.shape[0]
     for t in range(out.shape[0]):
-        minimal_state(model, work, h, zs[t * nbody : (t + 1) * nbody], out[t])
+        minimal_state(model, data, h, zs[t * nbody : (t + 1) * nbody], out[t])

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from sim.dynamics.joints.swing import swing_pose, swing_turn
 from sim.dynamics.kinematics import axis_column, displace
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel
 from solvers.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
@@ -31,18 +31,18 @@ class Increment(NamedTuple):
 
 
 @kernel
-def joint_turn(model: Model, work: Work, by: Increment, i: int) -> Quat:
+def joint_turn(model: Model, data: Data, by: Increment, i: int) -> Quat:
     """Rotation of joint i by its increment, world axes at configuration 2."""
     n = model.joint_nrot[i]
     d = model.body_vadr[i + 1] - n
     if n == 2:
         a = model.body_qadr[i + 1] - 2
         c, x, y, z = swing_turn(model, i, by.q[a], by.q[a + 1], by.h * by.v[d], by.h * by.v[d + 1])
-        x, y, z = rotate(work.rot2, i, x, y, z)
+        x, y, z = rotate(data.rot2, i, x, y, z)
         return c, x, y, z
     x, y, z = 0.0, 0.0, 0.0
     for e in range(d, d + n):
-        s = work.S2[e]
+        s = data.S2[e]
         a = by.h * by.v[e]
         x, y, z = x + a * s[3], y + a * s[4], z + a * s[5]
     return quat_exp(x, y, z)
@@ -60,12 +60,12 @@ def turn_matrix(T: Quat) -> Mat3:
 
 
 @kernel
-def slide(model: Model, work: Work, by: Increment, i: int, E: Mat3, dx: Vec3, S: Matrix) -> Vec3:
+def slide(model: Model, data: Data, by: Increment, i: int, E: Mat3, dx: Vec3, S: Matrix) -> Vec3:
     """dx + sum_k q_k E t_k + h v_k (t_k + E t_k) over the translations of joint i; E of the parent, S their columns."""
     x, y, z = dx
     for k in range(model.joint_ntrans[i]):
         d = model.body_vadr[i] + k
-        t = work.S2[d]
+        t = data.S2[d]
         s = S[d]
         g0, g1, g2 = times(E, t[0], t[1], t[2])
         s[0], s[1], s[2] = t[0] + g0, t[1] + g1, t[2] + g2
@@ -77,33 +77,33 @@ def slide(model: Model, work: Work, by: Increment, i: int, E: Mat3, dx: Vec3, S:
 
 
 @inlined
-def turned_columns(model: Model, work: Work, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
+def turned_columns(model: Model, data: Data, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
     """Columns of the rotations of joint i: their axes at 2 turned with the parent, through o from O; E: of the parent.
 
     Not those of a joint with two rotations.
     """
     for d in range(model.body_vadr[i + 1] - model.joint_nrot[i], model.body_vadr[i + 1]):
-        s = work.S2[d]
+        s = data.S2[d]
         x, y, z = times(E, s[3], s[4], s[5])
         axis_column(S, d, s[3] + x, s[4] + y, s[5] + z, o[0], o[1], o[2])
 
 
 @kernel
-def swing_columns(model: Model, work: Work, theta: Vector, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
+def swing_columns(model: Model, data: Data, theta: Vector, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
     """Columns of a joint with two rotations at the coordinates theta, through o from O; E: of its body."""
     a = model.body_qadr[i + 1] - 2
     d = model.body_vadr[i + 1] - 2
     _, first, second = swing_pose(model, i, theta[a], theta[a + 1])
-    x, y, z = rotate(work.rot2, i, first[0], first[1], first[2])
+    x, y, z = rotate(data.rot2, i, first[0], first[1], first[2])
     e = times(E, x, y, z)
     axis_column(S, d, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
-    x, y, z = rotate(work.rot2, i, second[0], second[1], second[2])
+    x, y, z = rotate(data.rot2, i, second[0], second[1], second[2])
     e = times(E, x, y, z)
     axis_column(S, d + 1, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
 
 
 @kernel
-def tree_moves(model: Model, work: Work, by: Increment, third: bool) -> None:
+def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
     """Positions of all bodies at configuration 3, or 1, from configuration 2, turns, and unit joint columns.
 
     Fills theta3, pos3, S3, and over the interval 2-3 move and turn; or theta1, pos1, S1, and over the interval 1-2
@@ -113,59 +113,59 @@ def tree_moves(model: Model, work: Work, by: Increment, third: bool) -> None:
     derivatives with respect to a right perturbation of q2 at a constant increment, which follows the perturbed
     quaternion.
     """
-    theta = work.theta3 if third else work.theta1
-    pos = work.pos3 if third else work.pos1
-    S = work.S3 if third else work.S1
-    move = work.move if third else work.move_in
-    turn = work.turn if third else work.turn_in
-    O = work.origin
+    theta = data.theta3 if third else data.theta1
+    pos = data.pos3 if third else data.pos1
+    S = data.S3 if third else data.S1
+    move = data.move if third else data.move_in
+    turn = data.turn if third else data.turn_in
+    O = data.origin
     displace(model, by.q, by.v, by.h, theta)
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
-        arm = work.arm[i]
+        arm = data.arm[i]
         t = (1.0, 0.0, 0.0, 0.0)
         E = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         dx = (0.0, 0.0, 0.0)
         if p >= 0:
             t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
-            E = rows_of(work.turn_matrix, p)
+            E = rows_of(data.turn_matrix, p)
             x, y, z = times(E, arm[0], arm[1], arm[2])
             dx = (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
         if model.joint_ntrans[i] > 0:
-            dx = slide(model, work, by, i, E, dx, S)
+            dx = slide(model, data, by, i, E, dx, S)
         o = (
-            work.pos2[i, 0] - O[0] + arm[3] + dx[0],
-            work.pos2[i, 1] - O[1] + arm[4] + dx[1],
-            work.pos2[i, 2] - O[2] + arm[5] + dx[2],
+            data.pos2[i, 0] - O[0] + arm[3] + dx[0],
+            data.pos2[i, 1] - O[1] + arm[4] + dx[1],
+            data.pos2[i, 2] - O[2] + arm[5] + dx[2],
         )
         n = model.joint_nrot[i]
         if n > 0:
-            e = joint_turn(model, work, by, i)
+            e = joint_turn(model, data, by, i)
             t = quat_mul(t[0], t[1], t[2], t[3], e[0], e[1], e[2], e[3])
             if t[0] < 0.0:
                 t = (-t[0], -t[1], -t[2], -t[3])
             if n != 2:
-                turned_columns(model, work, i, E, o, S)
+                turned_columns(model, data, i, E, o, S)
             E = turn_matrix(t)
             if n == 2:
-                swing_columns(model, work, theta, i, E, o, S)
+                swing_columns(model, data, theta, i, E, o, S)
         x, y, z = times(E, arm[3], arm[4], arm[5])
         dx = (dx[0] - x, dx[1] - y, dx[2] - z)
         for k in range(9):
-            work.turn_matrix[i, k] = E[k]
+            data.turn_matrix[i, k] = E[k]
         for k in range(4):
             turn[i, k] = t[k]
         for k in range(3):
             move[i, k] = dx[k]
-            pos[i, k] = work.pos2[i, k] + dx[k]
+            pos[i, k] = data.pos2[i, k] + dx[k]
 
 
 @kernel
-def turn_bodies(work: Work, out: Matrix) -> None:
+def turn_bodies(data: Data, out: Matrix) -> None:
     """out = R2 + E R2 of all bodies, with the turn matrices of the last `tree_moves`.   out: (nbody, 9)."""
     for i in range(out.shape[0]):
-        E = rows_of(work.turn_matrix, i)
-        R = rows_of(work.rot2, i)
+        E = rows_of(data.turn_matrix, i)
+        R = rows_of(data.rot2, i)
         a = times(E, R[0], R[3], R[6])
         b = times(E, R[1], R[4], R[7])
         c = times(E, R[2], R[5], R[8])
@@ -176,32 +176,32 @@ def turn_bodies(work: Work, out: Matrix) -> None:
 
 
 @kernel
-def move_back(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
-    """Configuration 1, and the interval 1-2, of the state (q, v) whose configuration 2 is in `work`."""
-    tree_moves(model, work, Increment(q, v, -h), False)
-    turn_bodies(work, work.rot1)
-    for i in range(work.move_in.shape[0]):  # from 2 to 1 so far
+def move_back(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
+    """Configuration 1, and the interval 1-2, of the state (q, v) whose configuration 2 is in `data`."""
+    tree_moves(model, data, Increment(q, v, -h), False)
+    turn_bodies(data, data.rot1)
+    for i in range(data.move_in.shape[0]):  # from 2 to 1 so far
         for k in range(3):
-            work.move_in[i, k] = -work.move_in[i, k]
-            work.turn_in[i, 1 + k] = -work.turn_in[i, 1 + k]
+            data.move_in[i, k] = -data.move_in[i, k]
+            data.turn_in[i, 1 + k] = -data.turn_in[i, 1 + k]
 
 
 @kernel
-def other_quaternions(work: Work) -> None:
+def other_quaternions(data: Data) -> None:
     """quat1 and quat3, from the turns: what only derivatives by parameters ask for."""
-    for i in range(work.quat2.shape[0]):
-        b = work.quat2[i]
-        t = work.turn_in[i]
+    for i in range(data.quat2.shape[0]):
+        b = data.quat2[i]
+        t = data.turn_in[i]
         a = quat_mul(t[0], -t[1], -t[2], -t[3], b[0], b[1], b[2], b[3])
-        c = third_quaternion(work, i)
+        c = third_quaternion(data, i)
         for k in range(4):
-            work.quat1[i, k] = a[k]
-            work.quat3[i, k] = c[k]
+            data.quat1[i, k] = a[k]
+            data.quat3[i, k] = c[k]
 
 
 @kernel
-def third_quaternion(work: Work, i: int) -> Quat:
+def third_quaternion(data: Data, i: int) -> Quat:
     """Orientation of body i at configuration 3."""
-    t = work.turn[i]
-    b = work.quat2[i]
+    t = data.turn[i]
+    b = data.quat2[i]
     return quat_mul(t[0], t[1], t[2], t[3], b[0], b[1], b[2], b[3])

@@ -8,7 +8,7 @@ eliminated as one block of up to six unknowns, with pivoting, as in Featherstone
 
 from __future__ import annotations
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel
 from solvers.lanes import Six, dot_lanes, load, minus_outer, plus, put, six, store, zeros
@@ -63,34 +63,34 @@ def project(model: Model, S: Matrix, subtree: Matrix, out: Vector) -> None:
 
 
 @inlined
-def _joint_products(model: Model, work: Work, i: int, a: Six) -> None:
+def _joint_products(model: Model, data: Data, i: int, a: Six) -> None:
     """U = A S3nu,  L = S2^T A,  D = S2^T U + joint block of joint i, at the articulated matrix A of its body.
 
-    a: the rows of A, which are in work.articulated, too. L of a root is not computed: nothing is above it.
+    a: the rows of A, which are in data.articulated, too. L of a root is not computed: nothing is above it.
     """
     d0 = model.body_vadr[i]
     n = model.body_vadr[i + 1] - d0
     for d in range(d0, d0 + n):
-        s = numbers(work.S3nu[d])
+        s = numbers(data.S3nu[d])
         for r in range(6):
-            work.U[d, r] = times_row(work.articulated[6 * i + r], 0, s)
+            data.U[d, r] = times_row(data.articulated[6 * i + r], 0, s)
         if model.body_parent[i] >= 0:
-            store(work.L, d, 0, dot_lanes(work.S2, d, 0, a))
-    D = work.D[i]
-    B = work.joint_block[i]
+            store(data.L, d, 0, dot_lanes(data.S2, d, 0, a))
+    D = data.D[i]
+    B = data.joint_block[i]
     for j in range(n):
         for k in range(n):
-            D[j * n + k] = B[j * n + k] + dot_six(work.S2[d0 + j], work.U[d0 + k])
+            D[j * n + k] = B[j * n + k] + dot_six(data.S2[d0 + j], data.U[d0 + k])
 
 
 @kernel
-def factor(model: Model, work: Work) -> int:
-    """`factor_of` the matrices in work.A."""
-    return factor_of(model, work, work.A)
+def factor(model: Model, data: Data) -> int:
+    """`factor_of` the matrices in data.A."""
+    return factor_of(model, data, data.A)
 
 
 @kernel
-def factor_of(model: Model, work: Work, A: Matrix) -> int:
+def factor_of(model: Model, data: Data, A: Matrix) -> int:
     """Eliminate the joints from the leaves to the root.   A: (nbody, 36), matrices of the bodies alone.
 
         U = A S3nu,   D = S2^T U + joint block,   L = D^-1 S2^T A,      A_parent += A - U L
@@ -98,7 +98,7 @@ def factor_of(model: Model, work: Work, A: Matrix) -> int:
     Returns the sign of det H, 0 when a joint block is singular.
     """
     sign = 1
-    P = work.articulated
+    P = data.articulated
     for i in range(model.body_parent.shape[0]):
         if model.body_leaf[i] == 0:
             put(P, 6 * i, 0, zeros())
@@ -106,19 +106,19 @@ def factor_of(model: Model, work: Work, A: Matrix) -> int:
         d0 = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d0
         p = model.body_parent[i]
-        D = work.D[i]
+        D = data.D[i]
         a = load(A, i, 0), load(A, i, 6), load(A, i, 12), load(A, i, 18), load(A, i, 24), load(A, i, 30)
         if model.body_leaf[i] == 0:
             a = plus(a, six(P, 6 * i, 0))
         put(P, 6 * i, 0, a)
-        _joint_products(model, work, i, a)
+        _joint_products(model, data, i, a)
         if n == 1:
             if not abs(D[0]) > 1e-300:
                 return 0
             if D[0] < 0.0:
                 sign = -sign
             D[0] = 1.0 / D[0]
-            store(work.L, d0, 0, D[0] * load(work.L, d0, 0))
+            store(data.L, d0, 0, D[0] * load(data.L, d0, 0))
         elif n > 1:
             swaps = lu_factor(D, n)
             if swaps < 0:
@@ -126,24 +126,24 @@ def factor_of(model: Model, work: Work, A: Matrix) -> int:
             sign *= lu_sign(D, n, swaps)
             D[36] = float(swaps)
             if p >= 0:
-                lu_solve_lanes(D, n, swaps, work.L, d0, 0)
+                lu_solve_lanes(D, n, swaps, data.L, d0, 0)
         if p >= 0:
             for d in range(d0, d0 + n):
-                a = minus_outer(a, work.U[d], load(work.L, d, 0))
+                a = minus_outer(a, data.U[d], load(data.L, d, 0))
             put(P, 6 * p, 0, plus(six(P, 6 * p, 0), a))
     return sign
 
 
 @kernel
-def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
-    """H out = b with the factors of `factor`; leaves the twists of configuration 3 in work.twist.  out may be b.
+def solve(model: Model, data: Data, b: Vector, out: Vector) -> None:
+    """H out = b with the factors of `factor`; leaves the twists of configuration 3 in data.twist.  out may be b.
 
     up      p_i += U z,   z = D^-1 (b - S2^T p)
     down    y = z - L V_parent,   V_i = V_parent + S3nu y
     """
     n = model.body_parent.shape[0]
-    p = work.subtree
-    V = work.twist
+    p = data.subtree
+    V = data.twist
     for i in range(n):
         for k in range(6):
             p[i, k] = 0.0
@@ -152,18 +152,18 @@ def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
         m = model.body_vadr[i + 1] - d0
         pi = p[i]
         for d in range(d0, d0 + m):
-            work.z[d] = b[d] - dot_six(work.S2[d], pi)
+            data.z[d] = b[d] - dot_six(data.S2[d], pi)
         if m == 1:
-            work.z[d0] *= work.D[i, 0]
+            data.z[d0] *= data.D[i, 0]
         elif m > 1:
-            lu_solve(work.D[i], m, int(work.D[i, 36]), work.z, d0)
+            lu_solve(data.D[i], m, int(data.D[i, 36]), data.z, d0)
         q = model.body_parent[i]
         if q < 0:
             continue
         for d in range(d0, d0 + m):
-            z = work.z[d]
+            z = data.z[d]
             for k in range(6):
-                pi[k] += work.U[d, k] * z
+                pi[k] += data.U[d, k] * z
         for k in range(6):
             p[q, k] += pi[k]
     for i in range(n):
@@ -172,10 +172,10 @@ def solve(model: Model, work: Work, b: Vector, out: Vector) -> None:
         q = model.body_parent[i]
         Vi = V[i]
         for d in range(d0, end):
-            out[d] = work.z[d] - (dot_six(work.L[d], V[q]) if q >= 0 else 0.0)
+            out[d] = data.z[d] - (dot_six(data.L[d], V[q]) if q >= 0 else 0.0)
         for k in range(6):
             Vi[k] = V[q, k] if q >= 0 else 0.0
         for d in range(d0, end):
             y = out[d]
             for k in range(6):
-                Vi[k] += work.S3nu[d, k] * y
+                Vi[k] += data.S3nu[d, k] * y

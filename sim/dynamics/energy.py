@@ -17,8 +17,8 @@ from sim.dynamics.elimination import factor, project, solve, subtree_sums
 from sim.dynamics.joints.ball_spring import relative_to_rest
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.momentum_balance import world_inertia
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 from solvers.rotation import Vec3, cross, quat_exp, quat_mul
@@ -55,11 +55,11 @@ def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, fall: 
 
 
 @kernel
-def node_momentum(model: Model, work: Work, h: float, x: Vector, out: Matrix) -> None:
+def node_momentum(model: Model, data: Data, h: float, x: Vector, out: Matrix) -> None:
     """`arriving_momentum` of the state x, about the origin of the world.   Fills configurations 1 and 2."""
-    node_poses(model, work, h, x)
-    world_inertia(model, work.rot2, work.inertia_world)
-    end = Arrival(work.pos2, work.move_in, work.turn_in, work.inertia_world)
+    node_poses(model, data, h, x)
+    world_inertia(model, data.rot2, data.inertia_world)
+    end = Arrival(data.pos2, data.move_in, data.turn_in, data.inertia_world)
     arriving_momentum(model, h, end, (0.0, 0.0, 0.0), 0.5 * h, out)
 
 
@@ -129,54 +129,54 @@ def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
 
 
 @kernel
-def factor_mass_matrix(model: Model, work: Work) -> bool:
-    """M = S2^T (inertia) S2 + armature at configuration 2 in `work`, factored for `solve`; False when singular."""
-    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
-    for d in range(work.S2.shape[0]):
+def factor_mass_matrix(model: Model, data: Data) -> bool:
+    """M = S2^T (inertia) S2 + armature at configuration 2 in `data`, factored for `solve`; False when singular."""
+    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
+    for d in range(data.S2.shape[0]):
         for k in range(6):
-            work.S3nu[d, k] = work.S2[d, k]
-    armature_blocks(model, 1.0, work.joint_block)
-    return factor(model, work) != 0
+            data.S3nu[d, k] = data.S2[d, k]
+    armature_blocks(model, 1.0, data.joint_block)
+    return factor(model, data) != 0
 
 
 @kernel
-def solve_mass_matrix(model: Model, work: Work, p: Vector, out: Vector) -> bool:
-    """out = M^-1 p at configuration 2 in `work`.
+def solve_mass_matrix(model: Model, data: Data, p: Vector, out: Vector) -> bool:
+    """out = M^-1 p at configuration 2 in `data`.
 
-    Leaves the twists of the bodies in work.twist; False when M is singular.   p, out: (nv,).
+    Leaves the twists of the bodies in data.twist; False when M is singular.   p, out: (nv,).
     """
-    if not factor_mass_matrix(model, work):
+    if not factor_mass_matrix(model, data):
         return False
-    solve(model, work, p, out)
+    solve(model, data, p, out)
     return True
 
 
 @kernel
-def node_velocity(model: Model, work: Work, h: float, x: Vector) -> bool:
-    """work.dnu = P M^-1 p, P: loops/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in work.residual.
+def node_velocity(model: Model, data: Data, h: float, x: Vector) -> bool:
+    """data.dnu = P M^-1 p, P: loops/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in data.residual.
 
     NaN, and False, when M is singular.
     """
-    node_momentum(model, work, h, x, work.wrench)
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    nq = work.theta1.shape[0]
-    add_spring_momentum(model, h, x[:nq], x[nq:], work.residual)
-    if not solve_mass_matrix(model, work, work.residual, work.dnu):
-        for d in range(work.dnu.shape[0]):
-            work.dnu[d] = nan
+    node_momentum(model, data, h, x, data.wrench)
+    subtree_sums(model, data.wrench, data.subtree)
+    project(model, data.S2, data.subtree, data.residual)
+    nq = data.theta1.shape[0]
+    add_spring_momentum(model, h, x[:nq], x[nq:], data.residual)
+    if not solve_mass_matrix(model, data, data.residual, data.dnu):
+        for d in range(data.dnu.shape[0]):
+            data.dnu[d] = nan
         return False
-    close_velocity(model, work, h, x[:nq], x[nq:], work.dnu)
+    close_velocity(model, data, h, x[:nq], x[nq:], data.dnu)
     return True
 
 
 @kernel
-def kinetic_energy(model: Model, work: Work, h: float, x: Vector) -> float:
+def kinetic_energy(model: Model, data: Data, h: float, x: Vector) -> float:
     """p.M^-1 p / 2."""
-    node_velocity(model, work, h, x)
+    node_velocity(model, data, h, x)
     energy = 0.0
-    for d in range(work.dnu.shape[0]):
-        energy += 0.5 * work.residual[d] * work.dnu[d]
+    for d in range(data.dnu.shape[0]):
+        energy += 0.5 * data.residual[d] * data.dnu[d]
     return energy
 
 
@@ -208,11 +208,11 @@ def spring_energy(model: Model, q: Vector) -> float:
 
 
 @kernel
-def momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: Matrix, v: Vector) -> float:
+def momentum_velocity(model: Model, data: Data, h: float, move: Matrix, turn: Matrix, v: Vector) -> float:
     """p.v of an interval [J], twice its kinetic energy; rotations by their sines."""
     energy = 0.0
     for i in range(model.body_parent.shape[0]):
-        J = work.inertia_world[i]
+        J = data.inertia_world[i]
         for r in range(3):
             energy += model.body_mass[i] * move[i, r] * move[i, r] / (h * h)
             for k in range(3):
@@ -223,30 +223,30 @@ def momentum_velocity(model: Model, work: Work, h: float, move: Matrix, turn: Ma
 
 
 @kernel
-def twice_kinetic(model: Model, work: Work, h: float, v: Vector) -> float:
+def twice_kinetic(model: Model, data: Data, h: float, v: Vector) -> float:
     """p.v of the intervals 1-2 and 2-3 together [J]."""
-    before = momentum_velocity(model, work, h, work.move_in, work.turn_in, v)
-    return before + momentum_velocity(model, work, h, work.move, work.turn, work.nu)
+    before = momentum_velocity(model, data, h, data.move_in, data.turn_in, v)
+    return before + momentum_velocity(model, data, h, data.move, data.turn, data.nu)
 
 
 @kernel
-def energies(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
+def energies(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """out[t] = (kinetic, potential) energy of state t [J].   xs: (n, nx); out: (n, 2)."""
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     for t in range(xs.shape[0]):
-        out[t, 0] = kinetic_energy(model, work, h, xs[t])
-        out[t, 1] = gravity_energy(model, work.pos2) + spring_energy(model, xs[t])
+        out[t, 0] = kinetic_energy(model, data, h, xs[t])
+        out[t, 1] = gravity_energy(model, data.pos2) + spring_energy(model, xs[t])
 
 
 @kernel
-def momenta(model_at: Table, work_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
+def momenta(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
     """out[t] = (linear, angular about the origin of the world) momentum of state t.   xs: (n, nx); out: (n, 6)."""
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     for t in range(xs.shape[0]):
-        node_momentum(model, work, h, xs[t], work.wrench)
+        node_momentum(model, data, h, xs[t], data.wrench)
         for k in range(6):
             out[t, k] = 0.0
             for i in range(model.body_parent.shape[0]):
-                out[t, k] += work.wrench[i, k]
+                out[t, k] += data.wrench[i, k]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.dynamics.elimination import add_children
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.dense import copy, dot
@@ -12,24 +12,24 @@ from solvers.types import Cube, Integers, Matrix, Vector
 
 
 @kernel
-def set_external(work: Work, wrenches: Cube, t: int) -> None:
-    """work.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
+def set_external(data: Data, wrenches: Cube, t: int) -> None:
+    """data.external = wrenches[t], of (T, nbody, 6); without any, (0, nbody, 6), it stays zero."""
     if wrenches.shape[0] > 0:
-        copy(wrenches[t], work.external)
+        copy(wrenches[t], data.external)
 
 
 @kernel
-def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
-    """out[:6] = wrench about O per unit of the WORLD or BODY input j, at the configuration in `work`."""
+def input_wrench(model: Model, data: Data, j: int, out: Vector) -> None:
+    """out[:6] = wrench about O per unit of the WORLD or BODY input j, at the configuration in `data`."""
     i = model.input_index[j]
     w = model.input_wrench[j]
     f = (w[0], w[1], w[2])
     t = (w[3], w[4], w[5])
     if model.input_kind[j] == InputKind.BODY:
-        f = rotate(work.rot2, i, f[0], f[1], f[2])
-        t = rotate(work.rot2, i, t[0], t[1], t[2])
-    o = work.origin
-    x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        f = rotate(data.rot2, i, f[0], f[1], f[2])
+        t = rotate(data.rot2, i, t[0], t[1], t[2])
+    o = data.origin
+    x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
     c = cross(x, y, z, f[0], f[1], f[2])
     for k in range(3):
         out[k] = f[k]
@@ -37,22 +37,22 @@ def input_wrench(model: Model, work: Work, j: int, out: Vector) -> None:
 
 
 @kernel
-def outer_wrenches(model: Model, work: Work, u: Vector, out: Matrix) -> None:
+def outer_wrenches(model: Model, data: Data, u: Vector, out: Matrix) -> None:
     """out[i] = wrench of gravity, external wrenches and WORLD and BODY inputs on the subtree of body i.   (nbody, 6)"""
     n = model.body_parent.shape[0]
-    o, g = work.origin, model.gravity
+    o, g = data.origin, model.gravity
     for i in range(n):
         m = model.body_mass[i]
         F = out[i]
-        e = work.external[i]
+        e = data.external[i]
         F[0], F[1], F[2] = m * g[0] + e[0], m * g[1] + e[1], m * g[2] + e[2]
-        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
         t = cross(x, y, z, F[0], F[1], F[2])
         F[3], F[4], F[5] = t[0] + e[3], t[1] + e[4], t[2] + e[5]
     for j in range(u.shape[0]):
         if model.input_kind[j] != InputKind.JOINT:
-            w = work.wrench[0]
-            input_wrench(model, work, j, w)
+            w = data.wrench[0]
+            input_wrench(model, data, j, w)
             for k in range(6):
                 out[model.input_index[j], k] += u[j] * w[k]
     add_children(model, out)
@@ -73,25 +73,25 @@ def _add_force_slope(f: Vector, x: float, y: float, z: float, out: Vector) -> No
 
 
 @kernel
-def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
+def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
     """out[i] = N of the subtree of body i, (nbody, 36): of `outer_wrenches`; BODY inputs turn along."""
-    n, o, w = model.body_parent.shape[0], work.origin, work.wrench[0]
+    n, o, w = model.body_parent.shape[0], data.origin, data.wrench[0]
     for i in range(n):
         for k in range(36):
             out[i, k] = 0.0
         for k in range(3):
-            w[k] = model.body_mass[i] * model.gravity[k] + work.external[i, k]
-        _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], out[i])
+            w[k] = model.body_mass[i] * model.gravity[k] + data.external[i, k]
+        _add_force_slope(w, data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2], out[i])
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:
             continue
         i = model.input_index[j]
-        input_wrench(model, work, j, w)
+        input_wrench(model, data, j, w)
         for k in range(6):
             w[k] *= u[j]
         N = out[i]
         if model.input_kind[j] != InputKind.BODY:
-            _add_force_slope(w, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2], N)
+            _add_force_slope(w, data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2], N)
             continue
         for r in range(3):  # S* w = (-[f] w_S, -[n] w_S - [f] v_S)
             a, b = (r + 1) % 3, (r + 2) % 3
@@ -105,9 +105,9 @@ def outer_slopes(model: Model, work: Work, u: Vector, out: Matrix) -> None:
 
 
 @kernel
-def input_slopes(model: Model, work: Work, free: Integers, out: Matrix) -> None:
+def input_slopes(model: Model, data: Data, free: Integers, out: Matrix) -> None:
     """out = df/du: 1 at the dof of a JOINT input, S_d . wrench above the body of the others."""
-    w = work.wrench[0]
+    w = data.wrench[0]
     for j in range(out.shape[1]):
         for d in range(out.shape[0]):
             out[d, j] = 0.0
@@ -115,8 +115,8 @@ def input_slopes(model: Model, work: Work, free: Integers, out: Matrix) -> None:
         if model.input_kind[j] == InputKind.JOINT:
             out[i, j] = 1.0
             continue
-        input_wrench(model, work, j, w)
+        input_wrench(model, data, j, w)
         while i >= 0:
             for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                out[d, j] = w[d - model.body_vadr[i]] if free[i] == 1 else dot(work.S2[d], w)
+                out[d, j] = w[d - model.body_vadr[i]] if free[i] == 1 else dot(data.S2[d], w)
             i = model.body_parent[i]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from sim.dynamics.joints.swing import swing_pose
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
@@ -107,7 +107,7 @@ def rotation_columns(model: Model, q: Vector, i: int, R: Mat3, o: Vec3, S: Matri
 
 
 @kernel
-def tree_poses(model: Model, work: Work, q: Vector) -> None:
+def tree_poses(model: Model, data: Data, q: Vector) -> None:
     """Poses of all bodies at configuration 2, whose coordinates are q, and unit joint columns about O.
 
         joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
@@ -117,7 +117,7 @@ def tree_poses(model: Model, work: Work, q: Vector) -> None:
 
     Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.
     """
-    pos, quat, rot, S, O = work.pos2, work.quat2, work.rot2, work.S2, work.origin
+    pos, quat, rot, S, O = data.pos2, data.quat2, data.rot2, data.S2, data.origin
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
         b = model.joint_parent_point[i]
@@ -144,8 +144,8 @@ def tree_poses(model: Model, work: Work, q: Vector) -> None:
         c = model.joint_child_point[i]
         e = times(R, c[0], c[1], c[2])
         for k in range(3):
-            work.arm[i, k] = r[k]
-            work.arm[i, 3 + k] = e[k]
+            data.arm[i, k] = r[k]
+            data.arm[i, 3 + k] = e[k]
             pos[i, k] = o[k] - e[k]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.dynamics.elimination import dot_six
 from sim.dynamics.energy import spatial_inertia
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.dense import clear
@@ -69,22 +69,22 @@ def eliminate_mass(
 
 
 @kernel
-def solve_mass(model: Model, work: Work, p: Vector, out: Vector) -> bool:
+def solve_mass(model: Model, data: Data, p: Vector, out: Vector) -> bool:
     """M out = p by `eliminate_mass`, and on the way down    out = z - U.V/D,  V += S out.
 
-    False when M is singular.   Leaves the twists of the bodies in work.twist.
+    False when M is singular.   Leaves the twists of the bodies in data.twist.
     """
-    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
-    clear(work.wrench)
-    if not eliminate_mass(model, work.S2, work.A, work.wrench, work.U, work.z, work.residual, p):
+    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
+    clear(data.wrench)
+    if not eliminate_mass(model, data.S2, data.A, data.wrench, data.U, data.z, data.residual, p):
         return False
     for i in range(model.body_parent.shape[0]):
-        V, q = work.twist[i], model.body_parent[i]
+        V, q = data.twist[i], model.body_parent[i]
         for k in range(6):
-            V[k] = work.twist[q, k] if q >= 0 else 0.0
+            V[k] = data.twist[q, k] if q >= 0 else 0.0
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            S = work.S2[d]
-            t = work.z[d] - work.residual[d] * dot_six(work.U[d], V)
+            S = data.S2[d]
+            t = data.z[d] - data.residual[d] * dot_six(data.U[d], V)
             out[d] = t
             for k in range(6):
                 V[k] += S[k] * t

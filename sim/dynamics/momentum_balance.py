@@ -15,7 +15,7 @@ from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jac
 from sim.dynamics.carry_over import advance, follows_on
 from sim.dynamics.displacements import Increment, move_back, tree_moves
 from sim.dynamics.kinematics import tree_poses
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.rotation import Mat3, cross, rotate
@@ -39,15 +39,15 @@ def world_inertia(model: Model, rot: Matrix, out: Matrix) -> None:
 
 
 @kernel
-def place_origin(model: Model, work: Work, q: Vector) -> None:
+def place_origin(model: Model, data: Data, q: Vector) -> None:
     """O at body 0 where that can move freely, at its joint otherwise."""
     free = model.body_parent.shape[0] > 0 and model.body_parent[0] < 0 and model.joint_ntrans[0] == 3
     for k in range(3):
-        work.origin[k] = q[k] if free else model.joint_parent_point[0, k]
+        data.origin[k] = q[k] if free else model.joint_parent_point[0, k]
 
 
 @kernel
-def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> bool:
+def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> bool:
     """Everything of a step that does not depend on its unknown: configurations 1 and 2, incoming momenta and impulses.
 
     momentum_in = (m (x2 - x1)/h + h m g + h f,  -P(c', -s') + h tau)      at the centre of mass
@@ -56,60 +56,60 @@ def begin_step(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vect
 
     False when a body turned by half a turn or more from 1 to 2: the state is not what it seems.
     """
-    before = (work.origin[0], work.origin[1], work.origin[2])
-    place_origin(model, work, q)
-    if follows_on(work, q, v):
-        advance(model, work, h, q, v, before)
-        world_inertia(model, work.rot2, work.inertia_world)
+    before = (data.origin[0], data.origin[1], data.origin[2])
+    place_origin(model, data, q)
+    if follows_on(data, q, v):
+        advance(model, data, h, q, v, before)
+        world_inertia(model, data.rot2, data.inertia_world)
     else:
-        work.carried_steps[0] = 0
-        tree_poses(model, work, q)
-        move_back(model, work, h, q, v)
-        world_inertia(model, work.rot2, work.inertia_world)
-        mean_momenta(model, work, h)
+        data.carried_steps[0] = 0
+        tree_poses(model, data, q)
+        move_back(model, data, h, q, v)
+        world_inertia(model, data.rot2, data.inertia_world)
+        mean_momenta(model, data, h)
     for i in range(model.body_parent.shape[0]):
         m = h * model.body_mass[i]
         for k in range(3):
-            work.momentum_in[i, k] += m * model.gravity[k] + h * work.external[i, k]
-            work.momentum_in[i, 3 + k] += h * work.external[i, 3 + k]
-            work.body_impulse[i, k] = 0.0
-            work.body_impulse[i, 3 + k] = 0.0
-    representable = turns_below_half(model, work, h, v)
+            data.momentum_in[i, k] += m * model.gravity[k] + h * data.external[i, k]
+            data.momentum_in[i, 3 + k] += h * data.external[i, 3 + k]
+            data.body_impulse[i, k] = 0.0
+            data.body_impulse[i, 3 + k] = 0.0
+    representable = turns_below_half(model, data, h, v)
     for j in range(u.shape[0]):
-        _apply_input(model, work, h, j, u[j])
+        _apply_input(model, data, h, j, u[j])
     return representable
 
 
 @kernel
-def mean_momenta(model: Model, work: Work, h: float) -> None:
+def mean_momenta(model: Model, data: Data, h: float) -> None:
     """momentum_in = (m (x2 - x1)/h, -P(c', -s')), from the moves of interval 1-2."""
     for i in range(model.body_parent.shape[0]):
         m = model.body_mass[i] / h
-        t = work.turn_in[i]
-        px, py, pz = angular_momentum(work.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
+        t = data.turn_in[i]
+        px, py, pz = angular_momentum(data.inertia_world, i, h, t[0], -t[1], -t[2], -t[3])
         for k in range(3):
-            work.momentum_in[i, k] = m * work.move_in[i, k]
-        work.momentum_in[i, 3], work.momentum_in[i, 4], work.momentum_in[i, 5] = -px, -py, -pz
+            data.momentum_in[i, k] = m * data.move_in[i, k]
+        data.momentum_in[i, 3], data.momentum_in[i, 4], data.momentum_in[i, 5] = -px, -py, -pz
 
 
 @kernel
-def turns_below_half(model: Model, work: Work, h: float, v: Vector) -> bool:
+def turns_below_half(model: Model, data: Data, h: float, v: Vector) -> bool:
     """|h omega| < pi for the angular velocity of each body, omega = sum of the ancestors' rotation rates about S2."""
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
         for k in range(3):
-            w = work.subtree[p, 3 + k] if p >= 0 else 0.0
+            w = data.subtree[p, 3 + k] if p >= 0 else 0.0
             for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-                w += h * v[d] * work.S2[d, 3 + k]
-            work.subtree[i, 3 + k] = w
-        x, y, z = work.subtree[i, 3], work.subtree[i, 4], work.subtree[i, 5]
-        if not x * x + y * y + z * z < _HALF_TURN or not work.turn_in[i, 0] > 1e-3:
+                w += h * v[d] * data.S2[d, 3 + k]
+            data.subtree[i, 3 + k] = w
+        x, y, z = data.subtree[i, 3], data.subtree[i, 4], data.subtree[i, 5]
+        if not x * x + y * y + z * z < _HALF_TURN or not data.turn_in[i, 0] > 1e-3:
             return False
     return True
 
 
 @kernel
-def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
+def _apply_input(model: Model, data: Data, h: float, j: int, u: float) -> None:
     """Add the impulse h u of a WORLD or BODY input to its body (JOINT inputs enter the generalized residual)."""
     if model.input_kind[j] == InputKind.JOINT:
         return
@@ -118,14 +118,14 @@ def _apply_input(model: Model, work: Work, h: float, j: int, u: float) -> None:
     f = (h * u * w[0], h * u * w[1], h * u * w[2])
     t = (h * u * w[3], h * u * w[4], h * u * w[5])
     if model.input_kind[j] == InputKind.BODY:
-        f = rotate(work.rot2, i, f[0], f[1], f[2])
-        t = rotate(work.rot2, i, t[0], t[1], t[2])
+        f = rotate(data.rot2, i, f[0], f[1], f[2])
+        t = rotate(data.rot2, i, t[0], t[1], t[2])
         for k in range(3):
-            work.body_impulse[i, k] += f[k]
-            work.body_impulse[i, 3 + k] += t[k]
+            data.body_impulse[i, k] += f[k]
+            data.body_impulse[i, 3 + k] += t[k]
     for k in range(3):
-        work.momentum_in[i, k] += f[k]
-        work.momentum_in[i, 3 + k] += t[k]
+        data.momentum_in[i, k] += f[k]
+        data.momentum_in[i, 3 + k] += t[k]
 
 
 @kernel
@@ -141,31 +141,31 @@ def joints_below_turn(model: Model, nu: Vector, h: float) -> bool:
 
 
 @kernel
-def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
-    """balance = momentum_out - momentum_in, as a wrench about O, at the trial velocity work.nu.
+def momentum_balance(model: Model, data: Data, h: float, q: Vector) -> bool:
+    """balance = momentum_out - momentum_in, as a wrench about O, at the trial velocity data.nu.
 
     momentum_out = (m (x3 - x2)/h, P(c, s))      at the centre of mass
 
     False when a body would turn by half a turn or more.   Fills configuration 3, move, turn, momentum_out, balance;
     rotation matrices are left to `turn_bodies`, for the balance has no use for them.
     """
-    tree_moves(model, work, Increment(q, work.nu, h), True)
-    inside = joints_below_turn(model, work.nu, h)
+    tree_moves(model, data, Increment(q, data.nu, h), True)
+    inside = joints_below_turn(model, data.nu, h)
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
+        c, x, y, z = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]
         inside = inside and c > 1e-3
-        p = work.momentum_out[i]
-        p[3], p[4], p[5] = angular_momentum(work.inertia_world, i, h, c, x, y, z)
+        p = data.momentum_out[i]
+        p[3], p[4], p[5] = angular_momentum(data.inertia_world, i, h, c, x, y, z)
         m = model.body_mass[i] / h
         for k in range(3):
-            p[k] = m * work.move[i, k]
-        b = work.balance[i]
+            p[k] = m * data.move[i, k]
+        b = data.balance[i]
         for k in range(6):
-            b[k] = p[k] - work.momentum_in[i, k]
+            b[k] = p[k] - data.momentum_in[i, k]
         tx, ty, tz = cross(
-            work.pos2[i, 0] - work.origin[0],
-            work.pos2[i, 1] - work.origin[1],
-            work.pos2[i, 2] - work.origin[2],
+            data.pos2[i, 0] - data.origin[0],
+            data.pos2[i, 1] - data.origin[1],
+            data.pos2[i, 2] - data.origin[2],
             b[0],
             b[1],
             b[2],
@@ -175,24 +175,24 @@ def momentum_balance(model: Model, work: Work, h: float, q: Vector) -> bool:
 
 
 @kernel
-def momentum_balance_jacobian(model: Model, work: Work, h: float, out: Matrix) -> None:
+def momentum_balance_jacobian(model: Model, data: Data, h: float, out: Matrix) -> None:
     """out[i] = d(balance)/d(twist of configuration 3), about O, 6 x 6 row-major.  (nbody, 36)"""
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
-        J = angular_momentum_jacobian(work.inertia_world, i, h, c, x, y, z)
-        body_jacobian(model, work, h, i, work.pos3, J, out[i])
+        c, x, y, z = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]
+        J = angular_momentum_jacobian(data.inertia_world, i, h, c, x, y, z)
+        body_jacobian(model, data, h, i, data.pos3, J, out[i])
 
 
 @kernel
-def body_jacobian(model: Model, work: Work, h: float, i: int, pos: Matrix, J: Mat3, A: Vector) -> None:
+def body_jacobian(model: Model, data: Data, h: float, i: int, pos: Matrix, J: Mat3, A: Vector) -> None:
     """A = the block of body i by its pose at configuration k, 1 or 3, whose positions are `pos`; J = dP/dphi:
 
     [ m/h I       -m/h [dk]         ]
     [ m/h [d2]    J - m/h [d2] [dk] ]     d2, dk: from O to the centre of mass at 2 and k
     """
     m = model.body_mass[i] / h
-    o = work.origin
-    x2, y2, z2 = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+    o = data.origin
+    x2, y2, z2 = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
     x, y, z = pos[i, 0] - o[0], pos[i, 1] - o[1], pos[i, 2] - o[2]
     for k in range(3):
         for j in range(3):

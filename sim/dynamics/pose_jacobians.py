@@ -10,7 +10,7 @@ from __future__ import annotations
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.momentum_balance import body_jacobian
 from sim.model.columns import Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.lanes import load, store
@@ -51,23 +51,23 @@ def columns_to_origin(A: Vector, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def inertial_jacobians(model: Model, work: Work, h: float) -> None:
+def inertial_jacobians(model: Model, data: Data, h: float) -> None:
     """A1, A2, A3 of the bodies without contacts; A2 still in rows and columns at the centre of mass.
 
     A1 = diag(m/h I, D-),   A2 = diag(-2 m/h I, -D+ - D- - [P+ - P-]) + inputs that turn with the body
     D+ = dP+/dphi3, D- = d(-P-)/dphi1, rows of A1 about O by d2, columns by d1
     """
-    J = work.inertia_world
+    J = data.inertia_world
     for i in range(model.body_parent.shape[0]):
-        c, x, y, z = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
-        e, u, v, w = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
+        c, x, y, z = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]
+        e, u, v, w = data.turn_in[i, 0], data.turn_in[i, 1], data.turn_in[i, 2], data.turn_in[i, 3]
         plus = angular_momentum_jacobian(J, i, h, c, x, y, z)
         minus = angular_momentum_jacobian(J, i, h, e, -u, -v, -w)
         px, py, pz = angular_momentum(J, i, h, c, x, y, z)
         mx, my, mz = angular_momentum(J, i, h, e, -u, -v, -w)  # -P-
-        body_jacobian(model, work, h, i, work.pos3, plus, work.A3[i])
-        body_jacobian(model, work, h, i, work.pos1, minus, work.A1[i])
-        A2 = work.A2[i]
+        body_jacobian(model, data, h, i, data.pos3, plus, data.A3[i])
+        body_jacobian(model, data, h, i, data.pos1, minus, data.A1[i])
+        A2 = data.A2[i]
         for k in range(36):
             A2[k] = 0.0
         m = -2.0 * model.body_mass[i] / h
@@ -75,23 +75,23 @@ def inertial_jacobians(model: Model, work: Work, h: float) -> None:
             A2[7 * k] = m
             for j in range(3):
                 A2[21 + 6 * k + j] = -plus[3 * k + j] - minus[3 * k + j]
-        b = work.body_impulse[i]
+        b = data.body_impulse[i]
         add_skew(A2, 0, 3, b[0], b[1], b[2])
         add_skew(A2, 3, 3, b[3] - px - mx, b[4] - py - my, b[5] - pz - mz)
 
 
 @kernel
-def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
+def add_slip_jacobian(model: Model, data: Data, h: float, c: int) -> None:
     """A2[body] -= impulse map W C2: the slip of contact c depends on pose 2 (rows and columns at the centre of mass).
 
     C2 = (-t/h, (-c y + s x y)/h),   y = r x t
     """
     i = model.contact_body[c]
-    k = work.contact_kin[c]
-    F = work.contact_frame[c]
-    W = work.contact_W[c]
-    A = work.A2[i]
-    w, sx, sy, sz = work.turn[i, 0], work.turn[i, 1], work.turn[i, 2], work.turn[i, 3]
+    k = data.contact_kin[c]
+    F = data.contact_frame[c]
+    W = data.contact_W[c]
+    A = data.A2[i]
+    w, sx, sy, sz = data.turn[i, 0], data.turn[i, 1], data.turn[i, 2], data.turn[i, 3]
     ih = 1.0 / h
     y0, y1, y2 = cross(*three(k, Kin.ARM), F[3], F[4], F[5])
     a0, a1, a2 = cross(sx, sy, sz, y0, y1, y2)
@@ -113,14 +113,14 @@ def add_slip_jacobian(model: Model, work: Work, h: float, c: int) -> None:
 
 
 @kernel
-def pose2_to_origin(work: Work) -> None:
+def pose2_to_origin(data: Data) -> None:
     """A2 from the centre of mass to O; the arm of the force moves with pose 2: torque rows -= [f] for dx2."""
-    o = work.origin
-    for i in range(work.A2.shape[0]):
-        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
-        A = work.A2[i]
+    o = data.origin
+    for i in range(data.A2.shape[0]):
+        x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
+        A = data.A2[i]
         rows_to_origin(A, x, y, z)
-        f = work.wrench[i]
+        f = data.wrench[i]
         add_skew(A, 3, 0, -f[0], -f[1], -f[2])
         columns_to_origin(A, x, y, z)
 
@@ -141,11 +141,11 @@ def _add_matrix(A: Matrix, i: int, p: int) -> None:
 
 
 @kernel
-def sum_composites(model: Model, work: Work) -> None:
+def sum_composites(model: Model, data: Data) -> None:
     """A1, A2, A3 of each body become the sums over its subtree."""
     for i in range(model.body_parent.shape[0] - 1, -1, -1):
         p = model.body_parent[i]
         if p >= 0:
-            _add_matrix(work.A1, i, p)
-            _add_matrix(work.A2, i, p)
-            _add_matrix(work.A3, i, p)
+            _add_matrix(data.A1, i, p)
+            _add_matrix(data.A2, i, p)
+            _add_matrix(data.A3, i, p)

@@ -17,8 +17,8 @@ from sim.derivatives.parameters.height_columns import add_height_gradient
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.integrators.rollout import Linearized, linearize
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.pace import DEADLINE
 from solvers.compiler import Table, kernel, seconds
@@ -55,7 +55,7 @@ class Sweep(NamedTuple):
 @kernel
 def sweep(
     model_at: Table,
-    work_at: Table,
+    data_at: Table,
     settings: Vector,
     line: Sweep,
     terms: IntegerMatrix,
@@ -67,7 +67,7 @@ def sweep(
     Without the report of an unsolved step, which is the last of those left, that is none, or the deadline is over.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     n = line.costate.shape[1]
     nq = line.xs.shape[1] - n // 2
     costate, before = line.costate[0], line.costate[1]
@@ -76,12 +76,12 @@ def sweep(
             line.x_next[0, k] = line.xs[t + 1, k]
         wrenches = line.wrenches[t : t + 1]
         one = Linearized(line.xs[t : t + 1], line.us[t : t + 1], wrenches, line.A, line.B, line.x_next, line.report)
-        linearize(model_at, work_at, settings, (0, 0, 1), 1, one)
+        linearize(model_at, data_at, settings, (0, 0, 1), 1, one)
         if line.report[0, 0] != _SOLVED:
             return t + 1
         if line.parameters.shape[0] > 0 or line.heights.shape[1] > 0:
             at = At(settings[0], line.xs[t, :nq], line.xs[t, nq:], line.us[t], line.twists, line.below)
-            _add_parameters(model, work, at, line, terms, weights)
+            _add_parameters(model, data, at, line, terms, weights)
         for j in range(line.us.shape[1]):
             s = 0.0
             for i in range(n):
@@ -100,7 +100,7 @@ def sweep(
 
 
 @kernel
-def _velocity_gradient(model: Model, work: Work, h: float, costate: Vector, w: Vector) -> None:
+def _velocity_gradient(model: Model, data: Data, h: float, costate: Vector, w: Vector) -> None:
     """w = l_v + h l_q, h J(h w) l_q of quaternions: gradient by v25."""
     nv = w.shape[0]
     for d in range(nv):
@@ -109,7 +109,7 @@ def _velocity_gradient(model: Model, work: Work, h: float, costate: Vector, w: V
         if model.joint_nrot[i] != 3:
             continue
         d = model.body_vadr[i + 1] - 3
-        J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+        J = left_jacobian(h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2])
         for r in range(3):
             w[d + r] = costate[nv + d + r] + h * (
                 J[3 * r] * costate[d] + J[3 * r + 1] * costate[d + 1] + J[3 * r + 2] * costate[d + 2]
@@ -117,66 +117,66 @@ def _velocity_gradient(model: Model, work: Work, h: float, costate: Vector, w: V
 
 
 @kernel
-def _residual_gradient(model: Model, work: Work, w: Vector, y: Vector) -> None:
+def _residual_gradient(model: Model, data: Data, w: Vector, y: Vector) -> None:
     """y = H^-T w: scalar products of w with the columns of H^-1, as many at once as fit."""
     nv = w.shape[0]
-    width = column_count(model, work)
+    width = column_count(model, data)
     first = 0
     while first < y.shape[0]:
-        clear_columns(work)
+        clear_columns(data)
         count = min(width, y.shape[0] - first)
         for m in range(count):
             if first + m < nv:
-                work.columns[first + m, m] = 1.0
+                data.columns[first + m, m] = 1.0
             else:
-                work.couple_panel[first + m - nv, m] = 1.0
-        solve_panel(model, work)
-        solve_coupling_panel(model, work)
+                data.couple_panel[first + m - nv, m] = 1.0
+        solve_panel(model, data)
+        solve_coupling_panel(model, data)
         for m in range(count):
             s = 0.0
             for d in range(nv):
-                s += w[d] * work.columns[d, m]
+                s += w[d] * data.columns[d, m]
             y[first + m] = s
         first += width
 
 
 @kernel
-def _add_parameters(model: Model, work: Work, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
+def _add_parameters(model: Model, data: Data, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
     """parameters += what this step adds."""
     costate, w, y = line.costate[0], line.w, line.y
     nv = w.shape[0]
-    _velocity_gradient(model, work, at.h, costate, w)
-    _residual_gradient(model, work, w, y)
+    _velocity_gradient(model, data, at.h, costate, w)
+    _residual_gradient(model, data, w, y)
     if line.heights.shape[1] > 0:
-        add_height_gradient(model, work, at.h, y, line.places, line.heights)
-    width = column_count(model, work)
+        add_height_gradient(model, data, at.h, y, line.places, line.heights)
+    width = column_count(model, data)
     count = line.parameters.shape[0]
     first = 0
     start = 0
     while first < count:
-        end = fill_columns(model, work, at, terms, weights, first, start)
+        end = fill_columns(model, data, at, terms, weights, first, start)
         for m in range(min(width, count - first)):
             s = 0.0
             for d in range(nv):
-                s += y[d] * work.columns[d, m]
-            for row in range(work.couple_panel.shape[0]):
-                s += y[nv + row] * work.couple_panel[row, m]
+                s += y[d] * data.columns[d, m]
+            for row in range(data.couple_panel.shape[0]):
+                s += y[nv + row] * data.couple_panel[row, m]
             line.parameters[first + m] += s
         for t in range(start, end):
             if terms[t, 0] == _TIME_STEP:
-                line.parameters[terms[t, 3]] += weights[t] * _time_gradient(work, at, line.A[0], costate, w)
+                line.parameters[terms[t, 3]] += weights[t] * _time_gradient(data, at, line.A[0], costate, w)
         first += width
         start = end
 
 
 @kernel
-def _time_gradient(work: Work, at: At, A: Matrix, costate: Vector, w: Vector) -> float:
+def _time_gradient(data: Data, at: At, A: Matrix, costate: Vector, w: Vector) -> float:
     """w.(A_vv v15 - v25)/h + l_q.v25, the part of dL/dh that does not go through dR/dh; see parameter_jacobian.py."""
     nv = w.shape[0]
     s = 0.0
     for d in range(nv):
-        z = -work.nu[d]
+        z = -data.nu[d]
         for k in range(nv):
             z += A[nv + d, nv + k] * at.v[k]
-        s += w[d] * z / at.h + costate[d] * work.nu[d]
+        s += w[d] * z / at.h + costate[d] * data.nu[d]
     return s

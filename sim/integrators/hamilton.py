@@ -25,7 +25,7 @@ from sim.dynamics.kinematics import tree_poses
 from sim.dynamics.mass import solve_mass
 from sim.dynamics.momentum_balance import world_inertia
 from sim.dynamics.velocity import joint_twists
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.rotation import cross, inverse_right_jacobian
@@ -35,24 +35,24 @@ _JOINT = int(InputKind.JOINT)
 
 
 @kernel
-def place(model: Model, work: Work) -> None:
-    """Configuration 2 at the coordinates work.theta1."""
-    q = work.theta1
-    tree_poses(model, work, q)
-    world_inertia(model, work.rot2, work.inertia_world)
+def place(model: Model, data: Data) -> None:
+    """Configuration 2 at the coordinates data.theta1."""
+    q = data.theta1
+    tree_poses(model, data, q)
+    world_inertia(model, data.rot2, data.inertia_world)
 
 
 @kernel
-def subtree_momenta(model: Model, work: Work) -> None:
-    """work.subtree[i] = momentum of the subtree of body i, of the twists in `work`: m (V + W x r), r x that + J W."""
+def subtree_momenta(model: Model, data: Data) -> None:
+    """data.subtree[i] = momentum of the subtree of body i, of the twists in `data`: m (V + W x r), r x that + J W."""
     n = model.body_parent.shape[0]
-    o = work.origin
+    o = data.origin
     for i in range(n):
-        V = work.twist[i]
-        J = work.inertia_world[i]
-        P = work.subtree[i]
+        V = data.twist[i]
+        J = data.inertia_world[i]
+        P = data.subtree[i]
         m = model.body_mass[i]
-        x, y, z = work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2]
+        x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
         a, b, c = cross(V[3], V[4], V[5], x, y, z)
         P[0], P[1], P[2] = m * (V[0] + a), m * (V[1] + b), m * (V[2] + c)
         a, b, c = cross(x, y, z, P[0], P[1], P[2])
@@ -63,72 +63,72 @@ def subtree_momenta(model: Model, work: Work) -> None:
         p = model.body_parent[i]
         if p >= 0:
             for k in range(6):
-                work.subtree[p, k] += work.subtree[i, k]
+                data.subtree[p, k] += data.subtree[i, k]
 
 
 @kernel
-def momenta_of_velocity(model: Model, work: Work, free: Integers, v: Vector, out: Vector) -> None:
-    """out = the momenta of joint velocities v at the configuration in `work`."""
-    joint_twists(model, work, v)
-    subtree_momenta(model, work)
-    project(model, work.S2, work.subtree, out)
+def momenta_of_velocity(model: Model, data: Data, free: Integers, v: Vector, out: Vector) -> None:
+    """out = the momenta of joint velocities v at the configuration in `data`."""
+    joint_twists(model, data, v)
+    subtree_momenta(model, data)
+    project(model, data.S2, data.subtree, out)
     for d in range(v.shape[0]):
         out[d] += model.dof_armature[d] * v[d]
     for i in range(free.shape[0]):
         if free[i] == 1:
             for k in range(6):
-                out[model.body_vadr[i] + k] = work.subtree[i, k]
+                out[model.body_vadr[i] + k] = data.subtree[i, k]
 
 
 @kernel
-def velocity_of_momenta(model: Model, work: Work, free: Integers, momenta: Vector) -> bool:
-    """work.nu = M^-1 p at the configuration in `work`, with the twists and momenta of the bodies; False if singular."""
-    p = work.rhs
+def velocity_of_momenta(model: Model, data: Data, free: Integers, momenta: Vector) -> bool:
+    """data.nu = M^-1 p at the configuration in `data`, with the twists and momenta of the bodies; False if singular."""
+    p = data.rhs
     for d in range(momenta.shape[0]):
         p[d] = momenta[d]
     for i in range(free.shape[0]):
         if free[i] == 1:
             d = model.body_vadr[i]
             for k in range(d, d + 6):
-                S = work.S2[k]
+                S = data.S2[k]
                 p[k] = S[0] * momenta[d] + S[1] * momenta[d + 1] + S[2] * momenta[d + 2]
                 p[k] += S[3] * momenta[d + 3] + S[4] * momenta[d + 4] + S[5] * momenta[d + 5]
-    if not solve_mass(model, work, p, work.nu):
+    if not solve_mass(model, data, p, data.nu):
         return False
-    subtree_momenta(model, work)
+    subtree_momenta(model, data)
     return True
 
 
 @kernel
-def node_energy(model: Model, work: Work) -> tuple[float, float]:
-    """Kinetic energy, and energy of the springs, at the evaluation that is in `work` [J]."""
+def node_energy(model: Model, data: Data) -> tuple[float, float]:
+    """Kinetic energy, and energy of the springs, at the evaluation that is in `data` [J]."""
     kinetic = 0.0
-    for d in range(work.nu.shape[0]):
-        p = dot_six(work.S2[d], work.subtree[model.dof_body[d]]) + model.dof_armature[d] * work.nu[d]
-        kinetic += 0.5 * p * work.nu[d]
-    return kinetic, spring_energy(model, work.theta1)
+    for d in range(data.nu.shape[0]):
+        p = dot_six(data.S2[d], data.subtree[model.dof_body[d]]) + model.dof_armature[d] * data.nu[d]
+        kinetic += 0.5 * p * data.nu[d]
+    return kinetic, spring_energy(model, data.theta1)
 
 
 @kernel
-def outer_power(model: Model, work: Work, u: Vector) -> float:
-    """Power of gravity and inputs [W], with the wrenches on subtrees that `momentum_rates` leaves in work.balance."""
+def outer_power(model: Model, data: Data, u: Vector) -> float:
+    """Power of gravity and inputs [W], with the wrenches on subtrees that `momentum_rates` leaves in data.balance."""
     power = 0.0
-    for d in range(work.nu.shape[0]):
-        power += dot_six(work.S2[d], work.balance[model.dof_body[d]]) * work.nu[d]
+    for d in range(data.nu.shape[0]):
+        power += dot_six(data.S2[d], data.balance[model.dof_body[d]]) * data.nu[d]
     for j in range(u.shape[0]):
         if model.input_kind[j] == _JOINT:
-            power += u[j] * work.nu[model.input_index[j]]
+            power += u[j] * data.nu[model.input_index[j]]
     return power
 
 
 @kernel
-def column_rate(model: Model, work: Work, i: int, d: int) -> tuple[float, float, float, float, float, float]:
+def column_rate(model: Model, data: Data, i: int, d: int) -> tuple[float, float, float, float, float, float]:
     """S_d' = W x S_d, d of joint i: W is the twist of body i for rotations, of its parent for translations."""
-    S = work.S2[d]
+    S = data.S2[d]
     if d >= model.body_vadr[i] + model.joint_ntrans[i]:
-        W = work.twist[i]
+        W = data.twist[i]
     elif model.body_parent[i] >= 0:
-        W = work.twist[model.body_parent[i]]
+        W = data.twist[model.body_parent[i]]
     else:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     a, b, c = cross(W[3], W[4], W[5], S[0], S[1], S[2])
@@ -158,33 +158,33 @@ def joint_forces(model: Model, q: Vector, v: Vector, u: Vector, out: Vector) -> 
 
 
 @kernel
-def momentum_rates(model: Model, work: Work, free: Integers, u: Vector, out: Vector) -> None:
-    """out = p' with the velocity and the momenta of the bodies in `work`."""
-    F = work.balance
-    outer_wrenches(model, work, u, F)
-    joint_forces(model, work.theta1, work.nu, u, out)
+def momentum_rates(model: Model, data: Data, free: Integers, u: Vector, out: Vector) -> None:
+    """out = p' with the velocity and the momenta of the bodies in `data`."""
+    F = data.balance
+    outer_wrenches(model, data, u, F)
+    joint_forces(model, data.theta1, data.nu, u, out)
     for i in range(free.shape[0]):
-        P, f = work.subtree[i], F[i]
+        P, f = data.subtree[i], F[i]
         if free[i] == 1:
             for k in range(6):
                 out[model.body_vadr[i] + k] = f[k]
             continue
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            r, S = column_rate(model, work, i, d), work.S2[d]
+            r, S = column_rate(model, data, i, d), data.S2[d]
             out[d] += r[0] * P[0] + r[1] * P[1] + r[2] * P[2] + r[3] * P[3] + r[4] * P[4] + r[5] * P[5]
             out[d] += S[0] * f[0] + S[1] * f[1] + S[2] * f[2] + S[3] * f[3] + S[4] * f[4] + S[5] * f[5]
         if model.joint_nrot[i] == 2:
-            _add_swing(model, work, i, out)
+            _add_swing(model, data, i, out)
 
 
 @kernel
-def _add_swing(model: Model, work: Work, i: int, out: Vector) -> None:
+def _add_swing(model: Model, data: Data, i: int, out: Vector) -> None:
     """out[d] += P . sum_k v_k d(S_d)/d(q_k), beyond turning, of the two rotations of a swing (joints/swing.py)."""
     d, a = model.body_vadr[i + 1] - 2, model.body_qadr[i + 1] - 2
-    R, v = work.dR_dq, work.nu
+    R, v = data.dR_dq, data.nu
     for k in range(2):
         R[d + k, d] = R[d + k, d + 1] = 0.0
-    swing_curvature(model, work, i, work.theta1[a], work.theta1[a + 1])
+    swing_curvature(model, data, i, data.theta1[a], data.theta1[a + 1])
     for k in range(2):
         out[d + k] += R[d + k, d] * v[d] + R[d + k, d + 1] * v[d + 1]
 

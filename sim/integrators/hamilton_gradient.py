@@ -23,7 +23,7 @@ from sim.dynamics.energy import armature_blocks, spatial_inertia
 from sim.dynamics.external_forces import input_slopes, outer_slopes
 from sim.dynamics.joints.ball_spring import relative_to_rest
 from sim.integrators.hamilton import column_rate
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.dense import dot
@@ -62,19 +62,19 @@ def _add_mul(A: Vector, x: Vector, sign: float, transposed: bool, out: Vector) -
 
 
 @kernel
-def _columns(model: Model, work: Work, out: Matrix) -> None:
-    """The vectors of every column, (nv, 42).   work.A1, A2: I and N of the subtrees; work.balance: F."""
+def _columns(model: Model, data: Data, out: Matrix) -> None:
+    """The vectors of every column, (nv, 42).   data.A1, A2: I and N of the subtrees; data.balance: F."""
     for i in range(model.body_parent.shape[0]):
-        V, p = work.wrench[0], model.body_parent[i]
+        V, p = data.wrench[0], model.body_parent[i]
         for k in range(6):
-            V[k] = work.twist[p, k] if p >= 0 else 0.0
-        J, N, P, F = work.A1[i], work.A2[i], work.subtree[i], work.balance[i]
+            V[k] = data.twist[p, k] if p >= 0 else 0.0
+        J, N, P, F = data.A1[i], data.A2[i], data.subtree[i], data.balance[i]
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            S, c = work.S2[d], out[d]
+            S, c = data.S2[d], out[d]
             a, b = cross(S[3], S[4], S[5], V[0], V[1], V[2]), cross(S[0], S[1], S[2], V[3], V[4], V[5])
             c[0], c[1], c[2] = a[0] + b[0], a[1] + b[1], a[2] + b[2]
             c[3], c[4], c[5] = cross(S[3], S[4], S[5], V[3], V[4], V[5])
-            c[6], c[7], c[8], c[9], c[10], c[11] = column_rate(model, work, i, d)
+            c[6], c[7], c[8], c[9], c[10], c[11] = column_rate(model, data, i, d)
             for k in range(12, 42):
                 c[k] = 0.0
             _add_mul(J, S, 1.0, False, c[12:18])
@@ -87,7 +87,7 @@ def _columns(model: Model, work: Work, out: Matrix) -> None:
             _add_mul(N, S, 1.0, False, c[36:42])
             if d < model.body_vadr[i] + model.joint_ntrans[i]:  # what lies before the rotations of a joint
                 for k in range(6):
-                    V[k] += S[k] * work.nu[d]
+                    V[k] += S[k] * data.nu[d]
 
 
 @kernel
@@ -107,9 +107,9 @@ def _pair(S: Matrix, slopes: Slopes, d: int, k: int, behind: bool) -> None:
 
 
 @kernel
-def _tree_pairs(model: Model, work: Work, free: Integers, slopes: Slopes) -> None:
+def _tree_pairs(model: Model, data: Data, free: Integers, slopes: Slopes) -> None:
     """p_q, p_v, f_q, f_v without joint forces."""
-    S = work.S2
+    S = data.S2
     for d in range(model.dof_body.shape[0]):
         i = model.dof_body[d]
         turns = model.body_vadr[i] + model.joint_ntrans[i]
@@ -157,30 +157,30 @@ def _add_joint_slopes(model: Model, q: Vector, slopes: Slopes) -> None:
 
 
 @kernel
-def slopes_at(model: Model, work: Work, free: Integers, u: Vector, out: Slopes) -> bool:
-    """All derivatives at the evaluation that is in `work`, and the factors of M; False when that is singular."""
-    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A1)
-    spatial_inertia(model, work.origin, work.pos2, work.inertia_world, work.A)
-    add_children(model, work.A1)
-    outer_slopes(model, work, u, work.A2)
-    _columns(model, work, out.column)
+def slopes_at(model: Model, data: Data, free: Integers, u: Vector, out: Slopes) -> bool:
+    """All derivatives at the evaluation that is in `data`, and the factors of M; False when that is singular."""
+    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A1)
+    spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
+    add_children(model, data.A1)
+    outer_slopes(model, data, u, data.A2)
+    _columns(model, data, out.column)
     for d in range(out.p_q.shape[0]):
         for k in range(out.p_q.shape[0]):
             out.p_q[d, k] = out.p_v[d, k] = out.f_q[d, k] = out.f_v[d, k] = 0.0
-    _tree_pairs(model, work, free, out)
-    _add_joint_slopes(model, work.theta1, out)
-    input_slopes(model, work, free, out.f_u)
-    for d in range(work.nu.shape[0]):
+    _tree_pairs(model, data, free, out)
+    _add_joint_slopes(model, data.theta1, out)
+    input_slopes(model, data, free, out.f_u)
+    for d in range(data.nu.shape[0]):
         for k in range(6):
-            work.S3nu[d, k] = work.S2[d, k]
-    armature_blocks(model, 1.0, work.joint_block)
-    return factor(model, work) != 0
+            data.S3nu[d, k] = data.S2[d, k]
+    armature_blocks(model, 1.0, data.joint_block)
+    return factor(model, data) != 0
 
 
 @kernel
-def velocity_slopes(model: Model, work: Work, free: Integers, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
-    """work.columns = dv of every direction (dq, dp), p_v dv = dp - p_q dq.   dq: tangent; both (nv, n)."""
-    X, n = work.columns, dq.shape[1]
+def velocity_slopes(model: Model, data: Data, free: Integers, slopes: Slopes, dq: Matrix, dp: Matrix) -> None:
+    """data.columns = dv of every direction (dq, dp), p_v dv = dp - p_q dq.   dq: tangent; both (nv, n)."""
+    X, n = data.columns, dq.shape[1]
     for d in range(X.shape[0]):
         for k in range(n):
             X[d, k] = dp[d, k]
@@ -191,10 +191,10 @@ def velocity_slopes(model: Model, work: Work, free: Integers, slopes: Slopes, dq
                     X[d, k] -= c * dq[e, k]
     for i in range(free.shape[0]):
         if free[i] == 1:
-            d, w = model.body_vadr[i], work.wrench[0]
+            d, w = model.body_vadr[i], data.wrench[0]
             for k in range(n):
                 for r in range(6):
                     w[r] = X[d + r, k]
                 for r in range(6):
-                    X[d + r, k] = dot(work.S2[d + r], w)
-    solve_panel(model, work)
+                    X[d + r, k] = dot(data.S2[d + r], w)
+    solve_panel(model, data)

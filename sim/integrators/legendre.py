@@ -15,8 +15,8 @@ from sim.dynamics.joints.ball_spring import spring_turns, turn_product
 from sim.dynamics.pose_jacobians import add_skew, columns_to_origin, pose2_to_origin, rows_to_origin, sum_composites
 from sim.integrators.hamilton import momenta_of_velocity, place
 from sim.integrators.hamilton_gradient import Slopes, slopes_at
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 from solvers.rotation import left_jacobian, quat_exp, quat_matrix
@@ -24,16 +24,16 @@ from solvers.types import Integers, Matrix, Vector
 
 
 @kernel
-def _momentum_jacobians(model: Model, work: Work, h: float) -> None:
+def _momentum_jacobians(model: Model, data: Data, h: float) -> None:
     """A1, A2 = d(-W)/d(pose 1), d(-W)/d(pose 2) about O, the latter at the centre of mass; A3 = 0."""
-    J = work.inertia_world
+    J = data.inertia_world
     for i in range(model.body_parent.shape[0]):
-        e, u, v, w = work.turn_in[i, 0], work.turn_in[i, 1], work.turn_in[i, 2], work.turn_in[i, 3]
+        e, u, v, w = data.turn_in[i, 0], data.turn_in[i, 1], data.turn_in[i, 2], data.turn_in[i, 3]
         minus = angular_momentum_jacobian(J, i, h, e, -u, -v, -w)
         px, py, pz = angular_momentum(J, i, h, e, -u, -v, -w)
-        A1, A2, m = work.A1[i], work.A2[i], model.body_mass[i] / h
+        A1, A2, m = data.A1[i], data.A2[i], model.body_mass[i] / h
         for k in range(36):
-            A1[k] = A2[k] = work.A3[i, k] = 0.0
+            A1[k] = A2[k] = data.A3[i, k] = 0.0
         for k in range(3):
             A1[7 * k] = m
             A2[7 * k] = -m
@@ -41,16 +41,16 @@ def _momentum_jacobians(model: Model, work: Work, h: float) -> None:
                 A1[6 * (3 + k) + 3 + j] = minus[3 * k + j]
                 A2[6 * (3 + k) + 3 + j] = -minus[3 * k + j]
         add_skew(A2, 3, 3, -px, -py, -pz)
-        o = work.origin
-        rows_to_origin(A1, work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2])
-        columns_to_origin(A1, work.pos1[i, 0] - o[0], work.pos1[i, 1] - o[1], work.pos1[i, 2] - o[2])
+        o = data.origin
+        rows_to_origin(A1, data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
+        columns_to_origin(A1, data.pos1[i, 0] - o[0], data.pos1[i, 1] - o[1], data.pos1[i, 2] - o[2])
 
 
 @kernel
-def _add_ball_spring(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> None:
+def _add_ball_spring(model: Model, data: Data, h: float, q: Vector, v: Vector, i: int) -> None:
     """dR_dq, dR_dv += d((h k/2) (c2 I - [s2]) (s1 + s2)) of quaternion joint i, as in joints/ball_spring.py."""
     e = model.body_vadr[i + 1] - 3
-    r1, r2, _ = spring_turns(model, work, h, q, v, i)
+    r1, r2, _ = spring_turns(model, data, h, q, v, i)
     g = h * model.dof_spring[e]
     y = (r1[1] + r2[1], r1[2] + r2[2], r1[3] + r2[3])
     c, s = r2[0], (r2[1], r2[2], r2[3])
@@ -65,44 +65,44 @@ def _add_ball_spring(model: Model, work: Work, h: float, q: Vector, v: Vector, i
             t = P2[3 * a + b] + 0.25 * (c * Y[3 * a + b] + s[a] * y[b] - y[a] * s[b])
             if a == b:
                 t -= 0.25 * dot
-            work.dR_dq[e + a, e + b] += g * (t + w)
-            work.dR_dv[e + a, e + b] += g * w
+            data.dR_dq[e + a, e + b] += g * (t + w)
+            data.dR_dv[e + a, e + b] += g * w
 
 
 @kernel
-def _add_springs(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+def _add_springs(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """dR_dq, dR_dv += springs and rotors of -p: h k/2, and in unit columns h k/4 + I/h."""
     for i in range(model.body_parent.shape[0]):
         end = model.body_vadr[i + 1]
         if model.joint_nrot[i] == 3:
             end -= 3
             if model.dof_spring[end] > 0.0:
-                _add_ball_spring(model, work, h, q, v, i)
+                _add_ball_spring(model, data, h, q, v, i)
         for d in range(model.body_vadr[i], end):
-            work.dR_dq[d, d] += 0.5 * h * model.dof_spring[d]
-            work.dR_dv[d, d] += 0.25 * h * model.dof_spring[d] + model.dof_armature[d] / h
+            data.dR_dq[d, d] += 0.5 * h * model.dof_spring[d]
+            data.dR_dv[d, d] += 0.25 * h * model.dof_spring[d] + model.dof_armature[d] / h
 
 
 @kernel
-def momentum_slopes(model: Model, work: Work, h: float, q: Vector, v: Vector, p_q: Matrix, p_v: Matrix) -> None:
+def momentum_slopes(model: Model, data: Data, h: float, q: Vector, v: Vector, p_q: Matrix, p_v: Matrix) -> None:
     """dp by q2 at constant v15, and by v15: unit columns times -(-h), of quaternions -(-h J(h w)^T).
 
-    After `node_momentum` of the state (q, v), which leaves W in work.wrench.   p_q, p_v: (nv, nv).
+    After `node_momentum` of the state (q, v), which leaves W in data.wrench.   p_q, p_v: (nv, nv).
     """
-    for i in range(work.wrench.shape[0]):
+    for i in range(data.wrench.shape[0]):
         for k in range(6):
-            work.wrench[i, k] = -work.wrench[i, k]
-    subtree_sums(model, work.wrench, work.subtree)
-    _momentum_jacobians(model, work, h)
-    pose2_to_origin(work)
-    sum_composites(model, work)
-    residual_derivatives(model, work, h)
-    _add_springs(model, work, h, q, v)
+            data.wrench[i, k] = -data.wrench[i, k]
+    subtree_sums(model, data.wrench, data.subtree)
+    _momentum_jacobians(model, data, h)
+    pose2_to_origin(data)
+    sum_composites(model, data)
+    residual_derivatives(model, data, h)
+    _add_springs(model, data, h, q, v)
     nv = v.shape[0]
-    R = work.dR_dv
+    R = data.dR_dv
     for d in range(nv):
         for k in range(nv):
-            p_q[d, k] = -work.dR_dq[d, k]
+            p_q[d, k] = -data.dR_dq[d, k]
             p_v[d, k] = h * R[d, k]
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
@@ -115,30 +115,30 @@ def momentum_slopes(model: Model, work: Work, h: float, q: Vector, v: Vector, p_
 
 @kernel
 def legendre_slopes(
-    model_at: Table, work_at: Table, h: float, none: Integers, x: Vector, slopes: Slopes, p_q: Matrix, p_v: Matrix
+    model_at: Table, data_at: Table, h: float, none: Integers, x: Vector, slopes: Slopes, p_q: Matrix, p_v: Matrix
 ) -> bool:  # fmt: skip
     """p_q, p_v of the state x = (q, v15), and in `slopes` those of M(q) v at its node; False when M is singular.
 
     none: (nbody,) zeros, no root of whose momenta others are kept.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    nq = work.theta1.shape[0]
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
     q, v = x[:nq], x[nq:]
-    if not node_velocity(model, work, h, x):
+    if not node_velocity(model, data, h, x):
         return False
     for d in range(v.shape[0]):
-        work.nu_trial[d] = work.dnu[d]
-        work.nu[d] = 0.0
-    node_momentum(model, work, h, x, work.wrench)
-    momentum_slopes(model, work, h, q, v, p_q, p_v)
+        data.nu_trial[d] = data.dnu[d]
+        data.nu[d] = 0.0
+    node_momentum(model, data, h, x, data.wrench)
+    momentum_slopes(model, data, h, q, v, p_q, p_v)
     for k in range(nq):
-        work.theta1[k] = q[k]
-    place(model, work)
-    momenta_of_velocity(model, work, none, work.nu_trial, work.rhs)
+        data.theta1[k] = q[k]
+    place(model, data)
+    momenta_of_velocity(model, data, none, data.nu_trial, data.rhs)
     for d in range(v.shape[0]):
-        work.nu[d] = work.nu_trial[d]
-    for i in range(work.balance.shape[0]):
+        data.nu[d] = data.nu_trial[d]
+    for i in range(data.balance.shape[0]):
         for k in range(6):
-            work.balance[i, k] = 0.0
-    return slopes_at(model, work, none, x[:0], slopes)
+            data.balance[i, k] = 0.0
+    return slopes_at(model, data, none, x[:0], slopes)

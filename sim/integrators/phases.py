@@ -22,8 +22,8 @@ from sim.dynamics.external_forces import set_external
 from sim.integrators.runge_kutta import Scheme, advance, begin
 from sim.mechanism.confined import IDLE
 from sim.model.columns import Apart
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
@@ -38,21 +38,21 @@ _SOLVED = int(Status.SOLVED)
 
 
 @kernel
-def _speed(model: Model, work: Work, c: int) -> float:
+def _speed(model: Model, data: Data, c: int) -> float:
     """|v + w x r| of all points of the cluster at contact c is at most this: |v| + arm |w| of its body."""
     i = model.contact_body[c]
-    V, o = work.twist[i], work.origin
-    x, y, z = cross(V[3], V[4], V[5], work.pos2[i, 0] - o[0], work.pos2[i, 1] - o[1], work.pos2[i, 2] - o[2])
+    V, o = data.twist[i], data.origin
+    x, y, z = cross(V[3], V[4], V[5], data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2])
     x, y, z = x + V[0], y + V[1], z + V[2]
     return sqrt(x * x + y * y + z * z) + model.cluster[c, 4] * sqrt(V[3] * V[3] + V[4] * V[4] + V[5] * V[5])
 
 
 @kernel
-def _limit(model: Model, work: Work, k: int, v: Vector) -> tuple[float, float]:
+def _limit(model: Model, data: Data, k: int, v: Vector) -> tuple[float, float]:
     """(gap, largest speed of the gap) of limit k, gaps as in joints/limits.py."""
     d = model.limit_dof[k]
     a = model.dof_qadr[d]
-    q = work.theta1
+    q = data.theta1
     if not model.limit_cone[k]:
         return model.limit_sign[k] * (q[a] - model.limit_bound[k]), abs(v[d])
     axis, R = model.joint_axis[model.dof_body[d]], quat_matrix(q[a], q[a + 1], q[a + 2], q[a + 3])
@@ -71,23 +71,23 @@ def _least(gap: float, speed: float, before: float, speed_before: float, travel:
 
 
 @kernel
-def left_out(model: Model, work: Work, kappa: float, v: Vector, h: float) -> float:
-    """Sum of the impulses kappa/g over a step of length h to the node in `work`; of the node itself with h < 0.
+def left_out(model: Model, data: Data, kappa: float, v: Vector, h: float) -> float:
+    """Sum of the impulses kappa/g over a step of length h to the node in `data`; of the node itself with h < 0.
 
     Gaps and speeds of the node are kept for the step that begins there. 1e300 where something is not apart.
     """
     total = 0.0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0 and model.contact_hold[c] != IDLE:
-            row, speed = work.inactive[c], _speed(model, work, c)
-            gap = cluster_gap(model, work, c, highest(model, c), False)
+            row, speed = data.inactive[c], _speed(model, data, c)
+            gap = cluster_gap(model, data, c, highest(model, c), False)
             g = _least(gap, speed, row[Apart.GAP], row[Apart.SPEED], h)
             row[Apart.GAP], row[Apart.SPEED] = gap, speed
             total = total + (model.cluster_end[c] - c) * kappa / g if g > 0.0 else 1e300
     for k in range(model.limit_dof.shape[0]):
-        gap, speed = _limit(model, work, k, v)
-        g = _least(gap, speed, work.bound_gap[k], work.bound_w[k], h)
-        work.bound_gap[k], work.bound_w[k] = gap, speed
+        gap, speed = _limit(model, data, k, v)
+        g = _least(gap, speed, data.bound_gap[k], data.bound_w[k], h)
+        data.bound_gap[k], data.bound_w[k] = gap, speed
         total = total + kappa / g if g > 0.0 else 1e300
     return total
 
@@ -102,50 +102,50 @@ def _allowed(scheme: Scheme, tolerance: float) -> float:
 
 
 @kernel
-def first_far(model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, xs: Matrix) -> int:
+def first_far(model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, xs: Matrix) -> int:
     """The first of the states xs (n, nx) at which all is far; n where there is none."""
     model = model_view(model_at)
-    work = work_view(work_at)
-    nq = work.theta1.shape[0]
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
     for t in range(xs.shape[0]):
-        begin(model, work, scheme, xs[t])
-        if left_out(model, work, settings[1], xs[t, nq:], -1.0) <= _allowed(scheme, settings[2]):
+        begin(model, data, scheme, xs[t])
+        if left_out(model, data, settings[1], xs[t, nq:], -1.0) <= _allowed(scheme, settings[2]):
             return t
     return xs.shape[0]
 
 
 @kernel
-def _leave(work: Work) -> None:
+def _leave(data: Data) -> None:
     """Configuration 2 becomes configuration 1."""
-    copy(work.pos2, work.pos1)
-    copy(work.quat2, work.quat1)
-    copy(work.rot2, work.rot1)
+    copy(data.pos2, data.pos1)
+    copy(data.quat2, data.quat1)
+    copy(data.rot2, data.rot1)
 
 
 @kernel
-def _report(model: Model, work: Work, h: float, out: Matrix) -> None:
+def _report(model: Model, data: Data, h: float, out: Matrix) -> None:
     """Contacts that carry nothing, with their gaps and mean slips, of the step from configuration 1 to 2."""
-    copy(work.pos2, work.pos3)
-    copy(work.quat2, work.quat3)
-    copy(work.rot2, work.rot3)
-    copy(work.pos1, work.pos2)
-    copy(work.quat1, work.quat2)
-    for i in range(work.pos2.shape[0]):
-        a, b, t = work.quat2[i], work.quat3[i], work.turn[i]
+    copy(data.pos2, data.pos3)
+    copy(data.quat2, data.quat3)
+    copy(data.rot2, data.rot3)
+    copy(data.pos1, data.pos2)
+    copy(data.quat1, data.quat2)
+    for i in range(data.pos2.shape[0]):
+        a, b, t = data.quat2[i], data.quat3[i], data.turn[i]
         t[0], t[1], t[2], t[3] = quat_turn(a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3])
         for k in range(3):
-            work.move[i, k] = work.pos3[i, k] - work.pos2[i, k]
-    work.inactive_count[0] = 0
+            data.move[i, k] = data.pos3[i, k] - data.pos2[i, k]
+    data.inactive_count[0] = 0
     for c in range(model.contact_height.shape[0]):
         if model.cluster_end[c] > 0:
-            work.inactive_first[work.inactive_count[0]] = c
-            work.inactive_count[0] += 1
-        work.bounce[c, 0] = 0.0
-        for k in range(work.cone.shape[1]):
-            work.cone[c, k] = 0.0
-    report_contacts(model, work, h, out)
-    copy(work.pos3, work.pos2)
-    copy(work.quat3, work.quat2)
+            data.inactive_first[data.inactive_count[0]] = c
+            data.inactive_count[0] += 1
+        data.bounce[c, 0] = 0.0
+        for k in range(data.cone.shape[1]):
+            data.cone[c, k] = 0.0
+    report_contacts(model, data, h, out)
+    copy(data.pos3, data.pos2)
+    copy(data.quat3, data.quat2)
 
 
 class Flight(NamedTuple):
@@ -160,7 +160,7 @@ class Flight(NamedTuple):
 
 @kernel
 def roll_far(
-    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
+    model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
 ) -> tuple[int, int]:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is far.
 
@@ -168,28 +168,28 @@ def roll_far(
     Status of the next.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    nq = work.theta1.shape[0]
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
     h, kappa = settings[0], settings[1]
     us, xs, reports = flight.us, flight.xs, flight.reports
-    start_pace(work, settings)
+    start_pace(data, settings)
     if first == 0:
-        begin(model, work, scheme, xs[0])
+        begin(model, data, scheme, xs[0])
     for t in range(first, us.shape[0]):
         x = xs[t + 1]
         copy_vector(xs[t], x)
         allowed = _allowed(scheme, settings[2])
-        if left_out(model, work, kappa, x[nq:], -1.0) > allowed:
+        if left_out(model, data, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
-        _leave(work)
-        set_external(work, flight.wrenches, t)
-        status = advance(model, work, scheme, h, us[t], x, None)
+        _leave(data)
+        set_external(data, flight.wrenches, t)
+        status = advance(model, data, scheme, h, us[t], x, None)
         reports[t, 0], reports[t, 1], reports[t, 4] = status, scheme.b.shape[0], -1.0
         if status != _SOLVED:
             return t, status
-        if left_out(model, work, kappa, x[nq:], h) > allowed:
+        if left_out(model, data, kappa, x[nq:], h) > allowed:
             return t, NEAR
-        _report(model, work, h, flight.contacts[t])
-        if is_due(work, reports[t, 1]):
+        _report(model, data, h, flight.contacts[t])
+        if is_due(data, reports[t, 1]):
             return t + 1, _SOLVED
     return us.shape[0], _SOLVED

@@ -5,7 +5,7 @@
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
-Every function takes the tables of a Model and a Work (solvers/compiler); every loop stops at the first step that is
+Every function takes the tables of a Model and a Data (solvers/compiler); every loop stops at the first step that is
 not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py says how it goes on.
 """
 
@@ -17,10 +17,10 @@ from sim.contact.contact_report import report_contacts
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import normalise_state
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.model.options import Guess, Options
+from sim.model.options import Guess, StepOptions
 from sim.model.pace import DEADLINE, is_due, start_pace
 from sim.step import step
 from solvers.compiler import Table, kernel, parallel_kernel, prange, seconds
@@ -48,7 +48,7 @@ class Linearized(NamedTuple):
     reports: Matrix  # (T, 6)
 
 
-class Motion(NamedTuple):
+class MotionBuffers(NamedTuple):
     """A motion and what a loop over time fills in; what is not asked for has no rows."""
 
     xs: Matrix  # (T + 1, nx), of which the first row is given
@@ -61,26 +61,26 @@ class Motion(NamedTuple):
 
 
 @kernel
-def options_of(work: Work, settings: Vector, begins: bool) -> Options:
-    """Options of the steps of a motion that begins here, or goes on after a pause."""
-    start_pace(work, settings)
+def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
+    """StepOptions of the steps of a motion that begins here, or goes on after a pause."""
+    start_pace(data, settings)
     if begins:
-        begin(work)
-    return Options(settings[0], settings[1], settings[2], int(settings[3]))
+        begin(data)
+    return StepOptions(settings[0], settings[1], settings[2], int(settings[3]))
 
 
 @kernel
-def begin(work: Work) -> None:
+def begin(data: Data) -> None:
     """Forget the motion before: clear all fields of CARRY (sim/model/layout.py)."""
-    work.carried_steps[0] = 0
-    work.inactive_kappa[0] = 0.0
-    clear(work.cone_step)
-    clear(work.bound_step)
-    clear(work.external)
-    for row in range(work.couple_force.shape[0]):
-        work.couple_force[row] = 0.0
-    for k in range(work.couple_rank.shape[0]):
-        work.couple_rank[k] = 0.0
+    data.carried_steps[0] = 0
+    data.inactive_kappa[0] = 0.0
+    clear(data.cone_step)
+    clear(data.bound_step)
+    clear(data.external)
+    for row in range(data.couple_force.shape[0]):
+        data.couple_force[row] = 0.0
+    for k in range(data.couple_rank.shape[0]):
+        data.couple_rank[k] = 0.0
 
 
 @kernel
@@ -93,7 +93,7 @@ def is_finite(row: Vector) -> bool:
 
 
 @kernel
-def accept(model: Model, motion: Motion) -> bool:
+def accept(model: Model, motion: MotionBuffers) -> bool:
     """Whether a motion begins at a state, with quaternions of length one to UNIT, under inputs that are numbers."""
     if not is_finite(motion.xs[0]) or normalise_state(model, motion.xs[0], UNIT) >= 0:
         return False
@@ -104,56 +104,56 @@ def accept(model: Model, motion: Motion) -> bool:
 
 
 @kernel
-def roll(model_at: Table, work_at: Table, settings: Vector, motion: Motion, first: int) -> int:
+def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffers, first: int) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
     A step is solved once, and differentiated where it ends. What nobody may begin with has the status REFUSED.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     if first == 0 and not accept(model, motion):
         motion.reports[0, 0] = REFUSED
         return 0
-    options = options_of(work, settings, first == 0)
-    nq = work.theta1.shape[0]
+    options = options_of(data, settings, first == 0)
+    nq = data.theta1.shape[0]
     steps = motion.us.shape[0]
     for t in range(first, steps):
         x = motion.xs[t]
         report = motion.reports[min(t, motion.reports.shape[0] - 1)]
-        set_external(work, motion.wrenches, t)
-        if step(model, work, options, x, motion.us[t], Guess(x[nq:], t > 0), motion.xs[t + 1], report) != _SOLVED:
+        set_external(data, motion.wrenches, t)
+        if step(model, data, options, x, motion.us[t], Guess(x[nq:], t > 0), motion.xs[t + 1], report) != _SOLVED:
             return t
         done = report[1]
         if motion.contacts.shape[0] > 0:
-            report_contacts(model, work, options.h, motion.contacts[t])
+            report_contacts(model, data, options.h, motion.contacts[t])
             for c in range(motion.contacts.shape[1]):
                 if not is_finite(motion.contacts[t, c]):
                     report[0] = _NOT_FINITE
                     return t
         if motion.A.shape[0] > 0:
-            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
+            if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], motion.A[t], motion.B[t]):
                 report[0] = _SINGULAR
                 return t
-            report[5] = ACCURACY * work.contact_hard[0]
+            report[5] = ACCURACY * data.contact_hard[0]
             done += motion.A.shape[1]
-        if is_due(work, done):
+        if is_due(data, done):
             return t + 1
     return steps
 
 
 @kernel
-def _chain(work: Work, A: Matrix, B: Matrix) -> None:
+def _chain(data: Data, A: Matrix, B: Matrix) -> None:
     """A := A_step A, B := A_step B + B_step."""
     n = A.shape[0]
     m = B.shape[1]
-    T = work.chain
-    S = work.step_A
+    T = data.chain
+    S = data.step_A
     for i in range(n):
         t = T[i]
         for k in range(n):
             t[k] = 0.0
         for k in range(m):
-            t[n + k] = work.step_B[i, k]
+            t[n + k] = data.step_B[i, k]
         for j in range(n):
             s = S[i, j]
             a = A[j]
@@ -172,7 +172,7 @@ def _chain(work: Work, A: Matrix, B: Matrix) -> None:
 @kernel
 def linearize(
     model_at: Table,
-    work_at: Table,
+    data_at: Table,
     settings: Vector,
     knots: tuple[int, int, int],
     substeps: int,
@@ -183,16 +183,16 @@ def linearize(
     knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    options = options_of(work, settings, knots[1] == knots[0] * substeps)
-    nq = work.theta1.shape[0]
-    x = work.step_x[0]
+    data = data_view(data_at)
+    options = options_of(data, settings, knots[1] == knots[0] * substeps)
+    nq = data.theta1.shape[0]
+    x = data.step_x[0]
     for t in range(knots[1] // substeps, knots[2]):
         A = line.A[t]
         B = line.B[t]
         x_next = line.x_next[t]
         report = line.reports[t]
-        velocity = work.step_x[1, nq:]
+        velocity = data.step_x[1, nq:]
         before = max(knots[1] - t * substeps, 0)
         if before == 0:
             copy_vector(x_next[nq:], velocity)
@@ -200,18 +200,18 @@ def linearize(
         for s in range(before, substeps):
             copy_vector(x_next, x)
             guess = Guess(velocity if substeps == 1 else x[nq:], s > 0)
-            set_external(work, line.wrenches, t)
-            if step(model, work, options, x, line.us[t], guess, x_next, report) != _SOLVED:
+            set_external(data, line.wrenches, t)
+            if step(model, data, options, x, line.us[t], guess, x_next, report) != _SOLVED:
                 break
-            Js = A if s == 0 else work.step_A
-            Ju = B if s == 0 else work.step_B
-            if not gradient(model, work, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
+            Js = A if s == 0 else data.step_A
+            Ju = B if s == 0 else data.step_B
+            if not gradient(model, data, options.h, options.kappa, x[:nq], x[nq:], Js, Ju):
                 report[0] = _SINGULAR
                 break
-            report[5] = max(report[5], ACCURACY * work.contact_hard[0])
+            report[5] = max(report[5], ACCURACY * data.contact_hard[0])
             if s > 0:
-                _chain(work, A, B)
-            if is_due(work, report[1] + A.shape[0]):
+                _chain(data, A, B)
+            if is_due(data, report[1] + A.shape[0]):
                 return t * substeps + s + 1
     return knots[2] * substeps
 
@@ -219,25 +219,25 @@ def linearize(
 @parallel_kernel
 def linearize_knots(
     model_at: Table,
-    work_ats: Table,
+    data_ats: Table,
     settings: Vector,
     substeps: int,
     line: Linearized,
     done: Integers,
 ) -> None:
-    """`linearize` of all knots, spread over the threads: chunk c has the scratch work_ats[c], done[c] is its next
+    """`linearize` of all knots, spread over the threads: chunk c has the scratch data_ats[c], done[c] is its next
     step, the first one of chunk c + 1 in the end.
     """
     n = line.us.shape[0]
-    chunks = work_ats.shape[0]
+    chunks = data_ats.shape[0]
     for c in prange(chunks):
         if seconds() < settings[DEADLINE]:
             knots = (c * n // chunks, done[c], (c + 1) * n // chunks)
-            done[c] = linearize(model_at, work_ats[c], settings, knots, substeps, line)
+            done[c] = linearize(model_at, data_ats[c], settings, knots, substeps, line)
 
 
-class Motions(NamedTuple):
-    """Motions from several states, kept as their states only."""
+class BatchBuffers(NamedTuple):
+    """BatchBuffers from several states, kept as their states only."""
 
     xs: Cube  # (n, T + 1, nx), of which the first rows are given
     us: Cube  # (n, T, nu)
@@ -250,8 +250,8 @@ class Motions(NamedTuple):
 
 
 @kernel
-def _roll_rows(model_at: Table, work_at: Table, settings: Vector, rows: tuple[int, int], motions: Motions) -> None:
-    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
+def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[int, int], motions: BatchBuffers) -> None:
+    """BatchBuffers rows[0] up to rows[1], as far as they are not done, until the deadline."""
     steps = motions.us.shape[1]
     for i in range(rows[0], rows[1]):
         report = motions.reports[i]
@@ -259,17 +259,17 @@ def _roll_rows(model_at: Table, work_at: Table, settings: Vector, rows: tuple[in
             if seconds() > settings[DEADLINE]:
                 return
             x, u = motions.xs[i], motions.us[i]
-            one = Motion(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
-            motions.knots[i] = roll(model_at, work_at, settings, one, motions.knots[i])
+            one = MotionBuffers(x, u, motions.wrenches, report, motions.contacts, motions.A, motions.B)
+            motions.knots[i] = roll(model_at, data_at, settings, one, motions.knots[i])
             if report[0, 0] == _SOLVED and motions.knots[i] < steps:
                 return
 
 
 @parallel_kernel
-def roll_batch(model_at: Table, work_ats: Table, settings: Vector, motions: Motions) -> None:
+def roll_batch(model_at: Table, data_ats: Table, settings: Vector, motions: BatchBuffers) -> None:
     """All motions, spread over the threads."""
     n = motions.us.shape[0]
-    chunks = work_ats.shape[0]
+    chunks = data_ats.shape[0]
     for c in prange(chunks):
         rows = (c * n // chunks, (c + 1) * n // chunks)
-        _roll_rows(model_at, work_ats[c], settings, rows, motions)
+        _roll_rows(model_at, data_ats[c], settings, rows, motions)

@@ -18,6 +18,7 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.kinematics import displace
 from sim.dynamics.momentum_balance import joints_below_turn
 from sim.dynamics.state import integrate_state, state_difference
+from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton import (
     coordinate_rates,
     momenta_of_velocity,
@@ -27,8 +28,7 @@ from sim.integrators.hamilton import (
     place,
     velocity_of_momenta,
 )
-from sim.integrators.policy import Path, Policy
-from sim.integrators.rollout import Linearized, Motion
+from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.integrators.tangents import (
     Tangents,
     first_tangents,
@@ -37,8 +37,8 @@ from sim.integrators.tangents import (
     move_tangents,
     tangent_rates,
 )
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.pace import is_due, start_pace
 from sim.solve.energy_balance import LARGEST_GAIN
@@ -68,18 +68,18 @@ class Scheme(NamedTuple):
 
 
 @kernel
-def begin(model: Model, work: Work, scheme: Scheme, x: Vector) -> None:
+def begin(model: Model, data: Data, scheme: Scheme, x: Vector) -> None:
     """Momenta and poses of the state x, about the place of its first body; no external wrenches."""
-    clear(work.external)
-    nq = work.theta1.shape[0]
+    clear(data.external)
+    nq = data.theta1.shape[0]
     for k in range(3):
-        work.origin[k] = x[k] if model.joint_ntrans[0] == 3 else model.joint_parent_point[0, k]
+        data.origin[k] = x[k] if model.joint_ntrans[0] == 3 else model.joint_parent_point[0, k]
     for k in range(nq):
-        work.theta1[k] = x[k]
-    place(model, work)
-    momenta_of_velocity(model, work, scheme.free, x[nq:], scheme.momenta)
-    for d in range(work.nu.shape[0]):
-        work.nu[d] = x[nq + d]
+        data.theta1[k] = x[k]
+    place(model, data)
+    momenta_of_velocity(model, data, scheme.free, x[nq:], scheme.momenta)
+    for d in range(data.nu.shape[0]):
+        data.nu[d] = x[nq + d]
 
 
 @kernel
@@ -94,124 +94,124 @@ def _add_rates(h: float, weights: Vector, count: int, rates: Matrix, out: Vector
 
 
 @kernel
-def _evaluate(model: Model, work: Work, scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> bool:
+def _evaluate(model: Model, data: Data, scheme: Scheme, h: float, weights: Vector, count: int, q: Vector) -> bool:
     """Velocity and momenta of the bodies at the node + h sum of weights[j] times the rates of stage j, j < count."""
     for d in range(scheme.momenta.shape[0]):
         scheme.shift[d] = 0.0
         scheme.stage_p[d] = scheme.momenta[d]
     _add_rates(h, weights, count, scheme.rates_r, scheme.shift)
     _add_rates(h, weights, count, scheme.rates_p, scheme.stage_p)
-    displace(model, q, scheme.shift, 1.0, work.theta1)
-    place(model, work)
-    return velocity_of_momenta(model, work, scheme.free, scheme.stage_p)
+    displace(model, q, scheme.shift, 1.0, data.theta1)
+    place(model, data)
+    return velocity_of_momenta(model, data, scheme.free, scheme.stage_p)
 
 
 @kernel
-def advance(model: Model, work: Work, scheme: Scheme, h: float, u: Vector, x: Vector, tangents: Tangents | None) -> int:
-    """x one step later, in place, with its evaluation in `work` before and after; returns the Status.
+def advance(model: Model, data: Data, scheme: Scheme, h: float, u: Vector, x: Vector, tangents: Tangents | None) -> int:
+    """x one step later, in place, with its evaluation in `data` before and after; returns the Status.
 
     tangents: of the node, moved along; without them nothing of them is compiled. No step is solved that gains energy,
     as those do that are too long for the method.
     """
-    nq = work.theta1.shape[0]
+    nq = data.theta1.shape[0]
     q, v = x[:nq], x[nq:]
     s = scheme.b.shape[0]
     if not joints_below_turn(model, v, h):
         return _ANGULAR_STEP
-    before = node_energy(model, work)
+    before = node_energy(model, data)
     given = 0.0
     for d in range(v.shape[0]):
         scheme.shift[d] = 0.0
     for i in range(s):
-        if i > 0 and not _evaluate(model, work, scheme, h, scheme.a[i], i, q):
+        if i > 0 and not _evaluate(model, data, scheme, h, scheme.a[i], i, q):
             return _SINGULAR
-        momentum_rates(model, work, scheme.free, u, scheme.rates_p[i])
-        given += h * scheme.b[i] * outer_power(model, work, u)
-        coordinate_rates(model, scheme.shift, work.nu, scheme.rates_r[i])
+        momentum_rates(model, data, scheme.free, u, scheme.rates_p[i])
+        given += h * scheme.b[i] * outer_power(model, data, u)
+        coordinate_rates(model, scheme.shift, data.nu, scheme.rates_r[i])
         if tangents is not None:
             move_tangents(model, scheme.shift, tangents, h, scheme.a[i], i)
-            if not tangent_rates(model, work, scheme.free, u, scheme.shift, tangents, i):
+            if not tangent_rates(model, data, scheme.free, u, scheme.shift, tangents, i):
                 return _SINGULAR
-    if not _evaluate(model, work, scheme, h, scheme.b, s, q):
+    if not _evaluate(model, data, scheme, h, scheme.b, s, q):
         return _SINGULAR
     if tangents is not None:
         move_tangents(model, scheme.shift, tangents, h, scheme.b, s)
         keep_tangents(tangents)
     total = 0.0
     for k in range(nq):
-        q[k] = work.theta1[k]
+        q[k] = data.theta1[k]
         total += q[k]
     for d in range(v.shape[0]):
-        v[d] = work.nu[d]
+        v[d] = data.nu[d]
         scheme.momenta[d] = scheme.stage_p[d]
         total += v[d]
     if not abs(total) < 1e300:
         return _NOT_FINITE
     if not joints_below_turn(model, scheme.shift, 1.0):
         return _ANGULAR_STEP
-    after = node_energy(model, work)
+    after = node_energy(model, data)
     stored = abs(after[1] - before[1])
     gain = after[0] + after[1] - before[0] - before[1] - given
     return _ENERGY_STEP if gain > LARGEST_GAIN * max(before[0], stored + abs(given)) else _SOLVED
 
 
 @kernel
-def roll(model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, motion: Motion, first: int) -> int:
+def roll(model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, motion: MotionBuffers, first: int) -> int:
     """As rollout.py, without contacts and derivatives."""
     model = model_view(model_at)
-    work = work_view(work_at)
-    start_pace(work, settings)
+    data = data_view(data_at)
+    start_pace(data, settings)
     if first == 0:
-        begin(model, work, scheme, motion.xs[0])
+        begin(model, data, scheme, motion.xs[0])
     steps = motion.us.shape[0]
     for t in range(first, steps):
         x, report = motion.xs[t + 1], motion.reports[t]
         copy_vector(motion.xs[t], x)
-        set_external(work, motion.wrenches, t)
-        status = advance(model, work, scheme, settings[0], motion.us[t], x, None)
+        set_external(data, motion.wrenches, t)
+        status = advance(model, data, scheme, settings[0], motion.us[t], x, None)
         report[0], report[1], report[4] = status, scheme.b.shape[0], -1.0
         if status != _SOLVED:
             return t
-        if is_due(work, report[1]):
+        if is_due(data, report[1]):
             return t + 1
     return steps
 
 
 @kernel
 def linearize(
-    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, substeps: int, line: Linearized,
+    model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, substeps: int, line: Linearized,
     tangents: Tangents, first: int,
 ) -> int:  # fmt: skip
     """Derivatives of the knots, of `substeps` steps each, from the step `first` of all on, carried through every stage;
     returns the step that is next.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    start_pace(work, settings)
+    data = data_view(data_at)
+    start_pace(data, settings)
     for t in range(first // substeps, line.us.shape[0]):
         x, report = line.x_next[t], line.reports[t]
         status, before = _SOLVED, max(first - t * substeps, 0)
         if before == 0:
             copy_vector(line.xs[t], x)
-            begin(model, work, scheme, x)
-            set_external(work, line.wrenches, t)
-            status = _SOLVED if first_tangents(model, work, scheme.free, line.us[t], tangents) else _SINGULAR
+            begin(model, data, scheme, x)
+            set_external(data, line.wrenches, t)
+            status = _SOLVED if first_tangents(model, data, scheme.free, line.us[t], tangents) else _SINGULAR
         due = False
         for s in range(before, substeps):
             if due:
                 return t * substeps + s
             if status == _SOLVED:
-                status = advance(model, work, scheme, settings[0], line.us[t], x, tangents)
-                due = is_due(work, float(scheme.b.shape[0] * work.nu.shape[0]))
-        if status == _SOLVED and not last_tangents(model, work, scheme.free, line.us[t], tangents):
+                status = advance(model, data, scheme, settings[0], line.us[t], x, tangents)
+                due = is_due(data, float(scheme.b.shape[0] * data.nu.shape[0]))
+        if status == _SOLVED and not last_tangents(model, data, scheme.free, line.us[t], tangents):
             status = _SINGULAR
         report[0], report[1], report[4] = status, substeps * scheme.b.shape[0], -1.0
-        nv = work.nu.shape[0]
+        nv = data.nu.shape[0]
         for d in range(nv):
             for k in range(2 * nv):
-                line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], work.columns[d, k]
+                line.A[t, d, k], line.A[t, nv + d, k] = tangents.node_q[d, k], data.columns[d, k]
             for k in range(line.us.shape[1]):
-                line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], work.columns[d, 2 * nv + k]
+                line.B[t, d, k], line.B[t, nv + d, k] = tangents.node_q[d, 2 * nv + k], data.columns[d, 2 * nv + k]
         if due:
             return (t + 1) * substeps
     return line.us.shape[0] * substeps
@@ -219,16 +219,16 @@ def linearize(
 
 @kernel
 def closed_loop(
-    model_at: Table, work_at: Table, settings: Vector, scheme: Scheme, policy: Policy, alpha: float,
+    model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, policy: FeedbackLaw, alpha: float,
     limits: tuple[Vector, Vector], substeps: int, path: Path, first: int,
 ) -> int:  # fmt: skip
-    """As policy.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
+    """As feedback.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     low, high = limits
     ndx = policy.gaps.shape[1]
-    dx = work.chain[0][:ndx]
-    start_pace(work, settings)
+    dx = data.chain[0][:ndx]
+    start_pace(data, settings)
     for t in range(first // substeps, path.us.shape[0]):
         u, b = path.us[t], path.xs[t + 1]
         state_difference(model, policy.xs[t], path.xs[t], dx)
@@ -238,21 +238,21 @@ def closed_loop(
         before, due = max(first - t * substeps, 0), False
         if before == 0:
             copy_vector(path.xs[t], b)
-            begin(model, work, scheme, b)
-        set_external(work, policy.wrenches, t)
+            begin(model, data, scheme, b)
+        set_external(data, policy.wrenches, t)
         for s in range(before, substeps):
             if due:
                 return t * substeps + s
-            path.report[0] = advance(model, work, scheme, settings[0], u, b, None)
+            path.report[0] = advance(model, data, scheme, settings[0], u, b, None)
             path.report[1] += scheme.b.shape[0]
             if path.report[0] != _SOLVED:
                 return t * substeps + s
-            due = is_due(work, float(scheme.b.shape[0]))
+            due = is_due(data, float(scheme.b.shape[0]))
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
-            copy_vector(b, work.step_x[0])
-            integrate_state(model, work.step_x[0], dx, b)
+            copy_vector(b, data.step_x[0])
+            integrate_state(model, data.step_x[0], dx, b)
         if due:
             return (t + 1) * substeps
     return path.us.shape[0] * substeps

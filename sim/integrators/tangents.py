@@ -9,7 +9,7 @@ from math import cos, sqrt
 from typing import NamedTuple
 
 from sim.integrators.hamilton_gradient import Slopes, slopes_at, velocity_slopes
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import (
@@ -71,14 +71,14 @@ def move_tangents(model: Model, r: Vector, tangents: Tangents, h: float, weights
 
 @kernel
 def tangent_rates(
-    model: Model, work: Work, free: Integers, u: Vector, r: Vector, tangents: Tangents, stage: int
+    model: Model, data: Data, free: Integers, u: Vector, r: Vector, tangents: Tangents, stage: int
 ) -> bool:
-    """Rates of the directions at the evaluation in `work`:  dp' = f_q dq + f_v dv + f_u du,  and dr'."""
+    """Rates of the directions at the evaluation in `data`:  dp' = f_q dq + f_v dv + f_u du,  and dr'."""
     slopes, dq = tangents.slopes, tangents.stage_q
-    if not slopes_at(model, work, free, u, slopes):
+    if not slopes_at(model, data, free, u, slopes):
         return False
-    velocity_slopes(model, work, free, slopes, dq, tangents.stage_p)
-    dv, out = work.columns, tangents.rates_p[stage]
+    velocity_slopes(model, data, free, slopes, dq, tangents.stage_p)
+    dv, out = data.columns, tangents.rates_p[stage]
     nv, n = out.shape
     for d in range(nv):
         for k in range(n):
@@ -93,7 +93,7 @@ def tangent_rates(
                     out[d, k] += a * dq[e, k] + b * dv[e, k]
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 3:
-            _turn_rates(work, model.body_vadr[i + 1] - 3, r, tangents.shift, tangents.rates_r[stage])
+            _turn_rates(data, model.body_vadr[i + 1] - 3, r, tangents.shift, tangents.rates_r[stage])
     return True
 
 
@@ -112,13 +112,13 @@ def _turn_coefficient(t2: float) -> tuple[float, float]:
 
 
 @kernel
-def _turn_rates(work: Work, d: int, r: Vector, dr: Matrix, out: Matrix) -> None:
+def _turn_rates(data: Data, d: int, r: Vector, dr: Matrix, out: Matrix) -> None:
     """out = d(J^-1(r) w), J^-1 w = w + r x w/2 + e(r.r) r x (r x w):
 
     J^-1 dw + dr x w/2 + 2 e' (r.dr) r x (r x w) + e (dr x (r x w) + r x (dr x w))
     """
     x, y, z = r[d], r[d + 1], r[d + 2]
-    v, dv = work.nu, work.columns
+    v, dv = data.nu, data.columns
     J = inverse_right_jacobian(x, y, z)
     e, slope = _turn_coefficient(x * x + y * y + z * z)
     a = cross(x, y, z, v[d], v[d + 1], v[d + 2])
@@ -144,10 +144,10 @@ def keep_tangents(tangents: Tangents) -> None:
 
 
 @kernel
-def first_tangents(model: Model, work: Work, free: Integers, u: Vector, tangents: Tangents) -> bool:
-    """Directions of the state that is in `work`: those of q and v themselves; none of u yet."""
+def first_tangents(model: Model, data: Data, free: Integers, u: Vector, tangents: Tangents) -> bool:
+    """Directions of the state that is in `data`: those of q and v themselves; none of u yet."""
     slopes = tangents.slopes
-    if not slopes_at(model, work, free, u, slopes):
+    if not slopes_at(model, data, free, u, slopes):
         return False
     nv = tangents.node_q.shape[0]
     for d in range(nv):
@@ -160,9 +160,9 @@ def first_tangents(model: Model, work: Work, free: Integers, u: Vector, tangents
 
 
 @kernel
-def last_tangents(model: Model, work: Work, free: Integers, u: Vector, tangents: Tangents) -> bool:
-    """work.columns = dv of the node in `work`."""
-    if not slopes_at(model, work, free, u, tangents.slopes):
+def last_tangents(model: Model, data: Data, free: Integers, u: Vector, tangents: Tangents) -> bool:
+    """data.columns = dv of the node in `data`."""
+    if not slopes_at(model, data, free, u, tangents.slopes):
         return False
-    velocity_slopes(model, work, free, tangents.slopes, tangents.node_q, tangents.node_p)
+    velocity_slopes(model, data, free, tangents.slopes, tangents.node_q, tangents.node_p)
     return True

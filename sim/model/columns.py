@@ -1,6 +1,6 @@
-"""Names of the columns of Model and Work: of a field, the first column of each of its parts.
+"""Names of the columns of Model and Data: of a field, the first column of each of its parts.
 
-    k = work.contact_kin[c]
+    k = data.contact_kin[c]
     k[Kin.GAP], k[Kin.ARM + 1]
 
 Rows that are matrices, row by row, such as rotations, have none: `W[3]` is entry (1, 0).
@@ -87,7 +87,7 @@ class Inactive(IntEnum):
 
 
 class Apart(IntEnum):
-    """inactive, in motions of higher order: the node in `work` (integrators/phases.py)."""
+    """inactive, in motions of higher order: the node in `data` (integrators/phases.py)."""
 
     GAP = 0
     SPEED = 1

@@ -1,4 +1,4 @@
-"""Work: what kernels write, as a NamedTuple of arrays; the glossary is in model.py, the shapes are in layout.py too."""
+"""Data: what kernels write, as a NamedTuple of arrays; the glossary is in model.py, the shapes are in layout.py too."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
-class Work(NamedTuple):
+class Data(NamedTuple):
     """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards.
 
     The first block is no scratch: it is state between the steps of a motion (CARRY of layout.py), which a new motion

@@ -1,4 +1,4 @@
-"""Layout of Model and Work: one table of shapes, from which Python allocates every field and kernels find it."""
+"""Layout of Model and Data: one table of shapes, from which Python allocates every field and kernels find it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import Field, record, table
 from solvers.lanes import LANES, SIDE, whole
 
-__all__ = ["CARRY", "MODEL_FIELDS", "MODEL_INTS", "WORK_FIELDS", "WORK_INTS", "Shape", "Sizes", "allocate_model",
-           "allocate_work", "model_view", "sizes_of", "table", "work_view"]  # fmt: skip
+__all__ = ["CARRY", "MODEL_FIELDS", "MODEL_INTS", "DATA_FIELDS", "DATA_INTS", "Shape", "Sizes", "allocate_model",
+           "allocate_data", "model_view", "sizes_of", "table", "data_view"]  # fmt: skip
 
 Shape = tuple[int | str, ...]
 
@@ -63,7 +63,7 @@ CARRY_FLOATS = _shapes(
 )
 CARRY = (*CARRY_INTS, *CARRY_FLOATS)
 
-WORK_INTS = CARRY_INTS | _shapes(
+DATA_INTS = CARRY_INTS | _shapes(
     """
     active_ground_count 1, active_count 1, inactive_count 1, active ncontact, inactive_first nground,
     pair_sides npair, pair_code npair, pair_previous npair,
@@ -73,7 +73,7 @@ WORK_INTS = CARRY_INTS | _shapes(
     """
 )
 
-WORK_FLOATS = CARRY_FLOATS | _shapes(
+DATA_FLOATS = CARRY_FLOATS | _shapes(
     """
     origin 3, theta1 nq, theta3 nq, nu nv, nu_trial nv, dnu nv, pos1 nbody 3, quat1 nbody 4, rot1 nbody 9,
     pos2 nbody 3, quat2 nbody 4, rot2 nbody 9, pos3 nbody 3, quat3 nbody 4, rot3 nbody 9, S1 nv 6, S2 nv 6, S3 nv 6,
@@ -108,7 +108,7 @@ WORK_FLOATS = CARRY_FLOATS | _shapes(
 )
 
 MODEL_FIELDS = {**MODEL_INTS, **MODEL_FLOATS}
-WORK_FIELDS = {**WORK_INTS, **WORK_FLOATS}
+DATA_FIELDS = {**DATA_INTS, **DATA_FLOATS}
 
 
 class Sizes(NamedTuple):
@@ -178,9 +178,9 @@ def allocate_model(sizes: Sizes) -> Model:
     return Model(**_carve(MODEL_INTS, sizes, np.int64), **_carve(MODEL_FLOATS, sizes, np.float64))
 
 
-def allocate_work(sizes: Sizes) -> Work:
+def allocate_data(sizes: Sizes) -> Data:
     """The scratch of one thread."""
-    return Work(**_carve(WORK_INTS, sizes, np.int64), **_carve(WORK_FLOATS, sizes, np.float64))
+    return Data(**_carve(DATA_INTS, sizes, np.int64), **_carve(DATA_FLOATS, sizes, np.float64))
 
 
 def sizes_of(model: Model) -> Sizes:
@@ -208,7 +208,7 @@ def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
     return [
         Field(
             name,
-            name in MODEL_INTS or name in WORK_INTS,
+            name in MODEL_INTS or name in DATA_INTS,
             None if len(shapes[name]) == 1 else int(shapes[name][1]) if isinstance(shapes[name][1], int) else 0,
         )
         for name in cls._fields
@@ -216,4 +216,4 @@ def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
 
 
 model_view = record(Model, _fields(Model, MODEL_FIELDS))
-work_view = record(Work, _fields(Work, WORK_FIELDS))
+data_view = record(Data, _fields(Data, DATA_FIELDS))

@@ -1,4 +1,4 @@
-"""Options, Guess, NewtonTarget, Outcome: what a step is asked for, and how it ended."""
+"""StepOptions, Guess, NewtonTarget, Outcome: what a step is asked for, and how it ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from solvers.status import Status
 from solvers.types import Vector
 
 
-class Options(NamedTuple):
+class StepOptions(NamedTuple):
     """Settings of a step."""
 
     h: float  # time step [s]
@@ -22,7 +22,7 @@ class Guess(NamedTuple):
     """Where a step may start to look for its solution; how good a guess it is, is found out."""
 
     velocity: Vector  # (nv,) of v25
-    impulses: bool  # work holds the impulses of the step before
+    impulses: bool  # the Data holds the impulses of the step before
 
 
 class NewtonTarget(NamedTuple):

@@ -2,7 +2,7 @@
 
 A signal waits until Python runs again. So a call of a long loop is made in pieces: a kernel stops at the first step
 after its deadline and says how far it came; Python lets it go on from there, with all that the step before left in its
-Work, so that what comes of it is the same to the last bit.
+Data, so that what comes of it is the same to the last bit.
 
     for _ in pieces(settings, steps):
         done = roll(..., settings, ..., done)
@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 
-from sim.model.data import Work
+from sim.model.data import Data
 from solvers.compiler import PAUSE, kernel, seconds
 from solvers.types import Vector
 
@@ -52,16 +52,16 @@ def _rows(count: int) -> Iterator[slice]:
 
 
 @kernel
-def start_pace(work: Work, settings: Vector) -> None:
+def start_pace(data: Data, settings: Vector) -> None:
     """Note the deadline."""
-    work.pace[0] = settings[DEADLINE]
+    data.pace[0] = settings[DEADLINE]
 
 
 @kernel
-def is_due(work: Work, effort: float) -> bool:
+def is_due(data: Data, effort: float) -> bool:
     """Whether it is time to go back to Python, after a step of that effort: its iterations, and columns solved for."""
-    work.pace[1] += effort
-    if work.pace[1] < _LOOK:
+    data.pace[1] += effort
+    if data.pace[1] < _LOOK:
         return False
-    work.pace[1] = 0.0
-    return seconds() > work.pace[0]
+    data.pace[1] = 0.0
+    return seconds() > data.pace[0]

@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 
-from sim.model.layout import Sizes, allocate_work, table
+from sim.model.layout import Sizes, allocate_data, table
 from solvers.compiler import Table
 from solvers.types import Vector
 
@@ -26,15 +26,15 @@ class Scratch:
         """Tables of `count` Works, (count, ...)."""
         works = self._kept.__dict__.setdefault("works", [])
         while len(works) < count:
-            works.append(allocate_work(self._sizes))
+            works.append(allocate_data(self._sizes))
             works[-1].contact_frame[:] = self._contact_frame
         if len(self._kept.__dict__.get("tables", ())) < count:
-            self._kept.tables = np.array([table(work) for work in works])
+            self._kept.tables = np.array([table(data) for data in works])
         out: Table = self._kept.tables[:count]
         return out
 
     def table(self) -> Table:
-        """Table of the first Work."""
+        """Table of the first Data."""
         return self.tables(1)[0]
 
     def chunks(self, count: int) -> Table:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.integrators.policy import Policy
+from sim.integrators.feedback import FeedbackLaw
 from sim.integrators.rollout import UNIT
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
@@ -99,8 +99,8 @@ class Arguments:
 
     def policy(
         self, call: str, start: Floats, us: Floats, wrenches: Floats | None, parts: tuple[ArrayLike | None, ...]
-    ) -> Policy:
-        """Policy around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
+    ) -> FeedbackLaw:
+        """FeedbackLaw around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
         ndx, knots = self._engine.ndx, len(us)
         shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
         xs, ks, Ks, gaps = (
@@ -112,7 +112,7 @@ class Arguments:
                 raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
             xs[:] = start
         external = self._engine.no_wrenches if wrenches is None else wrenches
-        return Policy(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)
+        return FeedbackLaw(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)
 
     def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:
         """(lower, upper) of every input, infinite where free."""

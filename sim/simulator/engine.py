@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
 from sim.integrators import rollout
-from sim.integrators.policy import Path, Policy, closed_loop
-from sim.integrators.rollout import Motion
-from sim.model.data import Work
-from sim.model.layout import sizes_of, table, work_view
+from sim.integrators.feedback import FeedbackLaw, Path, closed_loop
+from sim.integrators.rollout import MotionBuffers
+from sim.model.data import Data
+from sim.model.layout import data_view, sizes_of, table
 from sim.model.model import Model
 from sim.model.pace import pieces, rows
 from sim.model.scratch import Scratch
@@ -135,7 +135,7 @@ class Engine:
         return self._model
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
-        """Tables of the Model, linked for derivatives and what else a call needs, and of this thread's first Work."""
+        """Tables of the Model, linked for derivatives and what else a call needs, and of this thread's first Data."""
         return self.linked(link_step, link_gradient, *needs), self._scratch.table()
 
     # -- motions -------------------------------------------------------------------------------------------------------
@@ -165,13 +165,13 @@ class Engine:
         else:
             contacts = np.empty((steps, self.sizes.ncontact, CONTACT))
             model = self.linked(link_step)
-        motion = Motion(xs, us, self.no_wrenches if wrenches is None else wrenches, reports, contacts, A, B)
-        work = self._scratch.table()
+        motion = MotionBuffers(xs, us, self.no_wrenches if wrenches is None else wrenches, reports, contacts, A, B)
+        data = self._scratch.table()
         settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
         knot = 0
         try:
             for _ in pieces(settings, steps):
-                knot = int(rollout.roll(model, work, settings, motion, knot))
+                knot = int(rollout.roll(model, data, settings, motion, knot))
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -197,7 +197,7 @@ class Engine:
     def closed_loop(
         self,
         x: Vector,
-        policy: Policy,
+        policy: FeedbackLaw,
         alpha: float,
         limits: tuple[Floats, Floats],
         substeps: int,
@@ -208,10 +208,10 @@ class Engine:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
         path = self._path(len(policy.us), keep=keep)
         path.xs[0] = x
-        model, work, settings = self.linked(link_step), self._scratch.table(), self.settings.array(kappa)
+        model, data, settings = self.linked(link_step), self._scratch.table(), self.settings.array(kappa)
 
         def go_on(first: int) -> int:
-            return int(closed_loop(model, work, settings, policy, alpha, limits, substeps, path, first))
+            return int(closed_loop(model, data, settings, policy, alpha, limits, substeps, path, first))
 
         knot = follow(go_on, settings, path, substeps)
         if knot < len(policy.us):
@@ -243,9 +243,9 @@ class Engine:
         line = rollout.Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
         model, settings = self.linked(link_step, link_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
-            work, step = self._scratch.table(), 0
+            data, step = self._scratch.table(), 0
             for _ in pieces(settings, n * substeps):
-                step = int(rollout.linearize(model, work, settings, (0, step, n), substeps, line))
+                step = int(rollout.linearize(model, data, settings, (0, step, n), substeps, line))
                 if step == n * substeps:
                     break
         else:
@@ -275,7 +275,7 @@ class Engine:
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
         xs[:, 0] = x0s
-        motions = rollout.Motions(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
+        motions = rollout.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
         model, works, settings = self.linked(link_step), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, 0]
         try:
@@ -291,13 +291,13 @@ class Engine:
     def far(self) -> NDArray[np.bool_]:
         """Which contacts were far in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
-        work = work_view(self._scratch.table())
-        out[work.active[: work.active_count[0]]] = False
+        data = data_view(self._scratch.table())
+        out[data.active[: data.active_count[0]]] = False
         return out
 
-    def last(self) -> Work:
+    def last(self) -> Data:
         """What the last step of this thread has left."""
-        return work_view(self._scratch.table())
+        return data_view(self._scratch.table())
 
     def open_loops(self) -> list[float]:
         """How far loops, then gears, were open in the last iterate of this thread [m, or sine of an angle]."""
@@ -325,9 +325,9 @@ class Engine:
     def node_velocities(self, xs: Floats) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""
         out = np.zeros((len(xs), self.sizes.nv))
-        model, work, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        model, data, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
-            velocity.node_velocities(model, work, h, xs[part], out[part])
+            velocity.node_velocities(model, data, h, xs[part], out[part])
         return out
 
     def bodies(self, xs: Floats) -> Floats:
@@ -363,17 +363,17 @@ class Engine:
     def maximal(self, xs: Floats, nbody: int) -> Floats:
         """z of every row, (n, nbody, 13)."""
         out = np.zeros((len(xs), nbody, 13))
-        work, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
-            coordinates.maximal_states(self._model, work, h, xs[part], out[part].reshape(-1, 13))
+            coordinates.maximal_states(self._model, data, h, xs[part], out[part].reshape(-1, 13))
         return out
 
     def minimal(self, zs: Floats) -> Floats:
         """x of every z, (n, nbody, 13)."""
         out = np.zeros((len(zs), self.nx))
-        work, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), self.settings.time_step
         for part in rows(len(zs)):
-            coordinates.minimal_states(self._model, work, h, zs[part].reshape(-1, 13), out[part])
+            coordinates.minimal_states(self._model, data, h, zs[part].reshape(-1, 13), out[part])
         return out
 
     def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
@@ -393,15 +393,15 @@ class Engine:
     def energies(self, xs: Floats) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        model, work, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        model, data, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
-            energy.energies(model, work, h, xs[part], out[part])
+            energy.energies(model, data, h, xs[part], out[part])
         return out
 
     def momenta(self, xs: Floats) -> Floats:
         """(linear, angular) momentum of every row."""
         out = np.zeros((len(xs), 6))
-        work, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), self.settings.time_step
         for part in rows(len(xs)):
-            energy.momenta(self._model, work, h, xs[part], out[part])
+            energy.momenta(self._model, data, h, xs[part], out[part])
         return out

@@ -8,9 +8,9 @@ import numpy as np
 
 from sim.dynamics import bodies, coordinates
 from sim.integrators import runge_kutta
+from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton_gradient import Slopes
-from sim.integrators.policy import Path, Policy
-from sim.integrators.rollout import Linearized, Motion
+from sim.integrators.rollout import Linearized, MotionBuffers
 from sim.integrators.tableau import stable, tableau
 from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
@@ -44,7 +44,7 @@ class HighOrderEngine(Engine):
         return runge_kutta.Scheme(a, b, free_roots(self.model), *scratch)
 
     def _tables(self) -> tuple[Integers, Integers, Vector]:
-        """Tables of the Model and of this thread's first Work, and settings."""
+        """Tables of the Model and of this thread's first Data, and settings."""
         return self.linked(link_smooth), self._scratch.table(), self.settings.array()
 
     def roll(
@@ -63,12 +63,12 @@ class HighOrderEngine(Engine):
         external = self.no_wrenches if wrenches is None else wrenches
         A, B = self.unknown[:2]
         contacts = np.zeros((steps, 0, CONTACT))
-        motion = Motion(xs, us, external, reports, contacts, A, B)
-        model, work, settings, scheme = *self._tables(), self._scheme()
+        motion = MotionBuffers(xs, us, external, reports, contacts, A, B)
+        model, data, settings, scheme = *self._tables(), self._scheme()
         knot = 0
         try:
             for _ in pieces(settings, steps):
-                knot = int(runge_kutta.roll(model, work, settings, scheme, motion, knot))
+                knot = int(runge_kutta.roll(model, data, settings, scheme, motion, knot))
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -168,10 +168,10 @@ class HighOrderEngine(Engine):
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         line = Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
-        model, work, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
+        model, data, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
         step = 0
         for _ in pieces(settings, n * substeps):
-            step = int(runge_kutta.linearize(model, work, settings, scheme, substeps, line, tangents, step))
+            step = int(runge_kutta.linearize(model, data, settings, scheme, substeps, line, tangents, step))
             if step == n * substeps:
                 break
         unsolved = reports[:, 0] != Status.SOLVED
@@ -191,7 +191,7 @@ class HighOrderEngine(Engine):
     def closed_loop(
         self,
         x: Vector,
-        policy: Policy,
+        policy: FeedbackLaw,
         alpha: float,
         limits: tuple[Floats, Floats],
         substeps: int,
@@ -202,11 +202,11 @@ class HighOrderEngine(Engine):
         """As Engine.closed_loop."""
         path = self._path(len(policy.us), keep=keep)
         path.xs[0] = x
-        model, work, settings, scheme = *self._tables(), self._scheme()
+        model, data, settings, scheme = *self._tables(), self._scheme()
 
         def go_on(first: int) -> int:
             return int(
-                runge_kutta.closed_loop(model, work, settings, scheme, policy, alpha, limits, substeps, path, first)
+                runge_kutta.closed_loop(model, data, settings, scheme, policy, alpha, limits, substeps, path, first)
             )
 
         return follow(go_on, settings, path, substeps), path

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.integrators.policy import Policy
+from sim.integrators.feedback import FeedbackLaw
 from sim.simulator.arguments import Arguments
 from sim.simulator.engine import Engine
 from sim.simulator.results import Linearization
@@ -19,7 +19,7 @@ from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Horizon", "Steps", "Trial"]
+__all__ = ["Horizon", "Steps", "Rollout"]
 
 
 class Steps(NamedTuple):
@@ -29,7 +29,7 @@ class Steps(NamedTuple):
     bounds: Floats  # (T, nlimit, 2)
 
 
-class Trial(NamedTuple):
+class Rollout(NamedTuple):
     """A rollout; what comes after the last solved knot is undefined."""
 
     x: Floats  # (T + 1, nx)
@@ -70,14 +70,14 @@ class Horizon:
         alpha: float = 1.0,
         linear: Linearization | None = None,
         steps: Steps | None = None,
-    ) -> Trial:
+    ) -> Rollout:
         """Rollout from x0 (nx,) under the gains around (xs, us), as `Simulator.closed_loop`.
 
         linear: derivatives at (xs, us), steps: those of the rollout (xs, us); they tell where a step may look first.
         """
         derivatives = self._engine.unknown[:2] if linear is None else (linear.A, linear.B)
         cones = self._engine.unknown[2:] if steps is None else steps
-        policy = Policy(
+        policy = FeedbackLaw(
             xs,
             us,
             self._engine.no_wrenches,
@@ -90,7 +90,7 @@ class Horizon:
         keep = self._substeps == 1
         knot, path = self._engine.closed_loop(x0, policy, alpha, self._limits, self._substeps, kappa, keep=keep)
         kept = Steps(path.cones, path.bounds) if keep else None
-        return Trial(path.xs, path.us, Status(int(path.report[0])), knot, kept)
+        return Rollout(path.xs, path.us, Status(int(path.report[0])), knot, kept)
 
     def linearize(self, xs: Floats, us: Floats, kappa: float, guess: Floats | None = None) -> Linearization:
         """Derivatives of all knots, as `Simulator.linearize_trajectory`.

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.derivatives.parameters.parameters import KINDS, Parameters, Plan, all_parameters
+from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
 from sim.derivatives.parameters.selection import select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
@@ -27,14 +27,14 @@ class ParameterEngine:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
         self._known = all_parameters(mechanism, time_step)
         # those made so far: finding parameters by name takes longer than their derivatives
-        self._selections: dict[tuple[str, ...], tuple[Parameters, Plan]] = {}
+        self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
         """Those of all parameters."""
         return tuple(p.name for p in self._known)
 
-    def select(self, call: str, wrt: Sequence[str]) -> tuple[tuple[str, ...], Parameters, Plan]:
+    def select(self, call: str, wrt: Sequence[str]) -> tuple[tuple[str, ...], Parameters, ParameterPlan]:
         """The names, one or several; those of them that are parameters, and the terms of their columns."""
         asked = _different_names(call, wrt)
         names = tuple(name for name in asked if name not in _VARIABLES)
@@ -46,7 +46,7 @@ class ParameterEngine:
         """Parameters by name."""
         return self._selection(call, _different_names(call, wrt))[0]
 
-    def _selection(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, Plan]:
+    def _selection(self, call: str, names: tuple[str, ...]) -> tuple[Parameters, ParameterPlan]:
         if names not in self._selections:
             self._selections[names] = select(call, self._known, names)
         return self._selections[names]
@@ -55,12 +55,12 @@ class ParameterEngine:
         """The mechanism and the time step with other values of parameters."""
         return with_values(call, self._mechanism, self._time_step, values)
 
-    def columns(self, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
+    def columns(self, step: tuple[Vector, Vector], A: Floats, plan: ParameterPlan) -> Floats:
         """See `parameter_columns`."""
         return parameter_columns(self._engine, self._mechanism, step, A, plan)
 
     def roll(
-        self, x: Vector, us: Floats, plan: Plan, kappa: float | None, wrenches: Floats | None
+        self, x: Vector, us: Floats, plan: ParameterPlan, kappa: float | None, wrenches: Floats | None
     ) -> tuple[Rolled, Floats]:
         """See `roll_parameters`."""
         return roll_parameters(self._engine, self._mechanism, (x, us, wrenches), plan, kappa)
@@ -69,7 +69,7 @@ class ParameterEngine:
         self,
         path: tuple[Floats, Floats],
         loss: Floats,
-        plan: Plan,
+        plan: ParameterPlan,
         kappa: float | None,
         wrenches: Floats | None,
     ) -> tuple[int, Sweep]:

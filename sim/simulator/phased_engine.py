@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators import legendre, phases, rollout
+from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton_gradient import Slopes
-from sim.integrators.policy import Path, Policy
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
@@ -97,12 +97,12 @@ class PhasedEngine(HighOrderEngine):
 
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
         """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
-        model, work = self.linked(link_smooth, link_step), self._scratch.table()
+        model, data = self.linked(link_smooth, link_step), self._scratch.table()
         settings, scheme = self.settings.array(kappa), self._scheme()
         taken, why = 0, int(Status.SOLVED)
         try:
             for _ in pieces(settings, len(flight.us)):
-                taken, why = phases.roll_far(model, work, settings, scheme, flight, taken)
+                taken, why = phases.roll_far(model, data, settings, scheme, flight, taken)
                 if taken == len(flight.us) or why != Status.SOLVED:
                     break
         except KeyboardInterrupt:
@@ -116,7 +116,7 @@ class PhasedEngine(HighOrderEngine):
 
         None in its place where a step is not solved. given: inputs, and external wrenches.
         """
-        model, work, settings = self.linked(link_step), self._second._scratch.table(), self.settings.array(kappa)
+        model, data, settings = self.linked(link_step), self._second._scratch.table(), self.settings.array(kappa)
         us, external = given
         t, piece, nq = first, _PIECE, self.sizes.nq
         while t < len(us):
@@ -124,11 +124,11 @@ class PhasedEngine(HighOrderEngine):
             means = np.zeros((count + 1, self.nx))
             means[0] = mean
             rows, solved = slice(t, t + count), 0
-            line = rollout.Motion(
+            line = rollout.MotionBuffers(
                 means, us[rows], external[rows], out.reports[rows], out.contacts[rows], *self.unknown[:2]
             )
             for _ in pieces(settings, count):
-                solved = int(rollout.roll(model, work, settings, line, solved))
+                solved = int(rollout.roll(model, data, settings, line, solved))
                 if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
                     break
             nodes = means[1 : solved + 1].copy()
@@ -170,7 +170,7 @@ class PhasedEngine(HighOrderEngine):
     def closed_loop(
         self,
         x: Vector,
-        policy: Policy,
+        policy: FeedbackLaw,
         alpha: float,
         limits: tuple[Floats, Floats],
         substeps: int,

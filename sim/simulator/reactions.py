@@ -1,6 +1,6 @@
 """Reactions: the wrenches that joints transmit over a step, which the elimination of the joints hides.
 
-A step leaves in `work.subtree` the momentum balance of the bodies behind each joint, without the forces of joints:
+A step leaves in `data.subtree` the momentum balance of the bodies behind each joint, without the forces of joints:
 
     sum over the bodies behind it of (p_out - p_in - impulses of gravity, contacts, loops, inputs) = h wrench of a joint
 
@@ -28,7 +28,7 @@ from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.simulator.engine import Engine
 from sim.simulator.results import Result
@@ -122,9 +122,9 @@ def reactions(
             if status == Status.SOLVED:
                 status, detail = Status(int(rolled.reports[0, 0])), explain(call, rolled.reports[0], state)
             continue
-        work = engine.last()
-        rows = [_tree_joint(joint, i, engine.model, work, h, frame) for i, joint in enumerate(mech.joints)]
-        rows += [_loop_joint(mech, loop, m, engine.model, work, h, frame) for m, loop in loops]
+        data = engine.last()
+        rows = [_tree_joint(joint, i, engine.model, data, h, frame) for i, joint in enumerate(mech.joints)]
+        rows += [_loop_joint(mech, loop, m, engine.model, data, h, frame) for m, loop in loops]
         for n, row in enumerate(rows):
             out[:, k, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
         if status == Status.SOLVED and not np.isfinite(out[:, k]).all():
@@ -133,38 +133,38 @@ def reactions(
     return Reactions(names, frame, point, force, torque, held_force, held_torque, status, detail)
 
 
-def _tree_joint(joint: Joint, i: int, model: Model, work: Work, h: float, frame: str) -> _Row:
+def _tree_joint(joint: Joint, i: int, model: Model, data: Data, h: float, frame: str) -> _Row:
     """The wrench on everything behind joint i."""
-    rotation = work.rot2[i].reshape(3, 3)
-    point = work.pos2[i] + rotation @ np.asarray(joint.child_point)
-    wrench = _at(point - work.origin, work.subtree[i] / h)
-    S = np.array([_twist_at(point - work.origin, s) for s in work.S2[model.body_vadr[i] : model.body_vadr[i + 1]]])
+    rotation = data.rot2[i].reshape(3, 3)
+    point = data.pos2[i] + rotation @ np.asarray(joint.child_point)
+    wrench = _at(point - data.origin, data.subtree[i] / h)
+    S = np.array([_twist_at(point - data.origin, s) for s in data.S2[model.body_vadr[i] : model.body_vadr[i + 1]]])
     active = np.zeros(6)
     if len(S):
         S = S.reshape(-1, 6).T
         active = S @ np.linalg.lstsq(S, wrench.ravel(), rcond=None)[0]
     p = int(model.body_parent[i])
-    return _Row(point, wrench, wrench - active.reshape(2, 3), _axes(joint, rotation, p, work, frame))
+    return _Row(point, wrench, wrench - active.reshape(2, 3), _axes(joint, rotation, p, data, frame))
 
 
-def _loop_joint(mech: Mechanism, loop: Joint, m: int, model: Model, work: Work, h: float, frame: str) -> _Row:
+def _loop_joint(mech: Mechanism, loop: Joint, m: int, model: Model, data: Data, h: float, frame: str) -> _Row:
     """The wrench that closing joint m has on its child: nothing but the constraint's."""
     k = len(model.coupling_body) - len(mech.loops) + m
     a, b = (int(x) for x in model.coupling_body[k])
-    rotation = work.rot2[a].reshape(3, 3)
-    point = work.pos2[a] + rotation @ np.asarray(loop.child_point)
+    rotation = data.rot2[a].reshape(3, 3)
+    point = data.pos2[a] + rotation @ np.asarray(loop.child_point)
     rows = slice(model.coupling_row[k], model.coupling_row[k + 1])
-    wrench = _at(point - work.origin, work.couple_force[rows] @ work.couple_B[rows] / h)
-    return _Row(point, wrench, wrench, _axes(loop, rotation, b, work, frame))
+    wrench = _at(point - data.origin, data.couple_force[rows] @ data.couple_B[rows] / h)
+    return _Row(point, wrench, wrench, _axes(loop, rotation, b, data, frame))
 
 
-def _axes(joint: Joint, child: Floats, parent: int, work: Work, frame: str) -> Floats:
+def _axes(joint: Joint, child: Floats, parent: int, data: Data, frame: str) -> Floats:
     """Rotation to the world of the frame asked for."""
     if frame == "world":
         return np.eye(3)
     if frame == "body":
         return child
-    above = np.eye(3) if joint.parent == WORLD else work.rot2[parent].reshape(3, 3)
+    above = np.eye(3) if joint.parent == WORLD else data.rot2[parent].reshape(3, 3)
     return np.asarray(above @ rotation_matrix(joint.orientation))
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.integrators.policy import Path
+from sim.integrators.feedback import Path
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from solvers.status import MESSAGES, Status

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sim.derivatives.parameters.directions import At
 from sim.derivatives.parameters.height_columns import height_jacobian
 from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
-from sim.derivatives.parameters.parameters import Plan
+from sim.derivatives.parameters.parameters import ParameterPlan
 from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.mechanism.mechanism import Mechanism
@@ -23,19 +23,21 @@ _TWISTS = 12  # rows of scratch for twists at three configurations
 _PIECE = 64  # steps whose (A, B) are kept at once
 
 
-def parameter_columns(engine: Engine, mech: Mechanism, step: tuple[Vector, Vector], A: Floats, plan: Plan) -> Floats:
+def parameter_columns(
+    engine: Engine, mech: Mechanism, step: tuple[Vector, Vector], A: Floats, plan: ParameterPlan
+) -> Floats:
     """d(next state)/d(parameters), (ndx, n), right after `linearize_one` of the step (x, u) with the result A."""
     x, u = step
     out = np.zeros((engine.ndx, plan.size))
     nq = engine.sizes.nq
     at = At(engine.settings.time_step, x[:nq], x[nq:], u, np.zeros((_TWISTS, 6)), np.zeros(engine.sizes.nbody))
-    model, work = engine.tables(link_parameters)
+    model, data = engine.tables(link_parameters)
     if len(plan.weights):
-        parameter_jacobian(model, work, at, A, plan.terms, plan.weights, out)
+        parameter_jacobian(model, data, at, A, plan.terms, plan.weights, out)
     if len(plan.heights):
         places = np.zeros((engine.ndx, 3 * (engine.sizes.ncontact - engine.sizes.npair)))
         coefficients = np.zeros((engine.ndx, engine.sizes.nheight))
-        height_jacobian(model, work, at, places, coefficients)
+        height_jacobian(model, data, at, places, coefficients)
         _add_heights(mech, plan, coefficients, out)
     return out
 
@@ -62,7 +64,11 @@ def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
 
 
 def roll_parameters(
-    engine: Engine, mech: Mechanism, path: tuple[Vector, Floats, Floats | None], plan: Plan, kappa: float | None
+    engine: Engine,
+    mech: Mechanism,
+    path: tuple[Vector, Floats, Floats | None],
+    plan: ParameterPlan,
+    kappa: float | None,
 ) -> tuple[Rolled, Floats]:
     """A rollout with its derivatives, and d(next state)/d(parameters) (T, ndx, n); path: state, inputs, wrenches."""
     x, us, wrenches = path
@@ -84,7 +90,7 @@ def roll_parameters(
     return Rolled(knot, xs, reports, np.zeros((0, engine.sizes.ncontact, CONTACT)), A, B), J
 
 
-def _add_heights(mech: Mechanism, plan: Plan, coefficients: Floats, out: Floats) -> None:
+def _add_heights(mech: Mechanism, plan: ParameterPlan, coefficients: Floats, out: Floats) -> None:
     """out (n, nparameter) += derivatives by heights of terrains, from those by coefficients."""
     heights, columns = plan.heights.T
     found = height_gradients(mech, coefficients)[:, heights] * plan.height_weights
@@ -96,7 +102,7 @@ def adjoint_sweep(
     mech: Mechanism,
     path: tuple[Floats, Floats, Floats | None],
     loss: Floats,
-    plan: Plan,
+    plan: ParameterPlan,
     kappa: float | None,
 ) -> tuple[int, Sweep]:
     """(the step that was not solved or -1, gradients) of a loss with the gradient `loss` by the states of the path.
@@ -127,11 +133,11 @@ def adjoint_sweep(
     if engine.settings.order > 2:
         return adjoint_products(engine, line, kappa), line
     needs = (link_parameters, link_heights) if len(plan.heights) else (link_parameters,)
-    model, work = engine.tables(*needs[: 2 if plan.size else 0])
+    model, data = engine.tables(*needs[: 2 if plan.size else 0])
     settings, left = engine.settings.array(kappa), len(us)
     line.costate[0] = loss[-1]
     for _ in pieces(settings, left):
-        left = int(sweep(model, work, settings, line, plan.terms, plan.weights, left))
+        left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left))
         if left == 0 or line.report[0, 0] != Status.SOLVED:
             break
     if len(plan.heights):

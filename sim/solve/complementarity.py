@@ -9,26 +9,26 @@ from sim.contact.contact_law import (
     slip_violation,
 )
 from sim.model.columns import Bound
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.cones import orthant_step
 
 
 @kernel
-def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
+def products(model: Model, data: Data, kappa: float) -> tuple[float, float]:
     """Mean of all complementarity products, kappa where there is none, and their largest distance from kappa."""
     total = 0.0
     count = 0.0
     violation = 0.0
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        t, n, low, high = contact_products(model, work, c)
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        t, n, low, high = contact_products(model, data, c)
         total += t
         count += n
         violation = max(violation, high - kappa, kappa - low)
     for k in range(model.limit_dof.shape[0]):
-        t = work.bound[k, Bound.SLACK] * work.bound[k, Bound.IMPULSE]
+        t = data.bound[k, Bound.SLACK] * data.bound[k, Bound.IMPULSE]
         total += t
         count += 1.0
         violation = max(violation, abs(t - kappa))
@@ -36,42 +36,42 @@ def products(model: Model, work: Work, kappa: float) -> tuple[float, float]:
 
 
 @kernel
-def slip_error(model: Model, work: Work, kappa: float) -> float:
+def slip_error(model: Model, data: Data, kappa: float) -> float:
     """Largest violation of the friction law of the central path of kappa, in units of kappa."""
     e = 0.0
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        e = max(e, slip_violation(model, work, c, kappa))
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        e = max(e, slip_violation(model, data, c, kappa))
     return e
 
 
 @kernel
-def products_ahead(model: Model, work: Work, alpha: float) -> float:
+def products_ahead(model: Model, data: Data, alpha: float) -> float:
     """Mean of the complementarity products after a step of length alpha, kappa where there is none."""
     total = 0.0
     count = 0.0
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        t, n = contact_products_ahead(model, work, c, alpha)
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        t, n = contact_products_ahead(model, data, c, alpha)
         total += t
         count += n
     for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
+        b = data.bound[k]
+        d = data.bound_step[k]
         total += (b[Bound.SLACK] + alpha * d[Bound.SLACK]) * (b[Bound.IMPULSE] + alpha * d[Bound.IMPULSE])
         count += 1.0
-    return total / count if count > 0.0 else work.inactive_kappa[0]
+    return total / count if count > 0.0 else data.inactive_kappa[0]
 
 
 @kernel
-def boundary_step(model: Model, work: Work) -> float:
+def boundary_step(model: Model, data: Data) -> float:
     """Largest step that keeps every cone variable in its cone, or 1e30."""
     a = 1e30
-    for m in range(work.active_count[0]):
-        c = work.active[m]
-        a = min(a, contact_boundary(model, work, c))
+    for m in range(data.active_count[0]):
+        c = data.active[m]
+        a = min(a, contact_boundary(model, data, c))
     for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        d = work.bound_step[k]
+        b = data.bound[k]
+        d = data.bound_step[k]
         a = min(a, orthant_step(b[Bound.SLACK], d[Bound.SLACK]), orthant_step(b[Bound.IMPULSE], d[Bound.IMPULSE]))
     return a

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sim.dynamics.elimination import factor, solve
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import LawForm, NewtonTarget
 from sim.solve.complementarity import boundary_step, products_ahead
@@ -19,7 +19,7 @@ _SHARES = 4  # 1, 1/2, 1/4, 1/8 of the terms that can make the matrix indefinite
 
 @inlined
 def linearize_step(
-    model: Model, work: Work, h: float, q: Vector, v: Vector, smoothing: float, near: bool, beyond: bool
+    model: Model, data: Data, h: float, q: Vector, v: Vector, smoothing: float, near: bool, beyond: bool
 ) -> bool:
     """Newton matrix at the present iterate, contacts and limits condensed, eliminated; False if it is singular.
 
@@ -35,16 +35,16 @@ def linearize_step(
     shares = 0 if near or beyond else _SHARES
     for halvings in range(shares + 1):
         share = 0.5**halvings if halvings < shares else 1.0
-        free_matrix(model, work, h, q, v)
-        condense_inequalities(model, work, h, smoothing, share, LawForm.LINEAR if near else LawForm.PLAIN)
-        sign = factor(model, work)
+        free_matrix(model, data, h, q, v)
+        condense_inequalities(model, data, h, smoothing, share, LawForm.LINEAR if near else LawForm.PLAIN)
+        sign = factor(model, data)
         if sign >= 0:
             break
-    return sign != 0 and factor_coupling(model, work)
+    return sign != 0 and factor_coupling(model, data)
 
 
 @inlined
-def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> float:
+def direction(model: Model, data: Data, h: float, kappa: float, mean: float) -> float:
     """Newton step dnu and the steps of all cones; returns the step to their boundary.
 
     predictor     full residual, products to kappa                      -> sigma = (mean ahead / mean)^3
@@ -64,16 +64,16 @@ def direction(model: Model, work: Work, h: float, kappa: float, mean: float) -> 
             share = 0.5 if phase == 2 else 0.1
             sigma = 1.0 - share
         target = NewtonTarget(max(kappa, sigma * mean), share, reach * reach if phase == 1 else 0.0)
-        for d in range(work.dnu.shape[0]):
-            work.dnu[d] = -share * work.residual[d]
-        inequality_rhs(model, work, target)
-        solve(model, work, work.dnu, work.dnu)
-        solve_coupling(model, work, share, work.dnu)
-        recover_inequalities(model, work, h, share)
-        alpha = boundary_step(model, work)
+        for d in range(data.dnu.shape[0]):
+            data.dnu[d] = -share * data.residual[d]
+        inequality_rhs(model, data, target)
+        solve(model, data, data.dnu, data.dnu)
+        solve_coupling(model, data, share, data.dnu)
+        recover_inequalities(model, data, h, share)
+        alpha = boundary_step(model, data)
         if phase == 0:
             reach = min(1.0, 0.95 * alpha)
-            ahead = products_ahead(model, work, reach)
+            ahead = products_ahead(model, data, reach)
             if alpha > 1.06 and abs(ahead - kappa) < 0.1 * kappa:
                 break
             sigma = min(max(ahead / mean, 0.0), 1.0) ** 3

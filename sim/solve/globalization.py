@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import FeatureChoice, Guess, Options
+from sim.model.options import FeatureChoice, Guess, StepOptions
 from sim.solve.inequalities import (
     keep_inequalities,
     move_inequalities,
@@ -114,7 +114,7 @@ _KAPPA_GROWTH = np.array([s.growth for s in STRATEGIES])
 
 
 class KnownStart(NamedTuple):
-    """The start of the first strategy, whose iterate is in `work`."""
+    """The start of the first strategy, whose iterate is in `data`."""
 
     found: bool  # otherwise the list begins with the second strategy
     kappa: float  # of the central path on which it is
@@ -144,9 +144,9 @@ def from_last_iterate(s: Strategy) -> Strategy:
 
 @kernel
 def known_start(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], guess: Guess
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], guess: Guess
 ) -> KnownStart:
-    """The first of these that is near the solution, with its iterate in `work`:
+    """The first of these that is near the solution, with its iterate in `data`:
 
         warm        at the guess, with the impulses of the step before
         predicted   at what the step linearised there predicts (prediction.py)
@@ -158,40 +158,40 @@ def known_start(
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    if work.active_count[0] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
-        if set_trial_velocity(model, work, h, q, guess.velocity, 1.0):
-            return KnownStart(True, kappa, residuals(model, work, h, q, v, u))
+    if data.active_count[0] + model.limit_dof.shape[0] == 0:  # nothing to be on the central path of
+        if set_trial_velocity(model, data, h, q, guess.velocity, 1.0):
+            return KnownStart(True, kappa, residuals(model, data, h, q, v, u))
         return KnownStart(False, kappa, INFEASIBLE)
-    keep_inequalities(model, work)
+    keep_inequalities(model, data)
     if (
-        guess.impulses and work.active_count[0] == work.active_ground_count[0]
+        guess.impulses and data.active_count[0] == data.active_ground_count[0]
     ):  # pairs may have other points than before
-        if predictable(model, work):
-            start = warm_or_predicted(model, work, options, inputs, guess.velocity)
+        if predictable(model, data):
+            start = warm_or_predicted(model, data, options, inputs, guess.velocity)
             if start.found:
                 return start
-        return warm_or_resumed(model, work, options, inputs, guess.velocity)
-    return at_kappa(model, work, options, inputs, guess.velocity)
+        return warm_or_resumed(model, data, options, inputs, guess.velocity)
+    return at_kappa(model, data, options, inputs, guess.velocity)
 
 
 @inlined
 def warm_or_predicted(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> KnownStart:
     """At kappa: with the impulses of the step before where they all but balance, otherwise as predicted."""
     q, v, u = inputs
-    if not set_trial_velocity(model, work, options.h, q, velocity, 1.0):
+    if not set_trial_velocity(model, data, options.h, q, velocity, 1.0):
         return KnownStart(False, options.kappa, INFEASIBLE)
-    move_inequalities(model, work, 0.0)
-    balance = residuals(model, work, options.h, q, v, u)
-    if balance[0] > _GOES_ON * total_impulse(model, work):
-        balance = predict(model, work, options, inputs)
+    move_inequalities(model, data, 0.0)
+    balance = residuals(model, data, options.h, q, v, u)
+    if balance[0] > _GOES_ON * total_impulse(model, data):
+        balance = predict(model, data, options, inputs)
     return KnownStart(balance[0] < 1e300, options.kappa, balance)
 
 
 @inlined
 def warm_or_resumed(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> KnownStart:
     """With the impulses of the step before: the gap of a pressing contact changes much, its impulse does not.
 
@@ -199,60 +199,60 @@ def warm_or_resumed(
     """
     q, v, u = inputs
     h = options.h
-    if not set_trial_velocity(model, work, h, q, velocity, 1.0):
+    if not set_trial_velocity(model, data, h, q, velocity, 1.0):
         return KnownStart(False, options.kappa, INFEASIBLE)
     kappa = max(options.kappa, _RESUMED)
-    resume_inequalities(model, work, h, kappa, False)
-    away, _ = residuals(model, work, h, q, v, u)
-    move_inequalities(model, work, 0.0)
-    last = residuals(model, work, h, q, v, u)
+    resume_inequalities(model, data, h, kappa, False)
+    away, _ = residuals(model, data, h, q, v, u)
+    move_inequalities(model, data, 0.0)
+    last = residuals(model, data, h, q, v, u)
     if last[0] < _BALANCED * away:
         return KnownStart(True, options.kappa, last)
-    resume_inequalities(model, work, h, kappa, False)
-    return KnownStart(True, kappa, residuals(model, work, h, q, v, u))
+    resume_inequalities(model, data, h, kappa, False)
+    return KnownStart(True, kappa, residuals(model, data, h, q, v, u))
 
 
 @inlined
 def at_kappa(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], velocity: Vector
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], velocity: Vector
 ) -> KnownStart:
     """At the guess with the impulses kappa / gap, where they all but balance."""
     q, v, u = inputs
     h = options.h
     kappa = options.kappa
-    if not set_trial_velocity(model, work, h, q, v, 1.0):
+    if not set_trial_velocity(model, data, h, q, v, 1.0):
         return KnownStart(False, kappa, INFEASIBLE)
-    start_inequalities(model, work, h, kappa, 1.0)
-    usual, _ = residuals(model, work, h, q, v, u)
+    start_inequalities(model, data, h, kappa, 1.0)
+    usual, _ = residuals(model, data, h, q, v, u)
     placed = True  # most guess the incoming velocity: there already
     for d in range(v.shape[0]):
         placed = placed and velocity[d] == v[d]
-    if not placed and not set_trial_velocity(model, work, h, q, velocity, 1.0):
+    if not placed and not set_trial_velocity(model, data, h, q, velocity, 1.0):
         return KnownStart(False, kappa, INFEASIBLE)
-    start_inequalities(model, work, h, kappa, 0.0)
-    hard = residuals(model, work, h, q, v, u)
+    start_inequalities(model, data, h, kappa, 0.0)
+    hard = residuals(model, data, h, q, v, u)
     return KnownStart(hard[0] < _AT_REST * usual, kappa, hard)
 
 
 @inlined
-def start_on_path(model: Model, work: Work, options: Options, q: Vector, v: Vector, s: Strategy) -> float:
+def start_on_path(model: Model, data: Data, options: StepOptions, q: Vector, v: Vector, s: Strategy) -> float:
     """Start of a strategy but the first, on the central path of its kappa0; returns kappa0, or 0 where that fails.
 
     At a fold the Newton matrix is all but singular, and its null vector, the last Newton step, leads to the other side.
     """
     if s.start == Start.INCOMING or s.start == Start.SHARE:
-        placed = set_trial_velocity(model, work, options.h, q, v, s.share)
+        placed = set_trial_velocity(model, data, options.h, q, v, s.share)
     else:
         if s.start == Start.LAST_ITERATE:
             for d in range(v.shape[0]):
-                work.dnu[d] = work.nu[d]
+                data.dnu[d] = data.nu[d]
         else:
-            ahead = min(_BEYOND / largest_turn(work), 100.0)
+            ahead = min(_BEYOND / largest_turn(data), 100.0)
             if s.start == Start.BEHIND_FOLD:
                 ahead = -ahead
             for d in range(v.shape[0]):
-                work.dnu[d] = work.nu[d] + ahead * work.dnu[d]
-        placed = set_trial_velocity(model, work, options.h, q, work.dnu, 1.0)
+                data.dnu[d] = data.nu[d] + ahead * data.dnu[d]
+        placed = set_trial_velocity(model, data, options.h, q, data.dnu, 1.0)
     if not placed:
         return 0.0
-    return start_inequalities(model, work, options.h, options.kappa, s.growth)
+    return start_inequalities(model, data, options.h, options.kappa, s.growth)

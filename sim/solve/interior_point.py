@@ -27,9 +27,9 @@ from sim.contact.pairs.active_features import overlapping
 from sim.contact.pairs.inactive_pairs import begin_pairs
 from sim.contact.pairs.pair_energy import pairs_gained
 from sim.contact.restitution import find_impacts, impacts_gained
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import FAILED, FeatureChoice, Guess, Options, Outcome, Verdict
+from sim.model.options import FAILED, FeatureChoice, Guess, Outcome, StepOptions, Verdict
 from sim.model.slots import Slot
 from sim.solve.complementarity import products, slip_error
 from sim.solve.direction import direction, linearize_step
@@ -60,18 +60,18 @@ _FEW = 4  # halvings; an attempt that needs more is given up
 
 
 @inlined
-def on_path(model: Model, work: Work, h: float, kappa: float, spread: float, violation: float) -> bool:
+def on_path(model: Model, data: Data, h: float, kappa: float, spread: float, violation: float) -> bool:
     """Whether products and friction laws hold to `spread`; friction laws to their rounding, where that is coarser."""
     if violation < spread:
         return True
-    if not violation < spread + slip_noise(model, work, h):
+    if not violation < spread + slip_noise(model, data, h):
         return False
-    return products(model, work, kappa)[1] < spread
+    return products(model, data, kappa)[1] < spread
 
 
 @inlined
 def lower_smoothing(
-    model: Model, work: Work, kappa: float, continuation: bool, smoothing: float, ratio: float, merit: Merit
+    model: Model, data: Data, kappa: float, continuation: bool, smoothing: float, ratio: float, merit: Merit
 ) -> tuple[float, float, Merit]:
     """The friction smoothing, its ratio, and the merit with the violation of the friction law at that smoothing.
 
@@ -83,16 +83,16 @@ def lower_smoothing(
         least = max(kappa, 0.1 * merit.mean)
     elif merit.mean < smoothing and smoothing > kappa:
         smoothing = max(kappa, merit.mean)
-        slip = slip_error(model, work, smoothing)
-    smoothing, slip, ratio = follow(model, work, least, smoothing, ratio, slip)
+        slip = slip_error(model, data, smoothing)
+    smoothing, slip, ratio = follow(model, data, least, smoothing, ratio, slip)
     return smoothing, ratio, Merit(merit.residual, max(merit.violation, slip), slip, merit.mean)
 
 
 @kernel
 def solve_from(
     model: Model,
-    work: Work,
-    options: Options,
+    data: Data,
+    options: StepOptions,
     inputs: tuple[Vector, Vector, Vector],
     s: Strategy,
     iterations: int,
@@ -105,48 +105,48 @@ def solve_from(
     q, v, u = inputs
     h, kappa = options.h, options.kappa
     spread = max(kappa * min(1e-3, 1e5 * options.tolerance), _ROUNDING)
-    scale = max(residual_scale(work), rounding(model, work, h) / options.tolerance)
+    scale = max(residual_scale(data), rounding(model, data, h) / options.tolerance)
     worse = _WORSE_LED if s.continuation else _WORSE
     smoothing, balance = known.kappa, known.balance
     if s.start != Start.KNOWN:
-        smoothing = start_on_path(model, work, options, q, v, s)
-        balance = residuals(model, work, h, q, v, u)
+        smoothing = start_on_path(model, data, options, q, v, s)
+        balance = residuals(model, data, h, q, v, u)
     ratio = 1e-2
     patience = iterations + _PATIENCE
     halvings = 0
-    merit = judge(model, work, kappa, scale, max(smoothing, kappa), balance)
+    merit = judge(model, data, kappa, scale, max(smoothing, kappa), balance)
     while smoothing > 0.0 and merit.residual < 1e300:
         before = smoothing
-        smoothing, ratio, merit = lower_smoothing(model, work, kappa, s.continuation, smoothing, ratio, merit)
+        smoothing, ratio, merit = lower_smoothing(model, data, kappa, s.continuation, smoothing, ratio, merit)
         if s.continuation and smoothing < before:
             patience = max(patience, iterations + _PATIENCE // 2)
         solved = merit.residual < options.tolerance and smoothing <= kappa
         # a guess within the tolerance gets one step too: the error is squared
-        if solved and iterations > 0 and on_path(model, work, h, kappa, spread, merit.violation):
+        if solved and iterations > 0 and on_path(model, data, h, kappa, spread, merit.violation):
             return Outcome(Status.SOLVED.value, iterations, merit.residual, merit.violation)
         if iterations >= options.max_iterations:
             return Outcome(Status.MAX_ITERATIONS.value, iterations, merit.residual, merit.violation)
         if iterations >= patience or halvings > _FEW:
             break
         iterations += 1
-        if not linearize_step(model, work, h, q, v, smoothing, is_near(merit, kappa), s.undamped):
+        if not linearize_step(model, data, h, q, v, smoothing, is_near(merit, kappa), s.undamped):
             return Outcome(Status.SINGULAR.value, iterations, merit.residual, merit.violation)
-        boundary = direction(model, work, h, kappa, merit.mean)
-        merit, halvings = search(model, work, options, inputs, scale, smoothing, boundary, merit, worse)
+        boundary = direction(model, data, h, kappa, merit.mean)
+        merit, halvings = search(model, data, options, inputs, scale, smoothing, boundary, merit, worse)
     return Outcome(Status.NO_PROGRESS.value, iterations, merit.residual, merit.violation)
 
 
 @inlined
 def judge_solution(
-    model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector], out: Outcome
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], out: Outcome
 ) -> int:
     """The Verdict on the outcome of an attempt; VALID where it is no solution.   inputs: (q, v, u)."""
     if out.status != Status.SOLVED:
         return Verdict.VALID
-    found = overlapping(model, work)
-    if found == Verdict.VALID and pairs_gained(model, work, options, inputs[1]):
+    found = overlapping(model, data)
+    if found == Verdict.VALID and pairs_gained(model, data, options, inputs[1]):
         return Verdict.TUNNELLED
-    if found == Verdict.VALID and step_gained(model, work, options, inputs):
+    if found == Verdict.VALID and step_gained(model, data, options, inputs):
         return Verdict.ENERGY_GAIN
     return found
 
@@ -154,31 +154,31 @@ def judge_solution(
 @inlined
 def attempt(
     model: Model,
-    work: Work,
-    options: Options,
+    data: Data,
+    options: StepOptions,
     inputs: tuple[Vector, Vector, Vector],
     s: Strategy,
     iterations: int,
     known: KnownStart,
 ) -> tuple[Outcome, int]:
     """One attempt of a strategy, repeated with other active features while shapes overlap: its outcome and Verdict."""
-    out = solve_from(model, work, options, inputs, s, iterations, known)
-    verdict = judge_solution(model, work, options, inputs, out)
+    out = solve_from(model, data, options, inputs, s, iterations, known)
+    verdict = judge_solution(model, data, options, inputs, out)
     for repetition in range(_REPETITIONS):
-        if verdict != Verdict.OVERLAPPING or work.feature_choice[0] == FeatureChoice.EVERY_POSE:
+        if verdict != Verdict.OVERLAPPING or data.feature_choice[0] == FeatureChoice.EVERY_POSE:
             break
         if repetition > 0 or not s.replace_features:
-            work.feature_choice[0] = FeatureChoice.WITH_PREVIOUS
-        out = solve_from(model, work, options, inputs, from_last_iterate(s), out.iterations, known)
-        verdict = judge_solution(model, work, options, inputs, out)
+            data.feature_choice[0] = FeatureChoice.WITH_PREVIOUS
+        out = solve_from(model, data, options, inputs, from_last_iterate(s), out.iterations, known)
+        verdict = judge_solution(model, data, options, inputs, out)
     return out, verdict
 
 
 @inlined
 def solve_active(
     model: Model,
-    work: Work,
-    options: Options,
+    data: Data,
+    options: StepOptions,
     inputs: tuple[Vector, Vector, Vector],
     guess: Guess,
     out: Outcome,
@@ -187,16 +187,16 @@ def solve_active(
 
     out: the outcome before, whose iterations count.
     """
-    work.feature_choice[0] = FeatureChoice.ONCE
-    work.overlap_allowed[0] = 0
-    known = known_start(model, work, options, inputs, guess)
+    data.feature_choice[0] = FeatureChoice.ONCE
+    data.overlap_allowed[0] = 0
+    known = known_start(model, data, options, inputs, guess)
     gained = False
     for k in range(0 if known.found else 1, ATTEMPTS):
         s = strategy(k)
         if gained and s.start != Start.SHARE:  # beyond folds there are more solutions that gain energy
             continue
-        work.overlap_allowed[0] = 1 if s.overlap else 0
-        out, verdict = attempt(model, work, options, inputs, s, out.iterations, known)
+        data.overlap_allowed[0] = 1 if s.overlap else 0
+        out, verdict = attempt(model, data, options, inputs, s, out.iterations, known)
         if verdict == Verdict.VALID and (out.status == Status.SOLVED or out.status == Status.MAX_ITERATIONS):
             break
         refused = verdict == Verdict.OVERLAPPING or verdict == Verdict.TUNNELLED
@@ -204,7 +204,7 @@ def solve_active(
         out = Outcome(why, out.iterations, out.residual, out.violation)
         gained = gained or verdict == Verdict.ENERGY_GAIN
         # those of the next strategy in the list, also where it is skipped
-        work.feature_choice[0] = strategy(min(k + 1, ATTEMPTS - 1)).features
+        data.feature_choice[0] = strategy(min(k + 1, ATTEMPTS - 1)).features
     if gained and out.status != Status.SOLVED:
         return Outcome(Status.ENERGY_STEP.value, out.iterations, out.residual, out.violation)
     return out
@@ -212,25 +212,25 @@ def solve_active(
 
 @optional(Slot.INTERIOR_POINT, default=FAILED)
 def interior_point(
-    model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess
+    model: Model, data: Data, options: StepOptions, q: Vector, v: Vector, u: Vector, guess: Guess
 ) -> Outcome:
     """Solve the step for v25 with all complementarity products at kappa; the guess may be far off.
 
-    Leaves configuration 3, cone variables and residual wrenches (work.wrench, work.subtree) at the solution.
+    Leaves configuration 3, cone variables and residual wrenches (data.wrench, data.subtree) at the solution.
     """
     out = FAILED
     if sunk_contact(model) >= 0:
         return Outcome(Status.CONTACT_SUNK.value, 1, 1e300, 0.0)
-    work.overlap_allowed[0] = 0  # `find_impacts` chooses features, too
-    begin_pairs(model, work, options)
-    choose_active(model, work, options)
-    find_impacts(model, work, options.h)
+    data.overlap_allowed[0] = 0  # `find_impacts` chooses features, too
+    begin_pairs(model, data, options)
+    choose_active(model, data, options)
+    find_impacts(model, data, options.h)
     while True:
-        out = solve_active(model, work, options, (q, v, u), guess, out)
-        if has_activated(model, work):
+        out = solve_active(model, data, options, (q, v, u), guess, out)
+        if has_activated(model, data):
             continue
-        if out.status != Status.SOLVED or not impacts_gained(model, work, options.h):
+        if out.status != Status.SOLVED or not impacts_gained(model, data, options.h):
             break
     if out.status == Status.SOLVED:
-        absorb_residual(model, work)
+        absorb_residual(model, data)
     return out

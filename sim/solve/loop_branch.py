@@ -14,9 +14,9 @@ from sim.dynamics.loops.branch_motion import (
     predict_loops,
     stay_regular,
 )
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Guess, Options, Outcome
+from sim.model.options import Guess, Outcome, StepOptions
 from sim.model.slots import Slot
 from sim.solve.solve_step import solve_step
 from solvers.compiler import inlined, optional
@@ -33,23 +33,25 @@ def _after(r: Outcome, last: Outcome) -> Outcome:
 
 
 @optional(Slot.SOLVE_LOOPS)
-def solve_loops(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+def solve_loops(
+    model: Model, data: Data, options: StepOptions, q: Vector, v: Vector, u: Vector, guess: Guess
+) -> Outcome:
     """`solve_step` on the branch of the loops' motion."""
     r = Outcome(Status.SOLVED.value, 0, 0.0, 0.0)
-    if loops_regular(model, work):
-        r = _after(r, solve_step(model, work, options, q, v, u, guess))
-        if stay_regular(model, work, r.status):
+    if loops_regular(model, data):
+        r = _after(r, solve_step(model, data, options, q, v, u, guess))
+        if stay_regular(model, data, r.status):
             return r
         guess = Guess(guess.velocity, guess.impulses and r.status == Status.SOLVED)
-    if predict_loops(model, work, options.h, q, v, guess.velocity):
-        guess = Guess(work.loop_velocity, guess.impulses)
-    r = _after(r, solve_step(model, work, options, q, v, u, guess))
-    if r.status == Status.SOLVED and meet_ahead(model, work):
-        r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
-        if is_farther(model, work, r.status):
-            r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_start, guess.impulses)))
+    if predict_loops(model, data, options.h, q, v, guess.velocity):
+        guess = Guess(data.loop_velocity, guess.impulses)
+    r = _after(r, solve_step(model, data, options, q, v, u, guess))
+    if r.status == Status.SOLVED and meet_ahead(model, data):
+        r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_start, guess.impulses)))
+        if is_farther(model, data, r.status):
+            r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_start, guess.impulses)))
     for _ in range(_LEADS):
-        if r.status != Status.SOLVED or not lead_again(model, work, options.h, q):
+        if r.status != Status.SOLVED or not lead_again(model, data, options.h, q):
             break
-        r = _after(r, solve_step(model, work, options, q, v, u, Guess(work.loop_velocity, guess.impulses)))
+        r = _after(r, solve_step(model, data, options, q, v, u, Guess(data.loop_velocity, guess.impulses)))
     return r

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.dynamics.loops.closure import apply_loops
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.solve.complementarity import products, slip_error
 from sim.solve.inequalities import apply_inequalities, apply_limits
@@ -32,22 +32,22 @@ def is_near(merit: Merit, kappa: float) -> bool:
 
 
 @kernel
-def residuals(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
+def residuals(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> tuple[float, float]:
     """Largest generalized residual, and largest |gap - slack|; fills residual, wrench, subtree."""
-    balance_to_wrench(work)
-    e = max(apply_inequalities(model, work), apply_loops(model, work))
-    e = max(e, project_wrench(model, work, h, q, v, u))
-    apply_limits(model, work)
-    return norm(work.residual), e
+    balance_to_wrench(data)
+    e = max(apply_inequalities(model, data), apply_loops(model, data))
+    e = max(e, project_wrench(model, data, h, q, v, u))
+    apply_limits(model, data)
+    return norm(data.residual), e
 
 
 @kernel
 def judge(
-    model: Model, work: Work, kappa: float, scale: float, smoothing: float, balance: tuple[float, float]
+    model: Model, data: Data, kappa: float, scale: float, smoothing: float, balance: tuple[float, float]
 ) -> Merit:
     """Merit of the present iterate, whose residuals are `balance`."""
-    mean, violation = products(model, work, kappa)
-    slip = slip_error(model, work, smoothing)
+    mean, violation = products(model, data, kappa)
+    slip = slip_error(model, data, smoothing)
     violation = max(violation, slip)
     r = max(balance[0] / scale, balance[1])
     if r < 1e300 and violation < 1e300:
@@ -57,7 +57,7 @@ def judge(
 
 @kernel
 def follow(
-    model: Model, work: Work, least: float, smoothing: float, ratio: float, slip: float
+    model: Model, data: Data, least: float, smoothing: float, ratio: float, slip: float
 ) -> tuple[float, float, float]:
     """The smoothing brought down to `least` as far as the friction law holds on the way, and its violation there.
 
@@ -70,5 +70,5 @@ def follow(
         ratio = min(1e-2, ratio**0.5)
     while smoothing > least and slip < 0.3 * smoothing:
         smoothing = max(least, ratio * smoothing)
-        slip = slip_error(model, work, smoothing)
+        slip = slip_error(model, data, smoothing)
     return smoothing, slip, ratio

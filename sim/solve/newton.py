@@ -8,9 +8,9 @@ from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling
 from sim.dynamics.momentum_balance import momentum_balance
 from sim.model.columns import CoupleRank
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import FAILED, Guess, Options, Outcome
+from sim.model.options import FAILED, Guess, Outcome, StepOptions
 from sim.model.slots import Slot
 from sim.solve.matrix import factor_free
 from sim.solve.residual import absorb_residual, balance_to_wrench, norm, project_wrench, residual_scale, rounding
@@ -23,68 +23,68 @@ _ROUNDED = 1e-10
 
 @inlined
 def evaluate(
-    model: Model, work: Work, h: float, inputs: tuple[Vector, Vector, Vector], alpha: float
+    model: Model, data: Data, h: float, inputs: tuple[Vector, Vector, Vector], alpha: float
 ) -> tuple[bool, float, float]:
     """At nu = nu_trial + alpha dnu: whether it is inside the domain, the largest residual, and the largest gap."""
     q, v, u = inputs
     for d in range(v.shape[0]):
-        work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
-    inside = momentum_balance(model, work, h, q)
+        data.nu[d] = data.nu_trial[d] + alpha * data.dnu[d]
+    inside = momentum_balance(model, data, h, q)
     if model.loop_ntrans.shape[0] > 0:
-        turn_bodies(work, work.rot3)
-    balance_to_wrench(work)
-    move_loops(model, work, alpha)
-    gap = apply_loops(model, work)
-    gap = max(gap, project_wrench(model, work, h, q, v, u))
-    return inside, norm(work.residual), gap
+        turn_bodies(data, data.rot3)
+    balance_to_wrench(data)
+    move_loops(model, data, alpha)
+    gap = apply_loops(model, data)
+    gap = max(gap, project_wrench(model, data, h, q, v, u))
+    return inside, norm(data.residual), gap
 
 
 @inlined
-def newton_step(model: Model, work: Work, h: float, q: Vector, v: Vector) -> bool:
+def newton_step(model: Model, data: Data, h: float, q: Vector, v: Vector) -> bool:
     """H dnu = -R at nu, which becomes nu_trial; False when H is singular."""
-    if not factor_free(model, work, h, q, v) or not factor_coupling(model, work):
+    if not factor_free(model, data, h, q, v) or not factor_coupling(model, data):
         return False
     for d in range(v.shape[0]):
-        work.nu_trial[d] = work.nu[d]
-        work.rhs[d] = -work.residual[d]
-    solve(model, work, work.rhs, work.dnu)
-    solve_coupling(model, work, 1.0, work.dnu)
-    keep_loops(model, work)
+        data.nu_trial[d] = data.nu[d]
+        data.rhs[d] = -data.residual[d]
+    solve(model, data, data.rhs, data.dnu)
+    solve_coupling(model, data, 1.0, data.dnu)
+    keep_loops(model, data)
     return True
 
 
 @kernel
-def closed_to(work: Work, options: Options) -> float:
+def closed_to(data: Data, options: StepOptions) -> float:
     """How far loops may be open: near where two branches of their motion meet, gaps grow slowly away from either.
 
     Least pivot: the product of the distances of configurations 2 and 3 from there.
     """
     return (
-        options.tolerance * max(work.couple_rank[CoupleRank.PIVOT], _ROUNDED) ** 0.5
-        if work.couple_rank[CoupleRank.SIZE] > 0.0
+        options.tolerance * max(data.couple_rank[CoupleRank.PIVOT], _ROUNDED) ** 0.5
+        if data.couple_rank[CoupleRank.SIZE] > 0.0
         else 1e300
     )
 
 
 @optional(Slot.NEWTON, default=FAILED)
-def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
+def newton(model: Model, data: Data, options: StepOptions, q: Vector, v: Vector, u: Vector, guess: Guess) -> Outcome:
     """Solve R(v25) = 0 from the guess of v25; halve steps that leave the domain or let the residual grow.
 
-    Leaves configuration 3, the balances and the residual wrenches (work.wrench, work.subtree) at the solution.
+    Leaves configuration 3, the balances and the residual wrenches (data.wrench, data.subtree) at the solution.
     """
     h = options.h
-    scale = residual_scale(work)
-    floor = rounding(model, work, h) / scale
-    keep_loops(model, work)
+    scale = residual_scale(data)
+    floor = rounding(model, data, h) / scale
+    keep_loops(model, data)
     for d in range(v.shape[0]):
-        work.nu_trial[d] = guess.velocity[d]
-        work.dnu[d] = 0.0
+        data.nu_trial[d] = guess.velocity[d]
+        data.dnu[d] = 0.0
     alpha = 1.0
     last = 1e300
     halvings = 0
     iterations = 0
     while True:
-        inside, r, gap = evaluate(model, work, h, (q, v, u), alpha)
+        inside, r, gap = evaluate(model, data, h, (q, v, u), alpha)
         r = max(r / scale, gap)
         if not (inside and r < max(last, options.tolerance)):
             if inside and iterations > 0 and r < floor:
@@ -94,10 +94,10 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
             halvings += 1
             if iterations == 0:  # the start itself lies outside: slow everything down
                 for d in range(v.shape[0]):
-                    work.nu_trial[d] *= 0.7
+                    data.nu_trial[d] *= 0.7
             alpha *= 0.5
             continue
-        if r < options.tolerance and (gap < closed_to(work, options) or r >= last):
+        if r < options.tolerance and (gap < closed_to(data, options) or r >= last):
             break
         if iterations == options.max_iterations:
             return Outcome(Status.MAX_ITERATIONS.value, iterations, r, 0.0)
@@ -105,8 +105,8 @@ def newton(model: Model, work: Work, options: Options, q: Vector, v: Vector, u: 
         halvings = 0
         last = r
         alpha = 1.0
-        if not newton_step(model, work, h, q, v):
+        if not newton_step(model, data, h, q, v):
             return Outcome(Status.SINGULAR.value, iterations, r, 0.0)
-    turn_bodies(work, work.rot3)
-    absorb_residual(model, work)
+    turn_bodies(data, data.rot3)
+    absorb_residual(model, data)
     return Outcome(Status.SOLVED.value, iterations, r, 0.0)

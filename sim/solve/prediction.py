@@ -14,9 +14,9 @@ from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
 from sim.model.columns import Bound, Cone, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Law, Model
-from sim.model.options import Options
+from sim.model.options import StepOptions
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
@@ -34,12 +34,12 @@ _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's me
 
 
 @kernel
-def predictable(model: Model, work: Work) -> bool:
+def predictable(model: Model, data: Data) -> bool:
     """Whether `predict` knows all that acts: no pairs of bodies, loops, gears or friction pyramids."""
-    if work.active_count[0] != work.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
+    if data.active_count[0] != data.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return False
-    for m in range(work.active_ground_count[0]):
-        c = work.active[m]
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
         if law_of(model, c) == Law.LINEAR:
             return False
     return True
@@ -52,48 +52,48 @@ def _may_touch(gap: float, rate: float, slack: float, impulse: float, kappa: flo
 
 
 @kernel
-def _take_contact(work: Work, j: int, c: int, rate: Vec3) -> None:
+def _take_contact(data: Data, j: int, c: int, rate: Vec3) -> None:
     """w and l of contact c, in rows j, j + 1, j + 2.   rate: `contact_rate`."""
-    w, l = work.reach_rate, work.reach_impulse
-    k, z = work.contact_kin[c], work.cone[c]
+    w, l = data.reach_rate, data.reach_impulse
+    k, z = data.contact_kin[c], data.cone[c]
     w[j], w[j + 1], w[j + 2] = k[Kin.GAP] + rate[0], k[Kin.SLIP1] + rate[1], k[Kin.SLIP2] + rate[2]
     l[j], l[j + 1], l[j + 2] = z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2]
 
 
 @kernel
-def _take_limit(work: Work, j: int, k: int, rate: float) -> None:
+def _take_limit(data: Data, j: int, k: int, rate: float) -> None:
     """w and l of limit k, in row j.   rate: `limit_rate`."""
-    work.reach_rate[j] = work.bound_gap[k] + rate
-    work.reach_impulse[j] = work.bound[k, Bound.IMPULSE]
+    data.reach_rate[j] = data.bound_gap[k] + rate
+    data.reach_impulse[j] = data.bound[k, Bound.IMPULSE]
 
 
 @kernel
-def limit_rate(model: Model, work: Work, h: float, k: int) -> float:
+def limit_rate(model: Model, data: Data, h: float, k: int) -> float:
     """d(gap) of limit k of one coordinate, by the last solve."""
-    return h * model.limit_sign[k] * work.dnu[model.limit_dof[k]]
+    return h * model.limit_sign[k] * data.dnu[model.limit_dof[k]]
 
 
 @kernel
-def choose(model: Model, work: Work, h: float, kappa: float) -> tuple[int, int]:
+def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
     """Contacts and limits that may touch, into reach_of, with w and l; and their number: (contacts, rows). The others
     get the impulses of their gaps.
 
     After a solve. (0, -1) when there are more of them than places.
     """
-    most = work.reach_of.shape[0]
+    most = data.reach_of.shape[0]
     n = 0
-    for m in range(work.active_ground_count[0]):
-        c = work.active[m]
-        contact_jacobian(model, work, h, c)
-        rate = contact_rate(model, work, c)
-        gap = work.contact_kin[c, Kin.GAP]
-        z = work.cone[c]
+    for m in range(data.active_ground_count[0]):
+        c = data.active[m]
+        contact_jacobian(model, data, h, c)
+        rate = contact_rate(model, data, c)
+        gap = data.contact_kin[c, Kin.GAP]
+        z = data.cone[c]
         if _may_touch(gap, rate[0], z[Cone.SLACK], z[Cone.IMPULSE], kappa):
             if n + 3 > most:
                 return 0, -1
-            work.reach_of[n] = c
-            work.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == Law.NONLINEAR else 0.0
-            _take_contact(work, n, c, rate)
+            data.reach_of[n] = c
+            data.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == Law.NONLINEAR else 0.0
+            _take_contact(data, n, c, rate)
             n += 3
         else:
             z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = kappa / (gap + rate[0]), 0.0, 0.0
@@ -101,83 +101,85 @@ def choose(model: Model, work: Work, h: float, kappa: float) -> tuple[int, int]:
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
             continue
-        change = limit_rate(model, work, h, k)
-        gap = work.bound_gap[k]
-        if _may_touch(gap, change, work.bound[k, Bound.SLACK], work.bound[k, Bound.IMPULSE], kappa):
+        change = limit_rate(model, data, h, k)
+        gap = data.bound_gap[k]
+        if _may_touch(gap, change, data.bound[k, Bound.SLACK], data.bound[k, Bound.IMPULSE], kappa):
             if n + 1 > most:
                 return 0, -1
-            work.reach_of[n] = k
-            _take_limit(work, n, k, change)
+            data.reach_of[n] = k
+            _take_limit(data, n, k, change)
             n += 1
         else:
-            work.bound[k, Bound.IMPULSE] = kappa / (gap + change)
+            data.bound[k, Bound.IMPULSE] = kappa / (gap + change)
     return points, n
 
 
 @kernel
-def rates(model: Model, work: Work, h: float, points: int, size: int) -> None:
+def rates(model: Model, data: Data, h: float, points: int, size: int) -> None:
     """w and l of the contacts and limits chosen, after the last solve."""
     for j in range(0, 3 * points, 3):
-        _take_contact(work, j, work.reach_of[j], contact_rate(model, work, work.reach_of[j]))
+        _take_contact(data, j, data.reach_of[j], contact_rate(model, data, data.reach_of[j]))
     for j in range(3 * points, size):
-        _take_limit(work, j, work.reach_of[j], limit_rate(model, work, h, work.reach_of[j]))
+        _take_limit(data, j, data.reach_of[j], limit_rate(model, data, h, data.reach_of[j]))
 
 
 @kernel
-def impulses(model: Model, work: Work, h: float, kappa: float, points: int, size: int) -> bool:
+def impulses(model: Model, data: Data, h: float, kappa: float, points: int, size: int) -> bool:
     """Impulses of the contacts and limits chosen, into cone and bound; whether they have settled."""
-    l = work.reach_impulse
-    settled = gauss_seidel(work.delassus, work.reach_friction, h, kappa, points, size, work.reach_rate, l)
+    l = data.reach_impulse
+    settled = gauss_seidel(data.delassus, data.reach_friction, h, kappa, points, size, data.reach_rate, l)
     for j in range(0, 3 * points, 3):
-        z = work.cone[work.reach_of[j]]
+        z = data.cone[data.reach_of[j]]
         z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = l[j], l[j + 1], l[j + 2]
     for j in range(3 * points, size):
-        work.bound[work.reach_of[j], Bound.IMPULSE] = l[j]
+        data.bound[data.reach_of[j], Bound.IMPULSE] = l[j]
     return settled
 
 
 @kernel
-def descend(model: Model, work: Work) -> None:
+def descend(model: Model, data: Data) -> None:
     """dnu = -H^-1 R"""
-    for d in range(work.dnu.shape[0]):
-        work.dnu[d] = -work.residual[d]
-    solve(model, work, work.dnu, work.dnu)
+    for d in range(data.dnu.shape[0]):
+        data.dnu[d] = -data.residual[d]
+    solve(model, data, data.dnu, data.dnu)
 
 
 @kernel
-def predict(model: Model, work: Work, options: Options, inputs: tuple[Vector, Vector, Vector]) -> tuple[float, float]:
+def predict(
+    model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector]
+) -> tuple[float, float]:
     """nu = v25 as it is predicted and the impulses, on the central path; returns their residuals, INFEASIBLE where that
     fails.
 
-    At nu with the impulses of the step before, whose residual is in work.residual.
+    At nu with the impulses of the step before, whose residual is in data.residual.
     """
     q, v, u = inputs
     h, kappa = options.h, options.kappa
-    scale = residual_scale(work)
-    if not factor_free(model, work, h, q, v):
+    scale = residual_scale(data)
+    if not factor_free(model, data, h, q, v):
         return INFEASIBLE
-    descend(model, work)
-    points, size = choose(model, work, h, kappa)
+    descend(model, data)
+    points, size = choose(model, data, h, kappa)
     if size < 0:
         return INFEASIBLE
-    delassus(model, work, h, points, size)
+    delassus(model, data, h, points, size)
     settled = True
     step = 1
     while True:
         if size > 0:
-            settled = impulses(model, work, h, kappa, points, size)
-            residuals(model, work, h, q, v, u)
-            descend(model, work)
+            settled = impulses(model, data, h, kappa, points, size)
+            residuals(model, data, h, q, v, u)
+            descend(model, data)
         for d in range(v.shape[0]):
-            work.dnu[d] += work.nu[d]
-        if not set_trial_velocity(model, work, h, q, work.dnu, 1.0):
+            data.dnu[d] += data.nu[d]
+        if not set_trial_velocity(model, data, h, q, data.dnu, 1.0):
             return INFEASIBLE
-        resume_inequalities(model, work, h, kappa, True)
-        balance = residuals(model, work, h, q, v, u)
+        resume_inequalities(model, data, h, kappa, True)
+        balance = residuals(model, data, h, q, v, u)
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
             return balance
         step += 1
         for j in range(0, 3 * points, 3):
-            contact_jacobian(model, work, h, work.reach_of[j])
-        descend(model, work)
-        rates(model, work, h, points, size)
+            contact_jacobian(model, data, h, data.reach_of[j])
+        descend(model, data)
+        rates(model, data, h, points, size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.dynamics.elimination import project, subtree_sums
 from sim.dynamics.joints.terms import joint_impulses
 from sim.dynamics.loops.gears import apply_gears
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import cross
@@ -13,22 +13,22 @@ from solvers.types import Vector
 
 
 @kernel
-def residual_scale(work: Work) -> float:
+def residual_scale(data: Data) -> float:
     """1 + largest incoming momentum: rounding grows with it, and so does the tolerance."""
     s = 1.0
-    for i in range(work.momentum_in.shape[0]):
+    for i in range(data.momentum_in.shape[0]):
         for k in range(6):
-            s = max(s, 1.0 + abs(work.momentum_in[i, k]))
+            s = max(s, 1.0 + abs(data.momentum_in[i, k]))
     return s
 
 
 @kernel
-def rounding(model: Model, work: Work, h: float) -> float:
+def rounding(model: Model, data: Data, h: float) -> float:
     """Residual that cannot be told from zero where it contains differences of rounded poses, divided by h."""
     total = 0.0
-    o = abs(work.origin[0]) + abs(work.origin[1]) + abs(work.origin[2])
+    o = abs(data.origin[0]) + abs(data.origin[1]) + abs(data.origin[2])
     for i in range(model.body_parent.shape[0]):
-        x = abs(work.pos2[i, 0]) + abs(work.pos2[i, 1]) + abs(work.pos2[i, 2])
+        x = abs(data.pos2[i, 0]) + abs(data.pos2[i, 1]) + abs(data.pos2[i, 2])
         J = model.body_inertia[i]
         total += model.body_mass[i] * x * (1.0 + x + o) + J[0] + J[4] + J[8]
     return 1e-15 * total / abs(h)
@@ -46,14 +46,14 @@ def norm(x: Vector) -> float:
 
 
 @kernel
-def absorb_residual(model: Model, work: Work) -> None:
+def absorb_residual(model: Model, data: Data) -> None:
     """momentum_out less the residual r of the joints: a motion hands on the momenta that its steps should have left, so
     that the tolerance of the solve does not add up.
 
     Each joint takes (f, m) = (sum r_k t_k, sum r_k a_k) at its point o from its body, and gives it to the parent: about
     the centre of mass x, (f, m + (o - x) x f). The total changes by the residual of joints on the world alone.
     """
-    P = work.momentum_out
+    P = data.momentum_out
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 2:  # the axes of a swing are not orthogonal
             continue
@@ -61,18 +61,18 @@ def absorb_residual(model: Model, work: Work) -> None:
         first = model.body_vadr[i] + model.joint_ntrans[i]
         for d in range(first, model.body_vadr[i + 1]):
             for k in range(3):
-                m = work.residual[d] * work.S2[d, 3 + k]
+                m = data.residual[d] * data.S2[d, 3 + k]
                 P[i, 3 + k] -= m
                 if p >= 0:
                     P[p, 3 + k] += m
         for d in range(model.body_vadr[i], first):
-            r = work.residual[d]
-            s = work.S2[d]
-            a = work.arm[i]
+            r = data.residual[d]
+            s = data.S2[d]
+            a = data.arm[i]
             x, y, z = cross(a[3], a[4], a[5], r * s[0], r * s[1], r * s[2])
             _add(P[i], -r, s, -x, -y, -z)
             if p >= 0:
-                o, c = work.pos2[i], work.pos2[p]
+                o, c = data.pos2[i], data.pos2[p]
                 x, y, z = a[3] + o[0] - c[0], a[4] + o[1] - c[1], a[5] + o[2] - c[2]
                 x, y, z = cross(x, y, z, r * s[0], r * s[1], r * s[2])
                 _add(P[p], r, s, x, y, z)
@@ -86,17 +86,17 @@ def _add(P: Vector, r: float, s: Vector, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def balance_to_wrench(work: Work) -> None:
+def balance_to_wrench(data: Data) -> None:
     """wrench = balance: what forces are then added to."""
-    for i in range(work.balance.shape[0]):
+    for i in range(data.balance.shape[0]):
         for k in range(6):
-            work.wrench[i, k] = work.balance[i, k]
+            data.wrench[i, k] = data.balance[i, k]
 
 
 @kernel
-def project_wrench(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> float:
+def project_wrench(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> float:
     """residual = S2^T (subtree sums of wrench) + springs, dampers, inputs, gears; returns the gap of the gears."""
-    subtree_sums(model, work.wrench, work.subtree)
-    project(model, work.S2, work.subtree, work.residual)
-    joint_impulses(model, work, h, q, v, u)
-    return apply_gears(model, work, h)
+    subtree_sums(model, data.wrench, data.subtree)
+    project(model, data.S2, data.subtree, data.residual)
+    joint_impulses(model, data, h, q, v, u)
+    return apply_gears(model, data, h)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from sim.dynamics.displacements import turn_bodies
 from sim.dynamics.momentum_balance import momentum_balance
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Options
+from sim.model.options import StepOptions
 from sim.solve.inequalities import inequality_kinematics, keep_inequalities, move_inequalities, return_inequalities
 from sim.solve.merit import Merit, judge, residuals
 from solvers.compiler import inlined, kernel
@@ -18,19 +18,19 @@ _HALVINGS = 12
 
 
 @kernel
-def largest_turn(work: Work) -> float:
+def largest_turn(data: Data) -> float:
     """Largest component of the rotation of any body by the Newton step [rad]."""
     turn = 1e-300
-    for i in range(work.twist.shape[0]):
-        turn = max(turn, abs(work.twist[i, 3]), abs(work.twist[i, 4]), abs(work.twist[i, 5]))
+    for i in range(data.twist.shape[0]):
+        turn = max(turn, abs(data.twist[i, 3]), abs(data.twist[i, 4]), abs(data.twist[i, 5]))
     return turn
 
 
 @inlined
 def search(
     model: Model,
-    work: Work,
-    options: Options,
+    data: Data,
+    options: StepOptions,
     inputs: tuple[Vector, Vector, Vector],
     scale: float,
     smoothing: float,
@@ -48,21 +48,21 @@ def search(
     h = options.h
     whole = boundary < _WHOLE
     nearly = 0.99 if max(last.residual, last.violation) > 0.1 else 0.9999
-    alpha = min(nearly if whole else min(1.0, nearly * boundary), _TURN / largest_turn(work))
+    alpha = min(nearly if whole else min(1.0, nearly * boundary), _TURN / largest_turn(data))
     for d in range(v.shape[0]):
-        work.nu_trial[d] = work.nu[d]
-    keep_inequalities(model, work)
+        data.nu_trial[d] = data.nu[d]
+    keep_inequalities(model, data)
     now = last
     for halvings in range(_HALVINGS + 1):
         for d in range(v.shape[0]):
-            work.nu[d] = work.nu_trial[d] + alpha * work.dnu[d]
-        inside = momentum_balance(model, work, h, q)
-        turn_bodies(work, work.rot3)
-        inequality_kinematics(model, work, h)
-        move_inequalities(model, work, alpha)
+            data.nu[d] = data.nu_trial[d] + alpha * data.dnu[d]
+        inside = momentum_balance(model, data, h, q)
+        turn_bodies(data, data.rot3)
+        inequality_kinematics(model, data, h)
+        move_inequalities(model, data, alpha)
         if whole:
-            return_inequalities(model, work, h, max(options.kappa, last.mean))
-        now = judge(model, work, options.kappa, scale, smoothing, residuals(model, work, h, q, v, u))
+            return_inequalities(model, data, h, max(options.kappa, last.mean))
+        now = judge(model, data, options.kappa, scale, smoothing, residuals(model, data, h, q, v, u))
         if inside and now.residual <= max(last.residual, options.tolerance, 0.1 * now.mean**0.5):
             return now, halvings
         fits = now.violation <= last.violation and last.violation > options.kappa

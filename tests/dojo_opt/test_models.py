@@ -13,7 +13,7 @@ from dojo_opt.plots import thumbnail
 from sim.dynamics.kinematics import tree_poses
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
-from sim.model.layout import allocate_work, model_view, sizes_of, table, work_view
+from sim.model.layout import allocate_data, data_view, model_view, sizes_of, table
 from solvers.compiler import Table, kernel
 from solvers.types import Vector
 
@@ -69,15 +69,15 @@ MASSES = {
 
 
 @kernel
-def _poses(model_at: Table, work_at: Table, q: Vector) -> None:
-    w = work_view(work_at)
+def _poses(model_at: Table, data_at: Table, q: Vector) -> None:
+    w = data_view(data_at)
     tree_poses(model_view(model_at), w, q)
 
 
 def poses(mech: Mechanism, q: object = None) -> tuple[np.ndarray, np.ndarray]:
     """Positions and rotation matrices of the bodies."""
     model = pack(mech)
-    w = allocate_work(sizes_of(model))
+    w = allocate_data(sizes_of(model))
     _poses(table(model), table(w), np.array(mech.neutral if q is None else q, dtype=np.float64))
     return w.pos2, w.rot2.reshape(-1, 3, 3)
 

@@ -12,7 +12,7 @@ from sim.dynamics.coordinates_jacobian import maximal_jacobian_at, minimal_jacob
 from sim.dynamics.state import integrate_states, state_differences
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
-from sim.model.layout import allocate_work, sizes_of, table
+from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
 
 Floats = NDArray[np.float64]
@@ -27,20 +27,20 @@ class Maps:
         self.model = pack(mech)
         link_poses(self.model)
         self.model_at = table(self.model)
-        self.work = allocate_work(sizes_of(self.model))
+        self.work = allocate_data(sizes_of(self.model))
         for array in self.work:
             array[...] = np.nan if array.dtype.kind == "f" else -(2**62)
-        self.work_at = table(self.work)
+        self.data_at = table(self.work)
         self.nx, self.ndx = mech.nq + mech.nv, 2 * mech.nv
 
     def maximal(self, x: Floats) -> Floats:
         out = np.full((self.mech.nbody, 13), np.nan)
-        maximal_states(self.model_at, self.work_at, H, x[None], out)
+        maximal_states(self.model_at, self.data_at, H, x[None], out)
         return out
 
     def minimal(self, z: Floats) -> Floats:
         out = np.full((1, self.nx), np.nan)
-        minimal_states(self.model_at, self.work_at, H, z, out)
+        minimal_states(self.model_at, self.data_at, H, z, out)
         return out[0]
 
     def integrate(self, x: Floats, dx: Floats) -> Floats:
@@ -123,7 +123,7 @@ def test_velocities_are_those_of_the_interval(kind: str, on_world: bool) -> None
 def test_jacobian_of_maximal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     J = np.full((12 * maps.mech.nbody, maps.ndx), np.nan)
-    maximal_jacobian_at(maps.model_at, maps.work_at, H, x, J)
+    maximal_jacobian_at(maps.model_at, maps.data_at, H, x, J)
     z, e = maps.maximal(x), 1e-6
     for k, d in enumerate(np.eye(maps.ndx)):
         plus, minus = (apart(z, maps.maximal(maps.integrate(x, s * e * d))) for s in (1, -1))
@@ -137,7 +137,7 @@ def test_jacobian_of_minimal(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     J = np.full((maps.ndx, 12 * maps.mech.nbody), np.nan)
     z, e = maps.maximal(x), 1e-6
-    minimal_jacobian_at(maps.model_at, maps.work_at, H, z, J)
+    minimal_jacobian_at(maps.model_at, maps.data_at, H, z, J)
     for k, d in enumerate(np.eye(12 * maps.mech.nbody)):
         plus, minus = (maps.difference(x, maps.minimal(move(z, s * e * d))) for s in (1, -1))
         # off the joints too: the map takes the part along the free directions
@@ -151,8 +151,8 @@ def test_jacobians_are_inverse(kind: str, on_world: bool) -> None:
     maps, x = setup(kind, on_world)
     forward = np.empty((12 * maps.mech.nbody, maps.ndx))
     back = np.empty((maps.ndx, 12 * maps.mech.nbody))
-    maximal_jacobian_at(maps.model_at, maps.work_at, H, x, forward)
-    minimal_jacobian_at(maps.model_at, maps.work_at, H, maps.maximal(x), back)
+    maximal_jacobian_at(maps.model_at, maps.data_at, H, x, forward)
+    minimal_jacobian_at(maps.model_at, maps.data_at, H, maps.maximal(x), back)
     np.testing.assert_allclose(back @ forward, np.eye(maps.ndx), atol=1e-10)
 
 

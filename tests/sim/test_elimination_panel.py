@@ -6,15 +6,15 @@ import pytest
 import dojo_opt as dojo
 from sim.dynamics.elimination import solve
 from sim.dynamics.elimination_panel import column_count, solve_panel
-from sim.model.layout import model_view, work_view
+from sim.model.layout import data_view, model_view
 from sim.model.slots import Slot
 from solvers.compiler import local_kernel
 
 
 @local_kernel
-def both_ways(model_at, work_at, columns, by_one):
+def both_ways(model_at, data_at, columns, by_one):
     """columns solved by `solve_panel`; by_one: by `solve`, a column at a time.   Returns their number."""
-    model, work = model_view(model_at), work_view(work_at)
+    model, work = model_view(model_at), data_view(data_at)
     count = column_count(model, work)
     for m in range(count):
         for d in range(work.rhs.shape[0]):
@@ -42,14 +42,14 @@ def both_ways(model_at, work_at, columns, by_one):
 def test_columns_are_solved_as_one_by_one(build, deep, rng):
     sim = dojo.Simulator(build(), time_step=0.01)
     sim.linearize(sim.neutral(), rng.normal(size=sim.nu))  # leaves factors
-    model_at, work_at = sim._engine.tables()
+    model_at, data_at = sim._engine.tables()
     bound = sim.model.optional[Slot.SOLVE_DEEP_PANEL]
     assert (bound != 0) == deep
-    columns = rng.normal(size=work_view(work_at).columns.shape)
+    columns = rng.normal(size=data_view(data_at).columns.shape)
     for address in {bound, 0}:
         sim.model.optional[Slot.SOLVE_DEEP_PANEL] = address
         ours, by_one = columns.copy(), np.zeros_like(columns)
-        count = both_ways(model_at, work_at, ours, by_one)
+        count = both_ways(model_at, data_at, ours, by_one)
         assert count == 2 * sim.nv + sim.nu
         scale = np.abs(by_one[:, :count]).max()
         np.testing.assert_allclose(ours[:, :count], by_one[:, :count], rtol=0.0, atol=1e-11 * scale)

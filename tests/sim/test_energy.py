@@ -13,7 +13,7 @@ from sim.dynamics.energy import energies, momenta
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
 from sim.mechanism.shapes import rotation_matrix
-from sim.model.layout import allocate_work, sizes_of, table
+from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
 
 Floats = NDArray[np.float64]
@@ -23,15 +23,15 @@ def measure(mech: Mechanism, q: Floats, v: Floats, h: float) -> tuple[Floats, Fl
     """(kinetic, potential), momentum, maximal state."""
     model = pack(mech)
     link_poses(model)
-    work = allocate_work(sizes_of(model))
+    work = allocate_data(sizes_of(model))
     for array in work:
         array[...] = np.nan if array.dtype.kind == "f" else 0
-    model_at, work_at = table(model), table(work)
+    model_at, data_at = table(model), table(work)
     x = np.concatenate([q, v])[None]
     e, p, z = np.empty((1, 2)), np.empty((1, 6)), np.empty((mech.nbody, 13))
-    energies(model_at, work_at, h, x, e)
-    momenta(model_at, work_at, h, x, p)
-    maximal_states(model_at, work_at, h, x, z)
+    energies(model_at, data_at, h, x, e)
+    momenta(model_at, data_at, h, x, p)
+    maximal_states(model_at, data_at, h, x, z)
     return e[0], p[0], z
 
 

@@ -7,26 +7,26 @@ from naive import rotation as rot
 from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
-from sim.model.layout import model_view, work_view
+from sim.model.layout import data_view, model_view
 from sim.simulator.link import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
 from solvers.compiler import local_kernel
 
 
 @local_kernel
-def joints_work(model_at, work_at, h, v):
+def joints_work(model_at, data_at, h, v):
     """What the last step of this thread left."""
-    return constraint_work(model_view(model_at), work_view(work_at), h, v)
+    return constraint_work(model_view(model_at), data_view(data_at), h, v)
 
 
 @local_kernel
-def arriving(model_at, work_at, h, v, third):
-    return arriving_energy(model_view(model_at), work_view(work_at), h, v, third)
+def arriving(model_at, data_at, h, v, third):
+    return arriving_energy(model_view(model_at), data_view(data_at), h, v, third)
 
 
 @local_kernel
-def given(model_at, work_at, h, v, u):
-    return work_at_node(model_view(model_at), work_view(work_at), h, v, u)
+def given(model_at, data_at, h, v, u):
+    return work_at_node(model_view(model_at), data_view(data_at), h, v, u)
 
 
 def tables(sim):

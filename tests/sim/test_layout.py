@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 
 from sim.integrators.rollout import begin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.layout import (
     CARRY,
+    DATA_FIELDS,
+    DATA_INTS,
     MODEL_FIELDS,
     MODEL_INTS,
-    WORK_FIELDS,
-    WORK_INTS,
     Sizes,
+    allocate_data,
     allocate_model,
-    allocate_work,
+    data_view,
     model_view,
     sizes_of,
     table,
-    work_view,
 )
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
@@ -42,7 +42,7 @@ def declared_shapes(cls: type) -> dict[str, list[str] | None]:
     return shapes
 
 
-@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Data, DATA_FIELDS)])
 def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
     stated = declared_shapes(cls)
     assert set(table) == set(stated)
@@ -51,17 +51,17 @@ def test_table_matches_declaration(cls: type, table: dict[str, tuple[int | str, 
         assert written is None or written == [str(n).replace("nx", "nq+nv") for n in shape], name
 
 
-@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Work, WORK_FIELDS)])
+@pytest.mark.parametrize(("cls", "table"), [(Model, MODEL_FIELDS), (Data, DATA_FIELDS)])
 def test_kind_matches_annotation(cls: type, table: dict[str, tuple[int | str, ...]]) -> None:
     kinds = {(True, 1): "Integers", (True, 2): "IntegerMatrix", (False, 1): "Vector", (False, 2): "Matrix"}
     for name, shape in table.items():
-        integer = name in MODEL_INTS or name in WORK_INTS
+        integer = name in MODEL_INTS or name in DATA_INTS
         assert cls.__annotations__[name].__forward_arg__ == kinds[integer, len(shape)], name
 
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])
 def test_fields_do_not_overlap(sizes: Sizes) -> None:
-    model, work = allocate_model(sizes), allocate_work(sizes)
+    model, work = allocate_model(sizes), allocate_data(sizes)
     assert sizes_of(allocate_model(sizes))._replace(nq=sizes.nq) == sizes
     for record in (model, work):
         for name, value in zip(record._fields, record, strict=True):
@@ -85,8 +85,8 @@ def _mark_model(model_at: Table) -> None:
 
 
 @kernel
-def _mark_work(work_at: Table) -> int:
-    w = work_view(work_at)
+def _mark_work(data_at: Table) -> int:
+    w = data_view(data_at)
     for i in range(w.pos3.shape[0]):
         w.pos3[i, 2] = 5.0 + i
     for r in range(w.panel.shape[0]):
@@ -104,7 +104,7 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
     np.testing.assert_array_equal(model.dof_rest, -1.0 - np.arange(sizes.nv))
     assert model.contact_law.tolist() == [2] * sizes.ncontact and model.gravity[2] == -9.81
 
-    work = allocate_work(sizes)
+    work = allocate_data(sizes)
     assert _mark_work(table(work)) == 1000 * work.columns.shape[1] + sizes.nbody
     np.testing.assert_array_equal(work.pos3[:, 2], 5.0 + np.arange(sizes.nbody))
     np.testing.assert_array_equal(
@@ -114,22 +114,22 @@ def test_compiled_views_agree_with_python(sizes: Sizes) -> None:
 
 @pytest.mark.parametrize("sizes", [ALL, BARE])
 def test_python_reads_the_same_arrays(sizes: Sizes) -> None:
-    work = allocate_work(sizes)
+    work = allocate_data(sizes)
     for k, array in enumerate(work):
         array[...] = k
-    seen = work_view(table(work))
+    seen = data_view(table(work))
     for mine, theirs in zip(work, seen, strict=True):
         assert theirs.shape == mine.shape and theirs.dtype == mine.dtype
         np.testing.assert_array_equal(theirs, mine)
 
 
 @kernel
-def _begin(work_at: Table) -> None:
-    begin(work_view(work_at))
+def _begin(data_at: Table) -> None:
+    begin(data_view(data_at))
 
 
 def test_a_motion_begins_without_the_state_of_the_one_before() -> None:
-    work = allocate_work(ALL._replace(nrow=3))
+    work = allocate_data(ALL._replace(nrow=3))
     for array in work:
         array[...] = 7
     _begin(table(work))

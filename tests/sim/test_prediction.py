@@ -6,7 +6,7 @@ import pytest
 import dojo_opt as dojo
 from sim.contact.ground_contact import add_contact_wrench, contact_rate
 from sim.dynamics.elimination import solve, subtree_sums
-from sim.model.layout import model_view, work_view
+from sim.model.layout import data_view, model_view
 from sim.simulator.link import link_step
 from sim.solve.delassus import delassus
 from solvers.compiler import local_kernel
@@ -15,9 +15,9 @@ FEET = 4
 
 
 @local_kernel
-def both_ways(model_at, work_at, h, points, size, by_solves):
+def both_ways(model_at, data_at, h, points, size, by_solves):
     """work.delassus by the joints above two contacts or limits, and by whole solves."""
-    model, work = model_view(model_at), work_view(work_at)
+    model, work = model_view(model_at), data_view(data_at)
     for b in range(size):
         if b < 3 * points:
             for i in range(work.wrench.shape[0]):
@@ -50,14 +50,14 @@ def test_the_delassus_matrix_is_that_of_whole_solves():
     sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.01)
     us = np.random.default_rng(0).uniform(-5.0, 5.0, (3, sim.nu))
     sim.rollout(sim.neutral(), us, throw=True)  # leaves factors and Jacobians of a step
-    model_at, work_at = sim._engine.tables(link_step)
-    work = work_view(work_at)
+    model_at, data_at = sim._engine.tables(link_step)
+    work = data_view(data_at)
     stops = [0, 3, 9]
     size = 3 * FEET + len(stops)
     work.reach_of[: 3 * FEET : 3] = range(FEET)
     work.reach_of[3 * FEET : size] = stops
     by_solves = np.zeros((size, size))
-    both_ways(model_at, work_at, sim.time_step, FEET, size, by_solves)
+    both_ways(model_at, data_at, sim.time_step, FEET, size, by_solves)
     ours = work.delassus[:size, :size].T
     np.testing.assert_allclose(ours, by_solves, atol=1e-11 * np.abs(by_solves).max())
     assert np.abs(ours[:3, 3:6]).max() > 1e-3 * np.abs(ours).max()  # feet feel each other

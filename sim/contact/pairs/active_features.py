@@ -35,7 +35,7 @@ from sim.contact.pairs.previous_features import (
     rounding_of_rims,
 )
 from sim.model.columns import Cone, RelativePose, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice, Verdict
 from sim.model.slots import Slot
@@ -46,28 +46,28 @@ _LAST_RESORT = 1e-2  # the same, where elements are chosen at every pose, and wh
 
 
 @kernel
-def open_pairs(model: Model, work: Work, j: int) -> float:
+def open_pairs(model: Model, data: Data, j: int) -> float:
     """Where a collision begins: pair_before, the pose at configuration 2 now in pair_relative, and pair_sides, the axes
     that separate the shapes; returns their distance.
     """
     for k in range(12):
-        work.pair_before[j, k] = work.pair_relative[j, k]
-    pose = work.pair_before[j]
-    work.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP])
-    apart = distance(model, work, j)
-    work.pair_before[j, RelativePose.GAP] = min(apart, 0.0) - overlap_before(model, j)
+        data.pair_before[j, k] = data.pair_relative[j, k]
+    pose = data.pair_before[j]
+    data.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP])
+    apart = distance(model, data, j)
+    data.pair_before[j, RelativePose.GAP] = min(apart, 0.0) - overlap_before(model, j)
     return apart
 
 
 @kernel
-def distance(model: Model, work: Work, first: int) -> float:
+def distance(model: Model, data: Data, first: int) -> float:
     """Distance of the shapes of a collision at pair_relative, whatever elements are chosen."""
     kind = model.pair_kind[first]
     if on_cylinder(kind):
-        return cylinder_distance(model, work, first)
-    pose = work.pair_relative[first]
+        return cylinder_distance(model, data, first)
+    pose = data.pair_relative[first]
     faces = arrange(kind, model.pair_sizes[first], model.hull, pose[:9], pose[9:], OPEN)
-    g = work.pair_trial[0]
+    g = data.pair_trial[0]
     least = 1e300
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
@@ -78,71 +78,71 @@ def distance(model: Model, work: Work, first: int) -> float:
 
 
 @kernel
-def choose_shapes(model: Model, work: Work, first: int) -> None:
+def choose_shapes(model: Model, data: Data, first: int) -> None:
     """pair_code, pair_out: the elements of all points of a collision, chosen at pair_relative."""
     kind = model.pair_kind[first]
-    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
-        remember(model, work, first)
+    if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
+        remember(model, data, first)
     if on_cylinder(kind):
-        choose_cylinders(model, work, first)
+        choose_cylinders(model, data, first)
         return
-    pose = work.pair_relative[first]
-    before = work.pair_before[first]
-    faces = arrange(kind, model.pair_sizes[first], model.hull, pose[:9], pose[9:], work.pair_sides[first])
-    g = work.pair_trial[0]
+    pose = data.pair_relative[first]
+    before = data.pair_before[first]
+    faces = arrange(kind, model.pair_sizes[first], model.hull, pose[:9], pose[9:], data.pair_sides[first])
+    g = data.pair_trial[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         sizes = model.pair_sizes[j]
-        code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
+        code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], data.pair_out[j])
         if code > 1 or code < 0:  # a choice
             collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
             if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
-                work, kind, work.pair_out[j], pose, before, before[RelativePose.GAP]
+                data, kind, data.pair_out[j], pose, before, before[RelativePose.GAP]
             ):
                 code = instead(kind, j - first, sizes, model.hull, before[:9], before[9 : RelativePose.GAP])
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
                 code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
-                collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], work.pair_out[j])
-        work.pair_code[j] = code
+                collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], data.pair_out[j])
+        data.pair_code[j] = code
         j += 1
-    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
-        keep(model, work, first)
+    if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
+        keep(model, data, first)
         for k in range(first, j):
             sizes = model.pair_sizes[k]
-            collide_chosen(kind, k - first, work.pair_code[k], sizes, model.hull, pose[:9], pose[9:], work.pair_out[k])
+            collide_chosen(kind, k - first, data.pair_code[k], sizes, model.hull, pose[:9], pose[9:], data.pair_out[k])
 
 
 @optional(Slot.CHOOSE_PAIRS)
-def choose_pairs(model: Model, work: Work) -> None:
+def choose_pairs(model: Model, data: Data) -> None:
     """`choose_shapes` of the active collisions, at configuration 3."""
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
-            place_shapes(model, work, j, work.pos3, work.rot3)
-            choose_shapes(model, work, j)
+        if model.pair_feature[j] == 0 and data.pair_activation[j] == 0.0:
+            place_shapes(model, data, j, data.pos3, data.rot3)
+            choose_shapes(model, data, j)
 
 
 @kernel
-def passed_through(model: Model, work: Work, first: int) -> bool:
+def passed_through(model: Model, data: Data, first: int) -> bool:
     """Whether a point of a collision presses at configuration 3 though its elements, as they are there, have moved
     apart since the step began: beyond a line or a corner, whose distance has no sign, or far from where they were
     chosen.
     """
     kind = model.pair_kind[first]
-    before = work.pair_before[first]
-    g = work.pair_trial[0]
+    before = data.pair_before[first]
+    g = data.pair_trial[0]
     close = NEAR * least_size(model, first)
     least = before[RelativePose.GAP] - _LAST_RESORT * least_size(model, first)
     ground = model.contact_height.shape[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        code = work.pair_code[j]
-        if code != 0 and work.cone[ground + j, Cone.SLACK] < close:
+        code = data.pair_code[j]
+        if code != 0 and data.cone[ground + j, Cone.SLACK] < close:
             if on_cylinder(kind):
-                cylinder_before(model, work, first, j)
+                cylinder_before(model, data, first, j)
             else:
                 sizes = model.pair_sizes[first]
                 collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
-            now = work.pair_out[j]
+            now = data.pair_out[j]
             turned = (
                 now[Witness.NORMAL] * g[Witness.NORMAL]
                 + now[Witness.NORMAL + 1] * g[Witness.NORMAL + 1]
@@ -150,28 +150,28 @@ def passed_through(model: Model, work: Work, first: int) -> bool:
                 < 0.0
             )
             doubtful = turned or g[Witness.GAP] < least
-            if doubtful and left_behind(work, kind, now, work.pair_relative[first], before, least):
+            if doubtful and left_behind(data, kind, now, data.pair_relative[first], before, least):
                 return True
         j += 1
     return False
 
 
 @optional(Slot.OVERLAPPING, default=Verdict.VALID)
-def overlapping(model: Model, work: Work) -> int:
+def overlapping(model: Model, data: Data) -> int:
     """The Verdict on the solution at configuration 3: OVERLAPPING in features that were not active, TUNNELLED where a
     point has passed through the other shape, or VALID.
     """
     found = Verdict.VALID.value
     for j in range(model.pair_kind.shape[0]):
-        if model.pair_feature[j] == 0 and work.pair_activation[j] == 0.0:
+        if model.pair_feature[j] == 0 and data.pair_activation[j] == 0.0:
             signed = has_no_room(model.pair_kind[j])
-            if signed and work.feature_choice[0] == FeatureChoice.EVERY_POSE:
+            if signed and data.feature_choice[0] == FeatureChoice.EVERY_POSE:
                 continue
-            place_shapes(model, work, j, work.pos3, work.rot3)
-            if not signed and passed_through(model, work, j):
+            place_shapes(model, data, j, data.pos3, data.rot3)
+            if not signed and passed_through(model, data, j):
                 return Verdict.TUNNELLED.value
-            lenient = work.feature_choice[0] == FeatureChoice.EVERY_POSE or work.overlap_allowed[0] == 1
+            lenient = data.feature_choice[0] == FeatureChoice.EVERY_POSE or data.overlap_allowed[0] == 1
             part = _LAST_RESORT if lenient else _OVERLAP
-            if distance(model, work, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
+            if distance(model, data, j) < -part * least_size(model, j) - rounding_of_rims(model, j):
                 found = Verdict.OVERLAPPING.value
     return found

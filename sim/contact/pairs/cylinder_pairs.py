@@ -12,7 +12,7 @@ from sim.contact.collision.cylinders import (
 )
 from sim.contact.pairs.previous_features import keep, last_point, left_behind
 from sim.model.columns import RelativePose, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
 from sim.model.shape_kinds import SWAPPED, Pair
@@ -27,80 +27,80 @@ def on_cylinder(kind: int) -> bool:
 
 
 @optional(Slot.CYLINDER_DISTANCE, default=0.0)
-def cylinder_distance(model: Model, work: Work, first: int) -> float:
+def cylinder_distance(model: Model, data: Data, first: int) -> float:
     """Distance of the shapes of a collision at pair_relative."""
-    pose = work.pair_relative[first]
+    pose = data.pair_relative[first]
     return separation_of_cylinder(
         model.pair_kind[first],
         model.pair_sizes[first],
         model.hull,
         pose[:9],
         pose[9:],
-        work.pair_scratch[:12],
-        work.pair_code,
-        work.pair_trial[0],
+        data.pair_scratch[:12],
+        data.pair_code,
+        data.pair_trial[0],
     )
 
 
 @inner_kernel
-def put_all(model: Model, work: Work, first: int) -> None:
+def put_all(model: Model, data: Data, first: int) -> None:
     """pair_out of all points of a collision at pair_relative, with the elements that were chosen."""
-    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
-    turned = work.pair_scratch[:12]
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], data.pair_relative[first]
+    turned = data.pair_scratch[:12]
     for j in range(first, last_point(model, first)):
-        code = work.pair_code[j]
-        collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_out[j])
+        code = data.pair_code[j]
+        collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, data.pair_out[j])
 
 
 @optional(Slot.COLLIDE_CYLINDERS)
-def collide_cylinders(model: Model, work: Work, first: int) -> None:
+def collide_cylinders(model: Model, data: Data, first: int) -> None:
     """`put_all`"""
-    put_all(model, work, first)
+    put_all(model, data, first)
 
 
 @optional(Slot.CHOOSE_CYLINDERS)
-def choose_cylinders(model: Model, work: Work, first: int) -> None:
+def choose_cylinders(model: Model, data: Data, first: int) -> None:
     """pair_code, pair_out: elements of all points of a collision, chosen at pair_relative; none that overlapped when
     the step began; where that leaves a point without, those of the beginning.
     """
-    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], work.pair_relative[first]
-    before, turned, g = work.pair_before[first], work.pair_scratch[:12], work.pair_trial[0]
+    kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], data.pair_relative[first]
+    before, turned, g = data.pair_before[first], data.pair_scratch[:12], data.pair_trial[0]
     R, r = before[:9], before[9 : RelativePose.GAP]
     missing = False
-    choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, work.pair_code, first, g)
+    choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, data.pair_code, first, g)
     for j in range(first, last_point(model, first)):
         k = j - first
-        code = work.pair_code[j]
+        code = data.pair_code[j]
         collide_with_cylinder(kind, k, code, sizes, model.hull, R, r, turned, g)
         lost = g[Witness.GAP] < before[RelativePose.GAP]
         if lost:
             collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
-            lost = left_behind(work, kind, g, pose, before, before[RelativePose.GAP])
+            lost = left_behind(data, kind, g, pose, before, before[RelativePose.GAP])
         if lost:
-            work.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
-            collide_with_cylinder(kind, k, work.pair_code[j], sizes, model.hull, R, r, turned, g)
+            data.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
+            collide_with_cylinder(kind, k, data.pair_code[j], sizes, model.hull, R, r, turned, g)
             if g[Witness.GAP] < before[RelativePose.GAP]:
-                work.pair_code[j] = 0
-            missing = missing or work.pair_code[j] == 0
+                data.pair_code[j] = 0
+            missing = missing or data.pair_code[j] == 0
     if missing:
-        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, work.pair_code, first, g)
-    if work.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
-        keep(model, work, first)
-    put_all(model, work, first)
+        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, data.pair_code, first, g)
+    if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
+        keep(model, data, first)
+    put_all(model, data, first)
 
 
 @optional(Slot.CYLINDER_BEFORE)
-def cylinder_before(model: Model, work: Work, first: int, j: int) -> None:
+def cylinder_before(model: Model, data: Data, first: int, j: int) -> None:
     """pair_trial: the elements of point j where the step began."""
-    before = work.pair_before[first]
+    before = data.pair_before[first]
     collide_with_cylinder(
         model.pair_kind[first],
         j - first,
-        work.pair_code[j],
+        data.pair_code[j],
         model.pair_sizes[first],
         model.hull,
         before[:9],
         before[9 : RelativePose.GAP],
-        work.pair_scratch[:12],
-        work.pair_trial[0],
+        data.pair_scratch[:12],
+        data.pair_trial[0],
     )

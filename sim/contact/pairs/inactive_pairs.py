@@ -26,9 +26,9 @@ from sim.contact.pairs.pair_contact import add_pair_wrench, is_absent, point_kin
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.dynamics.displacements import third_quaternion
 from sim.model.columns import PairBound, RelativePose, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Options
+from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 
@@ -36,63 +36,63 @@ COUPLED = 1e-2  # largest sum of e over the inactive collisions of a body
 
 
 @optional(Slot.ENLIST_PAIRS)
-def enlist_pairs(model: Model, work: Work) -> None:
+def enlist_pairs(model: Model, data: Data) -> None:
     """Append the pairs of active collisions to the active contacts; coupling_live, the bodies that they couple."""
     ground = model.contact_height.shape[0]
-    n = work.active_ground_count[0]
+    n = data.active_ground_count[0]
     for k in range(model.coupling_body.shape[0]):
-        work.coupling_live[k] = 0
+        data.coupling_live[k] = 0
     first = 0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0:
             first = j
-        if work.pair_activation[first] == 0.0:
-            work.coupling_live[model.pair_coupling[first]] = 1
-            work.active[n] = ground + j
+        if data.pair_activation[first] == 0.0:
+            data.coupling_live[model.pair_coupling[first]] = 1
+            data.active[n] = ground + j
             n += 1
-    work.active_count[0] = n
+    data.active_count[0] = n
 
 
 @optional(Slot.BEGIN_PAIRS)
-def begin_pairs(model: Model, work: Work, options: Options) -> None:
+def begin_pairs(model: Model, data: Data, options: StepOptions) -> None:
     """Which collisions are active, and the poses of their shapes at configuration 2, where the step begins."""
     change = 0.0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] > 0:
             continue
-        place_shapes(model, work, j, work.pos2, work.rot2)
-        r = work.pair_relative[j]
-        travel = _travel(model, work, j)
+        place_shapes(model, data, j, data.pos2, data.rot2)
+        r = data.pair_relative[j]
+        travel = _travel(model, data, j)
         apart = (r[9] * r[9] + r[10] * r[10] + r[11] * r[11]) ** 0.5 - model.pair_far[j, PairBound.RADII]
         a = _far_enough(model, options, j, 0.5 * (apart - travel))
         if a == 0.0:
-            a = _far_enough(model, options, j, 0.5 * (open_pairs(model, work, j) - travel))
+            a = _far_enough(model, options, j, 0.5 * (open_pairs(model, data, j) - travel))
         else:
-            work.pair_sides[j] = OPEN
-            work.pair_before[j, RelativePose.GAP] = -1e300
-        work.pair_activation[j] = a
+            data.pair_sides[j] = OPEN
+            data.pair_before[j, RelativePose.GAP] = -1e300
+        data.pair_activation[j] = a
         if a > 0.0:
-            change += _change(model, work, options, j, a)
-    work.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
-    work.pair_evaluated[0] = 0.0
-    work.pair_change[0] = change
+            change += _change(model, data, options, j, a)
+    data.pair_travel[0] = options.tolerance / change if change > 0.0 else 1e300
+    data.pair_evaluated[0] = 0.0
+    data.pair_change[0] = change
 
 
 @kernel
-def _travel(model: Model, work: Work, j: int) -> float:
+def _travel(model: Model, data: Data, j: int) -> float:
     """How far the shapes of a collision have come towards one another in the step before, at most."""
     d = 0.0
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0:
             for k in range(3):
-                d += abs(work.move_in[i, k])
-                d += 2.0 * model.pair_far[j, PairBound.DISTANCE + side] * abs(work.turn_in[i, 1 + k])
+                d += abs(data.move_in[i, k])
+                d += 2.0 * model.pair_far[j, PairBound.DISTANCE + side] * abs(data.turn_in[i, 1 + k])
     return d
 
 
 @kernel
-def _far_enough(model: Model, options: Options, j: int, a: float) -> float:
+def _far_enough(model: Model, options: StepOptions, j: int, a: float) -> float:
     """a where a collision with this half gap is inactive, 0 where it is active."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
@@ -104,7 +104,7 @@ def _far_enough(model: Model, options: Options, j: int, a: float) -> float:
 
 
 @kernel
-def _change(model: Model, work: Work, options: Options, j: int, a: float) -> float:
+def _change(model: Model, data: Data, options: StepOptions, j: int, a: float) -> float:
     """Bound of the change of an inactive collision's wrench per displacement d of its bodies; slips change by 2 d/h."""
     f = model.pair_far[j]
     mu = model.contact_friction[model.contact_height.shape[0] + j]
@@ -114,104 +114,104 @@ def _change(model: Model, work: Work, options: Options, j: int, a: float) -> flo
         if i >= 0:
             lever += f[PairBound.DISTANCE + side]
             for k in range(3):
-                lever += abs(work.pos2[i, k] - work.origin[k])
+                lever += abs(data.pos2[i, k] - data.origin[k])
     push = f[PairBound.POINTS] * options.kappa / a
     return 2.0 * lever * push * (1.0 + (1.0 + mu + 2.0 * mu * mu / options.h) / a)
 
 
 @optional(Slot.FAR_PAIR_IMPULSES)
-def far_pair_impulses(model: Model, work: Work, h: float, kappa: float) -> None:
+def far_pair_impulses(model: Model, data: Data, h: float, kappa: float) -> None:
     """Wrenches of the inactive collisions at configuration 3, evaluated again where they may have changed."""
-    if work.pair_change[0] == 0.0 or not _moved(model, work):
+    if data.pair_change[0] == 0.0 or not _moved(model, data):
         return
-    work.pair_evaluated[0] = 1.0
-    for i in range(work.inactive_wrench.shape[0]):
-        q = third_quaternion(work, i)
+    data.pair_evaluated[0] = 1.0
+    for i in range(data.inactive_wrench.shape[0]):
+        q = third_quaternion(data, i)
         for k in range(3):
-            work.inactive_pose[i, k] = work.pos3[i, k]
+            data.inactive_pose[i, k] = data.pos3[i, k]
         for k in range(4):
-            work.inactive_pose[i, 3 + k] = q[k]
+            data.inactive_pose[i, 3 + k] = q[k]
         for k in range(6):
-            work.inactive_wrench[i, k] = 0.0
+            data.inactive_wrench[i, k] = 0.0
     j = 0
     while j < model.pair_kind.shape[0]:
-        a = work.pair_activation[j]
+        a = data.pair_activation[j]
         end = j + 1
         while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
             end += 1
         if a > 0.0:
-            place_shapes(model, work, j, work.pos3, work.rot3)
-            choose_shapes(model, work, j)
+            place_shapes(model, data, j, data.pos3, data.rot3)
+            choose_shapes(model, data, j)
             for m in range(j, end):
-                _evaluate(model, work, h, m, kappa, a)
+                _evaluate(model, data, h, m, kappa, a)
         j = end
 
 
 @kernel
-def _evaluate(model: Model, work: Work, h: float, j: int, kappa: float, a: float) -> None:
+def _evaluate(model: Model, data: Data, h: float, j: int, kappa: float, a: float) -> None:
     """Cone variables of one point of an inactive collision on the central path, and its wrench."""
     c = model.contact_height.shape[0] + j
-    point_kinematics(model, work, h, j)
-    start_contact(model, work, c, kappa, a)
-    if not is_absent(work, j):
-        n, t1, t2 = contact_impulse(model, work, c)
-        add_pair_wrench(model, work, j, n, t1, t2, work.inactive_wrench)
+    point_kinematics(model, data, h, j)
+    start_contact(model, data, c, kappa, a)
+    if not is_absent(data, j):
+        n, t1, t2 = contact_impulse(model, data, c)
+        add_pair_wrench(model, data, j, n, t1, t2, data.inactive_wrench)
 
 
 @kernel
-def _moved(model: Model, work: Work) -> bool:
+def _moved(model: Model, data: Data) -> bool:
     """Whether some body has moved so far that the inactive wrenches may have changed by more than the tolerance."""
-    if work.pair_evaluated[0] == 0.0:
+    if data.pair_evaluated[0] == 0.0:
         return True
-    for i in range(work.inactive_pose.shape[0]):
+    for i in range(data.inactive_pose.shape[0]):
         reach = model.body_reach[i]
         if reach == 0.0:
             continue
         d = 0.0
         turn = 0.0
         for k in range(3):
-            d += abs(work.pos3[i, k] - work.inactive_pose[i, k])
-        q = third_quaternion(work, i)
+            d += abs(data.pos3[i, k] - data.inactive_pose[i, k])
+        q = third_quaternion(data, i)
         for k in range(4):
-            turn += abs(q[k] - work.inactive_pose[i, 3 + k])
-        if not d + reach * ANGLE * turn <= work.pair_travel[0]:
+            turn += abs(q[k] - data.inactive_pose[i, 3 + k])
+        if not d + reach * ANGLE * turn <= data.pair_travel[0]:
             return True
     return False
 
 
 @kernel
-def add_inactive_pairs(work: Work) -> None:
+def add_inactive_pairs(data: Data) -> None:
     """wrench += those of the inactive collisions."""
-    if work.pair_change[0] == 0.0:
+    if data.pair_change[0] == 0.0:
         return
-    for i in range(work.wrench.shape[0]):
+    for i in range(data.wrench.shape[0]):
         for k in range(6):
-            work.wrench[i, k] += work.inactive_wrench[i, k]
+            data.wrench[i, k] += data.inactive_wrench[i, k]
 
 
 @optional(Slot.PAIRS_CAME_NEAR, default=False)
-def pairs_came_near(model: Model, work: Work) -> bool:
+def pairs_came_near(model: Model, data: Data) -> bool:
     """Whether an inactive collision has become active at configuration 3; it is active from now on."""
     found = False
     j = 0
     while j < model.pair_kind.shape[0]:
-        least = work.pair_out[j, Witness.GAP]
+        least = data.pair_out[j, Witness.GAP]
         end = j + 1
         while end < model.pair_kind.shape[0] and model.pair_feature[end] > 0:
-            least = min(least, work.pair_out[end, Witness.GAP])
+            least = min(least, data.pair_out[end, Witness.GAP])
             end += 1
-        if work.pair_activation[j] > 0.0 and least < work.pair_activation[j]:
+        if data.pair_activation[j] > 0.0 and least < data.pair_activation[j]:
             found = True
-            work.pair_activation[j] = 0.0
-            place_shapes(model, work, j, work.pos2, work.rot2)
-            open_pairs(model, work, j)
+            data.pair_activation[j] = 0.0
+            place_shapes(model, data, j, data.pos2, data.rot2)
+            open_pairs(model, data, j)
         j = end
     return found
 
 
 @optional(Slot.ALL_NEAR)
-def all_near(model: Model, work: Work) -> None:
+def all_near(model: Model, data: Data) -> None:
     """All collisions taken as active, for the derivatives of a step that has been solved."""
     for j in range(model.pair_kind.shape[0]):
-        work.pair_activation[j] = 0.0
-    enlist_pairs(model, work)
+        data.pair_activation[j] = 0.0
+    enlist_pairs(model, data)

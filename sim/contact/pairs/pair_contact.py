@@ -21,7 +21,7 @@ from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
 from sim.model.columns import Frame, Kin, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
 from sim.model.slots import Slot
@@ -51,82 +51,82 @@ def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3]:
 
 
 @kernel
-def point_velocity(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+def point_velocity(data: Data, h: float, i: int, x: float, y: float, z: float) -> Vec3:
     """Velocity over the interval of the point (x, y, z), world axes, that moves with body i; 0 for the world."""
     if i < 0:
         return 0.0, 0.0, 0.0
-    a = work.pos3[i]
-    b = work.pos2[i]
-    w = work.turn[i]
+    a = data.pos3[i]
+    b = data.pos2[i]
+    w = data.turn[i]
     vx, vy, vz = cross(w[1], w[2], w[3], x - a[0], y - a[1], z - a[2])
     return (a[0] - b[0] + 2.0 * vx) / h, (a[1] - b[1] + 2.0 * vy) / h, (a[2] - b[2] + 2.0 * vz) / h
 
 
 @kernel
-def collide_shapes(model: Model, work: Work, first: int) -> None:
+def collide_shapes(model: Model, data: Data, first: int) -> None:
     """pair_out of all points of the collision whose first pair this is, at configuration 3."""
-    place_shapes(model, work, first, work.pos3, work.rot3)
+    place_shapes(model, data, first, data.pos3, data.rot3)
     kind = model.pair_kind[first]
     sizes = model.pair_sizes[first]
-    pose = work.pair_relative[first]
-    if work.feature_choice[0] == FeatureChoice.EVERY_POSE:
-        choose_shapes(model, work, first)
+    pose = data.pair_relative[first]
+    if data.feature_choice[0] == FeatureChoice.EVERY_POSE:
+        choose_shapes(model, data, first)
     elif on_cylinder(kind):
-        collide_cylinders(model, work, first)
+        collide_cylinders(model, data, first)
         return
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
-        if work.feature_choice[0] != FeatureChoice.EVERY_POSE:
+        if data.feature_choice[0] != FeatureChoice.EVERY_POSE:
             collide_chosen(
-                kind, end - first, work.pair_code[end], sizes, model.hull, pose[:9], pose[9:], work.pair_out[end]
+                kind, end - first, data.pair_code[end], sizes, model.hull, pose[:9], pose[9:], data.pair_out[end]
             )
         end += 1
 
 
 @kernel
-def is_absent(work: Work, j: int) -> bool:
+def is_absent(data: Data, j: int) -> bool:
     """Whether the shapes have no such point now (a corner cut off): it has a gap of 1 m then, and no wrench."""
-    return work.pair_out[j, Witness.GAP] > _NO_POINT
+    return data.pair_out[j, Witness.GAP] > _NO_POINT
 
 
 @optional(Slot.PAIR_KINEMATICS)
-def pair_kinematics(model: Model, work: Work, h: float) -> None:
+def pair_kinematics(model: Model, data: Data, h: float) -> None:
     """Gap, slip, frame and point of the pairs of active collisions at configuration 3."""
     ground = model.contact_height.shape[0]
-    for m in range(work.active_ground_count[0], work.active_count[0]):
-        j = work.active[m] - ground
+    for m in range(data.active_ground_count[0], data.active_count[0]):
+        j = data.active[m] - ground
         if model.pair_feature[j] == 0:
-            collide_shapes(model, work, j)
-        point_kinematics(model, work, h, j)
+            collide_shapes(model, data, j)
+        point_kinematics(model, data, h, j)
 
 
 @kernel
-def point_kinematics(model: Model, work: Work, h: float, j: int) -> None:
+def point_kinematics(model: Model, data: Data, h: float, j: int) -> None:
     """Gap, slip, frame and point of pair j, from pair_out."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    g = work.pair_out[j]
-    F = work.pair_frame[j]
+    g = data.pair_out[j]
+    F = data.pair_frame[j]
     s = shape_b(model, j)
     t1, t2 = tangents(*three(g, Witness.NORMAL))
-    F[0], F[1], F[2] = rotate(work.shape_rot, s, *three(g, Witness.NORMAL))
-    F[3], F[4], F[5] = rotate(work.shape_rot, s, t1[0], t1[1], t1[2])
-    F[6], F[7], F[8] = rotate(work.shape_rot, s, t2[0], t2[1], t2[2])
-    F[Frame.POINT], F[Frame.POINT + 1], F[Frame.POINT + 2] = rotate(work.shape_rot, s, *three(g, Witness.POINT))
+    F[0], F[1], F[2] = rotate(data.shape_rot, s, *three(g, Witness.NORMAL))
+    F[3], F[4], F[5] = rotate(data.shape_rot, s, t1[0], t1[1], t1[2])
+    F[6], F[7], F[8] = rotate(data.shape_rot, s, t2[0], t2[1], t2[2])
+    F[Frame.POINT], F[Frame.POINT + 1], F[Frame.POINT + 2] = rotate(data.shape_rot, s, *three(g, Witness.POINT))
     for k in range(3):
-        F[Frame.POINT + k] += work.shape_pos[s, k]
-    ax, ay, az = point_velocity(work, h, a, *three(F, Frame.POINT))
-    bx, by, bz = point_velocity(work, h, b, *three(F, Frame.POINT))
+        F[Frame.POINT + k] += data.shape_pos[s, k]
+    ax, ay, az = point_velocity(data, h, a, *three(F, Frame.POINT))
+    bx, by, bz = point_velocity(data, h, b, *three(F, Frame.POINT))
     x, y, z = ax - bx, ay - by, az - bz
-    kin = work.contact_kin[model.contact_height.shape[0] + j]
-    kin[Kin.GAP] = 1.0 if is_absent(work, j) else g[Witness.GAP]
+    kin = data.contact_kin[model.contact_height.shape[0] + j]
+    kin[Kin.GAP] = 1.0 if is_absent(data, j) else g[Witness.GAP]
     kin[Kin.SLIP1] = F[3] * x + F[4] * y + F[5] * z
     kin[Kin.SLIP2] = F[6] * x + F[7] * y + F[8] * z
-    kin[Kin.ARM] = F[Frame.POINT] - work.pos3[a, 0]
-    kin[Kin.ARM + 1] = F[Frame.POINT + 1] - work.pos3[a, 1]
-    kin[Kin.ARM + 2] = F[Frame.POINT + 2] - work.pos3[a, 2]
-    if is_taut(model, work, j):
-        pull_from_before(model, work, j)
+    kin[Kin.ARM] = F[Frame.POINT] - data.pos3[a, 0]
+    kin[Kin.ARM + 1] = F[Frame.POINT + 1] - data.pos3[a, 1]
+    kin[Kin.ARM + 2] = F[Frame.POINT + 2] - data.pos3[a, 2]
+    if is_taut(model, data, j):
+        pull_from_before(model, data, j)
 
 
 @kernel
@@ -151,44 +151,44 @@ def shares(model: Model, j: int) -> tuple[float, float]:
 
 
 @kernel
-def pair_arm(model: Model, work: Work, j: int) -> Vec3:
+def pair_arm(model: Model, data: Data, j: int) -> Vec3:
     """P - O."""
-    if is_taut(model, work, j):
-        return string_arm(model, work, j)
+    if is_taut(model, data, j):
+        return string_arm(model, data, j)
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)
-    F = work.pair_frame[j]
-    x = F[Frame.POINT] - work.origin[0] - wa * (work.pos3[a, 0] - work.pos2[a, 0])
-    y = F[Frame.POINT + 1] - work.origin[1] - wa * (work.pos3[a, 1] - work.pos2[a, 1])
-    z = F[Frame.POINT + 2] - work.origin[2] - wa * (work.pos3[a, 2] - work.pos2[a, 2])
+    F = data.pair_frame[j]
+    x = F[Frame.POINT] - data.origin[0] - wa * (data.pos3[a, 0] - data.pos2[a, 0])
+    y = F[Frame.POINT + 1] - data.origin[1] - wa * (data.pos3[a, 1] - data.pos2[a, 1])
+    z = F[Frame.POINT + 2] - data.origin[2] - wa * (data.pos3[a, 2] - data.pos2[a, 2])
     if b >= 0:
-        x -= wb * (work.pos3[b, 0] - work.pos2[b, 0])
-        y -= wb * (work.pos3[b, 1] - work.pos2[b, 1])
-        z -= wb * (work.pos3[b, 2] - work.pos2[b, 2])
+        x -= wb * (data.pos3[b, 0] - data.pos2[b, 0])
+        y -= wb * (data.pos3[b, 1] - data.pos2[b, 1])
+        z -= wb * (data.pos3[b, 2] - data.pos2[b, 2])
     return x, y, z
 
 
 @kernel
-def gap_normal(model: Model, work: Work, j: int) -> Vec3:
+def gap_normal(model: Model, data: Data, j: int) -> Vec3:
     """Derivative of the gap of pair j by a displacement of a; where a string pulls along is another direction."""
-    F = work.pair_frame[j]
-    return (F[3], F[4], F[5]) if is_taut(model, work, j) else (F[0], F[1], F[2])
+    F = data.pair_frame[j]
+    return (F[3], F[4], F[5]) if is_taut(model, data, j) else (F[0], F[1], F[2])
 
 
 @kernel
-def pair_force(work: Work, j: int, fn: float, f1: float, f2: float) -> Vec3:
+def pair_force(data: Data, j: int, fn: float, f1: float, f2: float) -> Vec3:
     """n fn + t1 f1 + t2 f2."""
-    return transposed_times(work.pair_frame[j], fn, f1, f2)
+    return transposed_times(data.pair_frame[j], fn, f1, f2)
 
 
 @kernel
-def add_pair_wrench(model: Model, work: Work, j: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
+def add_pair_wrench(model: Model, data: Data, j: int, fn: float, f1: float, f2: float, out: Matrix) -> None:
     """out[a] -= (f, (P - O) x f), out[b] += the same."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    f = pair_force(work, j, fn, f1, f2)
-    x, y, z = pair_arm(model, work, j)
+    f = pair_force(data, j, fn, f1, f2)
+    x, y, z = pair_arm(model, data, j)
     m = cross(x, y, z, f[0], f[1], f[2])
     for k in range(3):
         out[a, k] -= f[k]

@@ -22,9 +22,9 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.restitution import impulse_work
 from sim.dynamics.energy import twice_kinetic
 from sim.model.columns import Bounce, Cone, RelativePose
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.options import Options
+from sim.model.options import StepOptions
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
@@ -36,49 +36,49 @@ _THROWN = 2e-2  # the same of shapes that are thrown out, not pushed: they overl
 
 
 @kernel
-def velocity_after(work: Work, h: float, i: int, x: float, y: float, z: float) -> Vec3:
+def velocity_after(data: Data, h: float, i: int, x: float, y: float, z: float) -> Vec3:
     """Velocity over the interval 2-3 of the point (x, y, z) of body i at configuration 2; 0 for the world."""
     if i < 0:
         return 0.0, 0.0, 0.0
-    m, w, o = work.move[i], work.turn[i], work.pos2[i]
+    m, w, o = data.move[i], data.turn[i], data.pos2[i]
     vx, vy, vz = cross(w[1], w[2], w[3], x - o[0], y - o[1], z - o[2])
     return (m[0] + 2.0 * vx) / h, (m[1] + 2.0 * vy) / h, (m[2] + 2.0 * vz) / h
 
 
 @kernel
-def power_after(model: Model, work: Work, h: float, j: int) -> float:
+def power_after(model: Model, data: Data, h: float, j: int) -> float:
     """f.u' of pair j [J]."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    fn, f1, f2 = contact_impulse(model, work, model.contact_height.shape[0] + j)
-    o = work.origin
-    x, y, z = pair_arm(model, work, j)
-    ux, uy, uz = velocity_after(work, h, a, o[0] + x, o[1] + y, o[2] + z)
-    vx, vy, vz = velocity_after(work, h, b, o[0] + x, o[1] + y, o[2] + z)
-    f = pair_force(work, j, fn, f1, f2)
+    fn, f1, f2 = contact_impulse(model, data, model.contact_height.shape[0] + j)
+    o = data.origin
+    x, y, z = pair_arm(model, data, j)
+    ux, uy, uz = velocity_after(data, h, a, o[0] + x, o[1] + y, o[2] + z)
+    vx, vy, vz = velocity_after(data, h, b, o[0] + x, o[1] + y, o[2] + z)
+    f = pair_force(data, j, fn, f1, f2)
     return f[0] * (ux - vx) + f[1] * (uy - vy) + f[2] * (uz - vz)
 
 
 @kernel
-def _overlapped(model: Model, work: Work, j: int) -> float:
+def _overlapped(model: Model, data: Data, j: int) -> float:
     """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond what is rounding [m]."""
-    return max(0.0, -(work.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
+    return max(0.0, -(data.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
 
 
 @optional(Slot.PAIR_SLACK, default=0.0)
-def pair_slack(model: Model, work: Work) -> float:
+def pair_slack(model: Model, data: Data) -> float:
     """Sum of the normal impulses times the overlaps where the step began, which they may take away [N s m]."""
     total, overlap = 0.0, 0.0
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0:
-            overlap = _overlapped(model, work, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
-        if not is_absent(work, j):
-            total += work.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
+            overlap = _overlapped(model, data, j) + _LEFT * least_size(model, j) + rounding_of_rims(model, j)
+        if not is_absent(data, j):
+            total += data.cone[model.contact_height.shape[0] + j, Cone.IMPULSE] * overlap
     return total
 
 
 @optional(Slot.PAIRS_GAINED, default=False)
-def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
+def pairs_gained(model: Model, data: Data, options: StepOptions, v: Vector) -> bool:
     """Whether the impulses of collisions gave energy in the solved step, of shapes that were apart where it began."""
     h = options.h
     ground = model.contact_height.shape[0]
@@ -87,18 +87,18 @@ def pairs_gained(model: Model, work: Work, options: Options, v: Vector) -> bool:
     for j in range(model.pair_kind.shape[0]):
         if model.pair_feature[j] == 0:
             size = least_size(model, j)
-            overlap = _overlapped(model, work, j)
+            overlap = _overlapped(model, data, j)
             slack = overlap + _LEFT * size + rounding_of_rims(model, j) + options.tolerance
-            counts = work.pair_activation[j] == 0.0 and overlap < _THROWN * size
+            counts = data.pair_activation[j] == 0.0 and overlap < _THROWN * size
         if (
             not counts
-            or is_absent(work, j)
-            or is_taut(model, work, j)
-            or work.bounce[ground + j, Bounce.RESTITUTION] > 0.0
+            or is_absent(data, j)
+            or is_taut(model, data, j)
+            or data.bounce[ground + j, Bounce.RESTITUTION] > 0.0
         ):
             continue
-        gain += impulse_work(model, work, h, ground + j)
-        power += power_after(model, work, h, j)
-        allowed += (2.0 * options.kappa + work.cone[ground + j, Cone.IMPULSE] * slack) / h
+        gain += impulse_work(model, data, h, ground + j)
+        power += power_after(model, data, h, j)
+        allowed += (2.0 * options.kappa + data.cone[ground + j, Cone.IMPULSE] * slack) / h
     least = min(gain, power)
-    return least > allowed and least > allowed + 0.5 * _SHARE * twice_kinetic(model, work, h, v)
+    return least > allowed and least > allowed + 0.5 * _SHARE * twice_kinetic(model, data, h, v)

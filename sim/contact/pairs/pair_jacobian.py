@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
 from sim.model.columns import Frame, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -18,9 +18,9 @@ from solvers.types import Vector
 
 
 @kernel
-def shape_to_world(X: Vector, first: int, work: Work, s: int, x: float, y: float, z: float, out: Vector) -> None:
+def shape_to_world(X: Vector, first: int, data: Data, s: int, x: float, y: float, z: float, out: Vector) -> None:
     """out (3 x 6) = R X diag(R^T, R^T) shifted from the origin of shape s to O: rotation columns -= translation [c]."""
-    R = work.shape_rot[s]
+    R = data.shape_rot[s]
     for r in range(3):
         for k in range(6):
             q = 3 * (k // 3)
@@ -55,21 +55,21 @@ def frame_turn(g: Vector, out: Vector) -> None:
 
 
 @kernel
-def _slip_rows(work: Work, h: float, i: int, sign: float, r: Vec3, t: Vec3, row: Vector) -> None:
+def _slip_rows(data: Data, h: float, i: int, sign: float, r: Vec3, t: Vec3, row: Vector) -> None:
     """row (6,) = sign d(t.u_i)/d(twist of body i) at a fixed point p = x_i3 + r and direction t.
 
     u_i = (x3 - x2)/h + omega x (p - x3)    ->    t/h - t x omega on dx3,   (c y + s x y)/h on dphi,   y = r x t
     """
-    w = work.turn[i]
+    w = data.turn[i]
     g = 2.0 / h
     ox, oy, oz = cross(t[0], t[1], t[2], g * w[1], g * w[2], g * w[3])
     vx, vy, vz = sign * (t[0] / h - ox), sign * (t[1] / h - oy), sign * (t[2] / h - oz)
     yx, yy, yz = cross(r[0], r[1], r[2], t[0], t[1], t[2])
     sx, sy, sz = cross(w[1], w[2], w[3], yx, yy, yz)
     dx, dy, dz = (
-        work.pos3[i, 0] - work.origin[0],
-        work.pos3[i, 1] - work.origin[1],
-        work.pos3[i, 2] - work.origin[2],
+        data.pos3[i, 0] - data.origin[0],
+        data.pos3[i, 1] - data.origin[1],
+        data.pos3[i, 2] - data.origin[2],
     )
     mx, my, mz = cross(dx, dy, dz, vx, vy, vz)
     row[0] = vx
@@ -81,52 +81,52 @@ def _slip_rows(work: Work, h: float, i: int, sign: float, r: Vec3, t: Vec3, row:
 
 
 @kernel
-def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
+def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
     """pair_turn, pair_shift: Omega and M about O;  pair_C: d(gap, slip) by the twists of a, then of b."""
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     s = shape_b(model, j)
-    o = work.origin
-    x, y, z = work.shape_pos[s, 0] - o[0], work.shape_pos[s, 1] - o[1], work.shape_pos[s, 2] - o[2]
-    g = work.pair_out[j]
-    frame_turn(g, work.pair_scratch)
-    shape_to_world(work.pair_scratch, 0, work, s, x, y, z, work.pair_turn[j])
-    shape_to_world(g, 25, work, s, x, y, z, work.pair_shift[j])
-    Omega = work.pair_turn[j]
-    M = work.pair_shift[j]
-    F = work.pair_frame[j]
+    o = data.origin
+    x, y, z = data.shape_pos[s, 0] - o[0], data.shape_pos[s, 1] - o[1], data.shape_pos[s, 2] - o[2]
+    g = data.pair_out[j]
+    frame_turn(g, data.pair_scratch)
+    shape_to_world(data.pair_scratch, 0, data, s, x, y, z, data.pair_turn[j])
+    shape_to_world(g, 25, data, s, x, y, z, data.pair_shift[j])
+    Omega = data.pair_turn[j]
+    M = data.pair_shift[j]
+    F = data.pair_frame[j]
     px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
-    Ca = work.pair_Ca[j]
-    Cb = work.pair_Cb[j]
-    n = gap_normal(model, work, j)
+    Ca = data.pair_Ca[j]
+    Cb = data.pair_Cb[j]
+    n = gap_normal(model, data, j)
     m = cross(px, py, pz, n[0], n[1], n[2])
     for k in range(3):
         Ca[k] = n[k]
         Ca[3 + k] = m[k]
         Cb[k] = -n[k]
         Cb[3 + k] = -m[k]
-    va = point_velocity(work, h, a, *three(F, Frame.POINT))
-    vb = point_velocity(work, h, b, *three(F, Frame.POINT))
+    va = point_velocity(data, h, a, *three(F, Frame.POINT))
+    vb = point_velocity(data, h, b, *three(F, Frame.POINT))
     q = 2.0 / h
-    wx, wy, wz = q * work.turn[a, 1], q * work.turn[a, 2], q * work.turn[a, 3]
+    wx, wy, wz = q * data.turn[a, 1], q * data.turn[a, 2], q * data.turn[a, 3]
     if b >= 0:
-        wx -= q * work.turn[b, 1]
-        wy -= q * work.turn[b, 2]
-        wz -= q * work.turn[b, 3]
-    ra = (F[Frame.POINT] - work.pos3[a, 0], F[Frame.POINT + 1] - work.pos3[a, 1], F[Frame.POINT + 2] - work.pos3[a, 2])
+        wx -= q * data.turn[b, 1]
+        wy -= q * data.turn[b, 2]
+        wz -= q * data.turn[b, 3]
+    ra = (F[Frame.POINT] - data.pos3[a, 0], F[Frame.POINT + 1] - data.pos3[a, 1], F[Frame.POINT + 2] - data.pos3[a, 2])
     for e in range(1, 3):
         t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
-        rows = work.pair_rows
-        _slip_rows(work, h, a, 1.0, ra, t, rows[0])
+        rows = data.pair_rows
+        _slip_rows(data, h, a, 1.0, ra, t, rows[0])
         for k in range(6):
             rows[1, k] = 0.0
         if b >= 0:
             rb = (
-                F[Frame.POINT] - work.pos3[b, 0],
-                F[Frame.POINT + 1] - work.pos3[b, 1],
-                F[Frame.POINT + 2] - work.pos3[b, 2],
+                F[Frame.POINT] - data.pos3[b, 0],
+                F[Frame.POINT + 1] - data.pos3[b, 1],
+                F[Frame.POINT + 2] - data.pos3[b, 2],
             )
-            _slip_rows(work, h, b, -1.0, rb, t, rows[1])
+            _slip_rows(data, h, b, -1.0, rb, t, rows[1])
         gp = cross(t[0], t[1], t[2], wx, wy, wz)
         gm = cross(px, py, pz, gp[0], gp[1], gp[2])
         ge = cross(t[0], t[1], t[2], va[0] - vb[0], va[1] - vb[1], va[2] - vb[2])
@@ -142,14 +142,14 @@ def pair_jacobian(model: Model, work: Work, h: float, j: int) -> None:
 
 
 @optional(Slot.PAIR_RATE, default=(0.0, 0.0, 0.0))
-def pair_rate(model: Model, work: Work, c: int) -> Vec3:
+def pair_rate(model: Model, data: Data, c: int) -> Vec3:
     """d(gap, slip) of contact c, a pair, with the twists of the last solve."""
     j = c - model.contact_height.shape[0]
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
-    x, y, z = _row_product(work.pair_Ca[j], work.twist[a])
+    x, y, z = _row_product(data.pair_Ca[j], data.twist[a])
     if b >= 0:
-        d = _row_product(work.pair_Cb[j], work.twist[b])
+        d = _row_product(data.pair_Cb[j], data.twist[b])
         return x + d[0], y + d[1], z + d[2]
     return x, y, z
 

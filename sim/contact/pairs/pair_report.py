@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.contact_law import report_contact
 from sim.contact.pairs.pair_contact import is_absent
 from sim.model.columns import Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import optional
@@ -13,12 +13,12 @@ from solvers.types import Matrix
 
 
 @optional(Slot.REPORT_PAIRS)
-def report_pairs(model: Model, work: Work, out: Matrix) -> None:
+def report_pairs(model: Model, data: Data, out: Matrix) -> None:
     """The rows of the pairs: impulse on the first body."""
     for j in range(model.pair_kind.shape[0]):
         c = model.contact_height.shape[0] + j
-        report_contact(model, work, c, work.pair_frame[j], out[c])
-        if is_absent(work, j):
-            out[c, 6] = work.pair_out[j, Witness.GAP]
+        report_contact(model, data, c, data.pair_frame[j], out[c])
+        if is_absent(data, j):
+            out[c, 6] = data.pair_out[j, Witness.GAP]
             for e in range(3):
                 out[c, e] = 0.0

@@ -15,7 +15,7 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
 from sim.model.columns import Frame
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
@@ -25,9 +25,9 @@ from solvers.types import Matrix, Vector
 
 
 @kernel
-def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
+def impulse_rate(data: Data, c: int, C: Vector, k: int) -> Vec3:
     """W times column k of C (3 x 6)."""
-    W = work.contact_W[c]
+    W = data.contact_W[c]
     x, y, z = C[k], C[6 + k], C[12 + k]
     return (
         W[0] * x + W[1] * y + W[2] * z,
@@ -37,124 +37,124 @@ def impulse_rate(work: Work, c: int, C: Vector, k: int) -> Vec3:
 
 
 @kernel
-def add_pair_stiffness(model: Model, work: Work, j: int, share: float) -> None:
+def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
     """coupling_K += pair j, condensed; share: of the turning of its impulse."""
-    if is_taut(model, work, j):
-        add_string_stiffness(model, work, j)
+    if is_taut(model, data, j):
+        add_string_stiffness(model, data, j)
         return
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
     wa, wb = shares(model, j)
-    n, t1, t2 = contact_impulse(model, work, c)
-    f = pair_force(work, j, share * n, share * t1, share * t2)
-    P = pair_arm(model, work, j)
-    Ka = work.coupling_K[2 * model.pair_coupling[j]]
-    Kb = work.coupling_K[2 * model.pair_coupling[j] + 1]
-    Omega = work.pair_turn[j]
-    M = work.pair_shift[j]
-    F = work.pair_frame[j]
-    o = work.origin
+    n, t1, t2 = contact_impulse(model, data, c)
+    f = pair_force(data, j, share * n, share * t1, share * t2)
+    P = pair_arm(model, data, j)
+    Ka = data.coupling_K[2 * model.pair_coupling[j]]
+    Kb = data.coupling_K[2 * model.pair_coupling[j] + 1]
+    Omega = data.pair_turn[j]
+    M = data.pair_shift[j]
+    F = data.pair_frame[j]
+    o = data.origin
     for k in range(6):
         turn = (Omega[k], Omega[6 + k], Omega[12 + k])
         shift = (M[k], M[6 + k], M[12 + k])
-        g = impulse_rate(work, c, work.pair_Ca[j], k)
-        e = pair_force(work, j, g[0], g[1], g[2])
+        g = impulse_rate(data, c, data.pair_Ca[j], k)
+        e = pair_force(data, j, g[0], g[1], g[2])
         r = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
-        x = centre_shift(work, work.pos3, a, k)
+        x = centre_shift(data, data.pos3, a, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (shift[0] - wa * x[0], shift[1] - wa * x[1], shift[2] - wa * x[2])
         add_wrench_column(Ka, k, f, df, P, dP)
         if b < 0:
             continue
-        g = impulse_rate(work, c, work.pair_Cb[j], k)
-        e = pair_force(work, j, g[0], g[1], g[2])
+        g = impulse_rate(data, c, data.pair_Cb[j], k)
+        e = pair_force(data, j, g[0], g[1], g[2])
         u = unit_vector(k - 3)
         r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
         p = point_shift(k, F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2])
-        x = centre_shift(work, work.pos3, b, k)
+        x = centre_shift(data, data.pos3, b, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
         add_wrench_column(Kb, k, f, df, P, dP)
 
 
 @optional(Slot.CONDENSE_PAIRS)
-def condense_pairs(model: Model, work: Work, h: float, kappa: float, share: float, form: int) -> None:
+def condense_pairs(model: Model, data: Data, h: float, kappa: float, share: float, form: int) -> None:
     """coupling_K of the active pairs, their laws linearised at kappa; overwritten.  See `condense_into`."""
     ground = model.contact_height.shape[0]
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0]):
-        if work.coupling_live[k] == 1:
+        if data.coupling_live[k] == 1:
             for e in range(36):
-                work.coupling_K[2 * k, e] = 0.0
-                work.coupling_K[2 * k + 1, e] = 0.0
-    for m in range(work.active_ground_count[0], work.active_count[0]):
-        c = work.active[m]
-        pair_jacobian(model, work, h, c - ground)
-        condense_contact(model, work, h, c, kappa, share, form)
-        if not is_absent(work, c - ground):
-            add_pair_stiffness(model, work, c - ground, share)
+                data.coupling_K[2 * k, e] = 0.0
+                data.coupling_K[2 * k + 1, e] = 0.0
+    for m in range(data.active_ground_count[0], data.active_count[0]):
+        c = data.active[m]
+        pair_jacobian(model, data, h, c - ground)
+        condense_contact(model, data, h, c, kappa, share, form)
+        if not is_absent(data, c - ground):
+            add_pair_stiffness(model, data, c - ground, share)
 
 
 @optional(Slot.APPLY_PAIRS, default=0.0)
-def apply_pairs(model: Model, work: Work) -> float:
+def apply_pairs(model: Model, data: Data) -> float:
     """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
     ground = model.contact_height.shape[0]
     r = 0.0
-    for m in range(work.active_ground_count[0], work.active_count[0]):
-        c = work.active[m]
-        n, t1, t2 = contact_impulse(model, work, c)
-        if not is_absent(work, c - ground):
-            add_pair_wrench(model, work, c - ground, n, t1, t2, work.wrench)
-        r = max(r, contact_error(model, work, c))
-    add_inactive_pairs(work)
+    for m in range(data.active_ground_count[0], data.active_count[0]):
+        c = data.active[m]
+        n, t1, t2 = contact_impulse(model, data, c)
+        if not is_absent(data, c - ground):
+            add_pair_wrench(model, data, c - ground, n, t1, t2, data.wrench)
+        r = max(r, contact_error(model, data, c))
+    add_inactive_pairs(data)
     return r
 
 
 @optional(Slot.PAIR_CONSTANTS)
-def pair_constants(model: Model, work: Work, target: NewtonTarget) -> None:
+def pair_constants(model: Model, data: Data, target: NewtonTarget) -> None:
     """wrench -= constant parts of the impulses of the active pairs, for the target of this Newton step."""
     ground = model.contact_height.shape[0]
-    for m in range(work.active_ground_count[0], work.active_count[0]):
-        c = work.active[m]
-        contact_constant(model, work, c, target)
-        w = work.contact_w[c]
-        if not is_absent(work, c - ground):
-            add_pair_wrench(model, work, c - ground, w[0], w[1], w[2], work.wrench)
+    for m in range(data.active_ground_count[0], data.active_count[0]):
+        c = data.active[m]
+        contact_constant(model, data, c, target)
+        w = data.contact_w[c]
+        if not is_absent(data, c - ground):
+            add_pair_wrench(model, data, c - ground, w[0], w[1], w[2], data.wrench)
 
 
 @kernel
-def add_earlier_slip(model: Model, work: Work, h: float, j: int, K2: Matrix) -> None:
+def add_earlier_slip(model: Model, data: Data, h: float, j: int, K2: Matrix) -> None:
     """K2 (2, 36) += dF by the twists of a and b at configuration 2, of pair j.
 
     slip    -t/h on dx2,  (-c y + s x y)/h on dphi2,  y = r x t        P follows the centres of mass at 2
     """
-    if is_taut(model, work, j):
-        add_string_turn(model, work, j, K2)
+    if is_taut(model, data, j):
+        add_string_turn(model, data, j, K2)
         return
     c = model.contact_height.shape[0] + j
     weight = shares(model, j)
-    n, t1, t2 = contact_impulse(model, work, c)
-    f = pair_force(work, j, n, t1, t2)
-    P = pair_arm(model, work, j)
-    F = work.pair_frame[j]
-    W = work.contact_W[c]
+    n, t1, t2 = contact_impulse(model, data, c)
+    f = pair_force(data, j, n, t1, t2)
+    P = pair_arm(model, data, j)
+    F = data.pair_frame[j]
+    W = data.contact_W[c]
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i < 0:
             continue
         sign = 1.0 if side == 0 else -1.0
-        w = work.turn[i]
+        w = data.turn[i]
         r = (
-            F[Frame.POINT] - work.pos3[i, 0],
-            F[Frame.POINT + 1] - work.pos3[i, 1],
-            F[Frame.POINT + 2] - work.pos3[i, 2],
+            F[Frame.POINT] - data.pos3[i, 0],
+            F[Frame.POINT + 1] - data.pos3[i, 1],
+            F[Frame.POINT + 2] - data.pos3[i, 2],
         )
         for k in range(6):
-            x = centre_shift(work, work.pos2, i, k)
+            x = centre_shift(data, data.pos2, i, k)
             e = unit_vector(k - 3)
             s1 = slip_rate(F[3], F[4], F[5], r, w, x, e) * sign / h
             s2 = slip_rate(F[6], F[7], F[8], r, w, x, e) * sign / h
-            df = pair_force(work, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
+            df = pair_force(data, j, W[1] * s1 + W[2] * s2, W[4] * s1 + W[5] * s2, W[7] * s1 + W[8] * s2)
             q = weight[0] if side == 0 else weight[1]
             add_wrench_column(K2[side], k, f, df, P, (q * x[0], q * x[1], q * x[2]))
 

@@ -12,7 +12,7 @@ from sim.contact.collision.kept import elsewhere
 from sim.contact.collision.rim import LEVEL
 from sim.contact.collision.witness import dot
 from sim.model.columns import Cone, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.shape_kinds import RIM_POINTS, SWAPPED, Pair
 from solvers.compiler import inner_kernel, kernel
@@ -96,7 +96,7 @@ def moved_since(kind: int, out: Vector, pose: Vector, before: Vector) -> Vec3:
 
 
 @kernel
-def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector, least: float) -> bool:
+def left_behind(data: Data, kind: int, out: Vector, pose: Vector, before: Vector, least: float) -> bool:
     """Whether the two points of a contact at `pose` were closer than `least` at the pose `before`, along the normal at
     `pose`: they have moved apart since then, whatever the normal was on the way.
 
@@ -104,7 +104,7 @@ def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector
     the points seem to have been closer than they were by that angle times their motion.
     """
     moved = moved_since(kind, out, pose, before)
-    if work.overlap_allowed[0] == 1:
+    if data.overlap_allowed[0] == 1:
         turn = 0.0
         for k in range(9):
             turn += (pose[k] - before[k]) ** 2
@@ -113,31 +113,31 @@ def left_behind(work: Work, kind: int, out: Vector, pose: Vector, before: Vector
 
 
 @kernel
-def remember(model: Model, work: Work, first: int) -> None:
+def remember(model: Model, data: Data, first: int) -> None:
     """pair_previous: the features of the points of a collision that press; 0 for the others."""
     close = NEAR * least_size(model, first)
     ground = model.contact_height.shape[0]
     for j in range(first, last_point(model, first)):
-        pressing = work.pair_code[j] != 0 and work.cone[ground + j, Cone.SLACK] < close
-        work.pair_previous[j] = work.pair_code[j] if pressing else 0
+        pressing = data.pair_code[j] != 0 and data.cone[ground + j, Cone.SLACK] < close
+        data.pair_previous[j] = data.pair_code[j] if pressing else 0
 
 
 @kernel
-def keep(model: Model, work: Work, first: int) -> None:
+def keep(model: Model, data: Data, first: int) -> None:
     """Features of pair_previous that were not chosen again take the places of points that there are not now."""
     end = last_point(model, first)
     begin = first + room(model.pair_kind[first], model.pair_sizes[first], model.hull)
     free = begin
     for j in range(first, end):
-        kept = work.pair_previous[j]
-        if kept == 0 or kept == work.pair_code[j]:
+        kept = data.pair_previous[j]
+        if kept == 0 or kept == data.pair_code[j]:
             continue
         if j < begin:
             kept = elsewhere(j - first, kept)
         for k in range(begin, end):
-            if work.pair_code[k] == kept:
+            if data.pair_code[k] == kept:
                 kept = 0
-        while free < end and work.pair_code[free] != 0:
+        while free < end and data.pair_code[free] != 0:
             free += 1
         if kept != 0 and free < end:
-            work.pair_code[free] = kept
+            data.pair_code[free] = kept

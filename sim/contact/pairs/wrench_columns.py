@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.model.data import Work
+from sim.model.data import Data
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross
 from solvers.types import Matrix, Vector
@@ -24,9 +24,9 @@ def point_shift(k: int, x: float, y: float, z: float) -> Vec3:
 
 
 @kernel
-def centre_shift(work: Work, pos: Matrix, i: int, k: int) -> Vec3:
+def centre_shift(data: Data, pos: Matrix, i: int, k: int) -> Vec3:
     """Displacement of the centre of mass of body i by the unit twist k about O."""
-    o = work.origin
+    o = data.origin
     return point_shift(k, pos[i, 0] - o[0], pos[i, 1] - o[1], pos[i, 2] - o[2])
 
 

@@ -17,7 +17,7 @@ from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
 from sim.model.columns import Bounce
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
@@ -55,7 +55,7 @@ def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: M
 @kernel
 def _joint_twist(
     model: Model,
-    work: Work,
+    data: Data,
     effect: int,
     i: int,
     k: int,
@@ -100,7 +100,7 @@ def _joint_twist(
     t = (Q[0] * s0 + Q[1] * s1 + Q[2] * s2, Q[3] * s0 + Q[4] * s1 + Q[5] * s2, Q[6] * s0 + Q[7] * s1 + Q[8] * s2)
     c = model.joint_child_point[i]
     c0, c1, c2 = rotate(rot, i, c[0], c[1], c[2])
-    O = work.origin
+    O = data.origin
     o = (pos[i, 0] + c0 - O[0], pos[i, 1] + c1 - O[1], pos[i, 2] + c2 - O[2])
     if effect == Effect.ORIENTATION:
         for r in range(3):
@@ -123,37 +123,37 @@ def _mark_below(model: Model, i: int, below: Vector) -> None:
 
 
 @kernel
-def add_geometry(model: Model, work: Work, at: At, effect: int, i: int, k: int, w: float, col: int) -> None:
+def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, w: float, col: int) -> None:
     """The column of a change of the geometry of joint i."""
     T = at.twists
-    _joint_twist(model, work, effect, i, k, work.theta1, work.pos1, work.quat1, work.rot1, T[0:3])
-    _joint_twist(model, work, effect, i, k, work.theta3, work.pos3, work.quat3, work.rot3, T[6:9])
-    _joint_twist(model, work, effect, i, k, at.q, work.pos2, work.quat2, work.rot2, T[3:6])
+    _joint_twist(model, data, effect, i, k, data.theta1, data.pos1, data.quat1, data.rot1, T[0:3])
+    _joint_twist(model, data, effect, i, k, data.theta3, data.pos3, data.quat3, data.rot3, T[6:9])
+    _joint_twist(model, data, effect, i, k, at.q, data.pos2, data.quat2, data.rot2, T[3:6])
     T1, T2, T3, F = T[0], T[3], T[6], T[_PRODUCT]
     for r in range(6):
-        A1, A2, A3 = work.A1[i, 6 * r : 6 * r + 6], work.A2[i, 6 * r : 6 * r + 6], work.A3[i, 6 * r : 6 * r + 6]
+        A1, A2, A3 = data.A1[i, 6 * r : 6 * r + 6], data.A2[i, 6 * r : 6 * r + 6], data.A3[i, 6 * r : 6 * r + 6]
         F[r] = _dot(A1, T1) + _dot(A2, T2) + _dot(A3, T3)
-    X = work.columns
+    X = data.columns
     first_rotation = model.body_vadr[i] + model.joint_ntrans[i]
     for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
         B = T[4] if d < first_rotation else T[5]
-        X[d, col] -= w * (_dot(work.S2[d], F) + _dot(B, work.F[d, 12:18]))
+        X[d, col] -= w * (_dot(data.S2[d], F) + _dot(B, data.F[d, 12:18]))
     p = model.body_parent[i]
     while p >= 0:
         for d in range(model.body_vadr[p], model.body_vadr[p + 1]):
-            X[d, col] -= w * _dot(work.S2[d], F)
+            X[d, col] -= w * _dot(data.S2[d], F)
         p = model.body_parent[p]
     _mark_below(model, i, at.below)
     for b in range(i + 1, at.below.shape[0]):
         if at.below[b] > 0.0:
             for d in range(model.body_vadr[b], model.body_vadr[b + 1]):
-                G = work.G[d]
+                G = data.G[d]
                 X[d, col] -= w * (_dot(G[0:6], T1) + _dot(G[6:12], T2) + _dot(G[12:18], T3))
-    add_coupled_geometry(model, work, at, w, col)
+    add_coupled_geometry(model, data, at, w, col)
 
 
 @kernel
-def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -> None:
+def add_coupled_geometry(model: Model, data: Data, at: At, w: float, col: int) -> None:
     """What a change of geometry does to couplings across branches: wrench F on a and -F on b, gaps of loops."""
     T2, T3, F = at.twists[3], at.twists[6], at.twists[_PRODUCT]
     loops = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
@@ -161,37 +161,37 @@ def add_coupled_geometry(model: Model, work: Work, at: At, w: float, col: int) -
         for side in range(2):
             i = model.coupling_body[k, side]
             other = model.coupling_body[k, 1 - side]
-            far = k < loops and work.coupling_live[k] == 0  # its rows are those of an earlier step
+            far = k < loops and data.coupling_live[k] == 0  # its rows are those of an earlier step
             if i < 0 or at.below[i] == 0.0 or far:
                 continue
-            K2 = work.coupling_K2[2 * k + side]
+            K2 = data.coupling_K2[2 * k + side]
             for r in range(6):
                 F[r] = _dot(K2[6 * r : 6 * r + 6], T2)
             for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-                t = _dot(work.couple_R[row, 6 * side : 6 * side + 6], T3)
+                t = _dot(data.couple_R[row, 6 * side : 6 * side + 6], T3)
                 if k >= loops:
-                    work.couple_panel[row, col] += w * t
+                    data.couple_panel[row, col] += w * t
                     continue
-                if work.couple_E[row] == 0.0:  # no row
+                if data.couple_E[row] == 0.0:  # no row
                     continue
                 for r in range(6):
-                    F[r] += work.couple_B[row, r] * t / work.couple_E[row]
-            add_wrench(model, work, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
+                    F[r] += data.couple_B[row, r] * t / data.couple_E[row]
+            add_wrench(model, data, other, (F[0], F[1], F[2]), (F[3], F[4], F[5]), w if side == 0 else -w, col)
     for j in range(model.pair_kind.shape[0]):
-        if work.bounce[model.contact_height.shape[0] + j, Bounce.RESTITUTION] > 0.0:
-            _add_coupled_impact(model, work, at, j, w, col)
+        if data.bounce[model.contact_height.shape[0] + j, Bounce.RESTITUTION] > 0.0:
+            _add_coupled_impact(model, data, at, j, w, col)
 
 
 @kernel
-def _add_coupled_impact(model: Model, work: Work, at: At, j: int, w: float, col: int) -> None:
+def _add_coupled_impact(model: Model, data: Data, at: At, j: int, w: float, col: int) -> None:
     """As `add_bounce_derivatives`: a floor that the motion of one body raises pushes the other."""
     c = model.contact_height.shape[0] + j
-    b = work.bounce[c]
+    b = data.bounce[c]
     rise = b[Bounce.RESTITUTION] * _dot(b[Bounce.ROW1 : Bounce.ROW2], at.twists[0]) + (
         1.0 - b[Bounce.RESTITUTION]
     ) * _dot(b[Bounce.ROW2 : Bounce.GAP1], at.twists[3])
-    f, t = gap_wrench(model, work, c)
+    f, t = gap_wrench(model, data, c)
     for side in range(2):
         i = model.coupling_body[model.pair_coupling[j], side]
         if i >= 0 and at.below[i] > 0.0:
-            add_wrench(model, work, model.coupling_body[model.pair_coupling[j], 1 - side], f, t, -w * rise, col)
+            add_wrench(model, data, model.coupling_body[model.pair_coupling[j], 1 - side], f, t, -w * rise, col)

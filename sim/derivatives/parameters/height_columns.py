@@ -22,8 +22,8 @@ from sim.derivatives.parameters.surface import add_ground_place, is_on_terrain
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
 from sim.model.columns import Bounce, Grid
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import Table, kernel, optional
@@ -56,65 +56,65 @@ def spread(model: Model, k: int, at: Vec3, s: Vec3, X: Matrix, first: int, out: 
 
 
 @kernel
-def spread_earlier(model: Model, work: Work, c: int, configuration: int, X: Matrix, out: Matrix) -> None:
+def spread_earlier(model: Model, data: Data, c: int, configuration: int, X: Matrix, out: Matrix) -> None:
     """What the floor of an impact feels of the ground below configuration 1 or 2."""
     k = model.contact_terrain[c] - 1
-    b = work.bounce[c]
+    b = data.bounce[c]
     share, phi = (
         (b[Bounce.RESTITUTION], b[Bounce.GAP1]) if configuration == 1 else (1.0 - b[Bounce.RESTITUTION], b[Bounce.GAP2])
     )
-    pos, rot = (work.pos1, work.rot1) if configuration == 1 else (work.pos2, work.rot2)
+    pos, rot = (data.pos1, data.rot1) if configuration == 1 else (data.pos2, data.rot2)
     at = centre(model, c, pos, rot)
     _, Fx, Fy, _, _, _ = height_field(model, k, at[0], at[1])
     i = 1.0 / sqrt(1.0 + Fx * Fx + Fy * Fy)
-    t = -share * i / work.contact_frame[c, 2]
+    t = -share * i / data.contact_frame[c, 2]
     if share != 0.0:
         spread(model, k, at, (t, t * phi * i * Fx, t * phi * i * Fy), X, 3 * c, out)
 
 
 @kernel
-def spread_contacts(model: Model, work: Work, X: Matrix, out: Matrix) -> None:
+def spread_contacts(model: Model, data: Data, X: Matrix, out: Matrix) -> None:
     """out (n, ncoefficient) += d/d(coefficients) from the columns X (n, 3 nground) by F, F_x and F_y."""
     for c in range(model.contact_terrain.shape[0]):
-        if is_on_terrain(model, work, c):
-            at = centre(model, c, work.pos3, work.rot3)
+        if is_on_terrain(model, data, c):
+            at = centre(model, c, data.pos3, data.rot3)
             spread(model, model.contact_terrain[c] - 1, at, (0.0, 0.0, 0.0), X, 3 * c, out)
-            if work.bounce[c, Bounce.RESTITUTION] > 0.0:
-                spread_earlier(model, work, c, 1, X, out)
-                spread_earlier(model, work, c, 2, X, out)
+            if data.bounce[c, Bounce.RESTITUTION] > 0.0:
+                spread_earlier(model, data, c, 1, X, out)
+                spread_earlier(model, data, c, 2, X, out)
 
 
 @kernel
-def height_jacobian(model_at: Table, work_at: Table, at: At, places: Matrix, out: Matrix) -> None:
-    """out (2 nv, ncoefficient) += d(next state)/d(coefficients), of the step that `linearize` left in the Work.
+def height_jacobian(model_at: Table, data_at: Table, at: At, places: Matrix, out: Matrix) -> None:
+    """out (2 nv, ncoefficient) += d(next state)/d(coefficients), of the step that `linearize` left in the Data.
 
     places: (2 nv, 3 nground), the same by F, F_x, F_y of every contact; overwritten.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    width = column_count(model, work)
+    data = data_view(data_at)
+    width = column_count(model, data)
     first = 0
     while first < places.shape[1]:
         count = min(width, places.shape[1] - first)
-        clear_columns(work)
+        clear_columns(data)
         for m in range(count):
-            add_ground_place(model, work, at.h, (first + m) // 3, (first + m) % 3, m)
-        solve_panel(model, work)
-        solve_coupling_panel(model, work)
-        coordinate_rows(model, work, at.h, first, count, places)
+            add_ground_place(model, data, at.h, (first + m) // 3, (first + m) % 3, m)
+        solve_panel(model, data)
+        solve_coupling_panel(model, data)
+        coordinate_rows(model, data, at.h, first, count, places)
         first += width
-    spread_contacts(model, work, places, out)
+    spread_contacts(model, data, places, out)
 
 
 @optional(Slot.ADD_HEIGHT_GRADIENT)
-def add_height_gradient(model: Model, work: Work, h: float, y: Vector, places: Matrix, out: Matrix) -> None:
+def add_height_gradient(model: Model, data: Data, h: float, y: Vector, places: Matrix, out: Matrix) -> None:
     """out (1, ncoefficient) += y.(-dR/d(coefficients)); places: (1, 3 nground), overwritten."""
     for m in range(places.shape[1]):
-        for d in range(work.columns.shape[0]):
-            work.columns[d, 0] = 0.0
-        add_ground_place(model, work, h, m // 3, m % 3, 0)
+        for d in range(data.columns.shape[0]):
+            data.columns[d, 0] = 0.0
+        add_ground_place(model, data, h, m // 3, m % 3, 0)
         s = 0.0
-        for d in range(work.columns.shape[0]):
-            s += y[d] * work.columns[d, 0]
+        for d in range(data.columns.shape[0]):
+            s += y[d] * data.columns[d, 0]
         places[0, m] = s
-    spread_contacts(model, work, places, out)
+    spread_contacts(model, data, places, out)

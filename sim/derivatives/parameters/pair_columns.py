@@ -9,7 +9,7 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
 from sim.derivatives.parameters.string_columns import add_moved_end
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
@@ -23,16 +23,16 @@ def row(X: Vector, first: int) -> Vec3:
 
 
 @kernel
-def pair_floor(work: Work, c: int, side: int, e1: Vec3, e2: Vec3) -> float:
+def pair_floor(data: Data, c: int, side: int, e1: Vec3, e2: Vec3) -> float:
     """Change of the floor that an impact raises when the shape of a (0) or b (1) is moved by e1, e2 at 1 and 2."""
-    b = work.bounce[c]
-    d = floor_change(work, c, dot(row(b, 2), e1), dot(row(b, 8), e2))
+    b = data.bounce[c]
+    d = floor_change(data, c, dot(row(b, 2), e1), dot(row(b, 8), e2))
     return d if side == 0 else -d
 
 
 @kernel
 def add_moved_shape(
-    model: Model, work: Work, h: float, j: int, side: int, e: Vec3, floor: float, w: float, col: int
+    model: Model, data: Data, h: float, j: int, side: int, e: Vec3, floor: float, w: float, col: int
 ) -> None:
     """The shape of a (side 0) or b (1) of pair j moves by e, the floor of an impact rises by `floor`; a relative to b:
 
@@ -42,36 +42,36 @@ def add_moved_shape(
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
     z = e if side == 0 else (-e[0], -e[1], -e[2])
-    Omega, M, F = work.pair_turn[j], work.pair_shift[j], work.pair_frame[j]
+    Omega, M, F = data.pair_turn[j], data.pair_shift[j], data.pair_frame[j]
     turn = (dot(row(Omega, 0), z), dot(row(Omega, 6), z), dot(row(Omega, 12), z))
     dp = (dot(row(M, 0), z), dot(row(M, 6), z), dot(row(M, 12), z))
     if side == 1:
         dp = (dp[0] + e[0], dp[1] + e[1], dp[2] + e[2])
-    u = _relative_velocity(work, h, a, b, row(F, 9))
-    v = turning(work, h, a, dp)
+    u = _relative_velocity(data, h, a, b, row(F, 9))
+    v = turning(data, h, a, dp)
     if b >= 0:
-        t = turning(work, h, b, dp)
+        t = turning(data, h, b, dp)
         v = (v[0] - t[0], v[1] - t[1], v[2] - t[2])
     x = cross(u[0], u[1], u[2], turn[0], turn[1], turn[2])
     v = (v[0] + x[0], v[1] + x[1], v[2] + x[2])
-    g = impulse_change(work, c, dot(row(F, 0), z) - floor, dot(row(F, 3), v), dot(row(F, 6), v))
-    df = pair_force(work, j, g[0], g[1], g[2])
-    q = contact_impulse(model, work, c)
-    f = pair_force(work, j, q[0], q[1], q[2])
+    g = impulse_change(data, c, dot(row(F, 0), z) - floor, dot(row(F, 3), v), dot(row(F, 6), v))
+    df = pair_force(data, j, g[0], g[1], g[2])
+    q = contact_impulse(model, data, c)
+    f = pair_force(data, j, q[0], q[1], q[2])
     x = cross(turn[0], turn[1], turn[2], f[0], f[1], f[2])
-    add_pair(model, work, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
+    add_pair(model, data, j, (df[0] + x[0], df[1] + x[1], df[2] + x[2]), dp, w, col)
 
 
 @kernel
-def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
+def _relative_velocity(data: Data, h: float, a: int, b: int, p: Vec3) -> Vec3:
     """Velocity over the interval of the point p of a relative to that of b."""
-    x3, x2 = work.pos3[a], work.pos2[a]
-    v = turning(work, h, a, (p[0] - x3[0], p[1] - x3[1], p[2] - x3[2]))
+    x3, x2 = data.pos3[a], data.pos2[a]
+    v = turning(data, h, a, (p[0] - x3[0], p[1] - x3[1], p[2] - x3[2]))
     v = (v[0] + (x3[0] - x2[0]) / h, v[1] + (x3[1] - x2[1]) / h, v[2] + (x3[2] - x2[2]) / h)
     if b < 0:
         return v
-    x3, x2 = work.pos3[b], work.pos2[b]
-    t = turning(work, h, b, (p[0] - x3[0], p[1] - x3[1], p[2] - x3[2]))
+    x3, x2 = data.pos3[b], data.pos2[b]
+    t = turning(data, h, b, (p[0] - x3[0], p[1] - x3[1], p[2] - x3[2]))
     return (
         v[0] - t[0] - (x3[0] - x2[0]) / h,
         v[1] - t[1] - (x3[1] - x2[1]) / h,
@@ -80,13 +80,13 @@ def _relative_velocity(work: Work, h: float, a: int, b: int, p: Vec3) -> Vec3:
 
 
 @kernel
-def is_felt(model: Model, work: Work, j: int) -> bool:
+def is_felt(model: Model, data: Data, j: int) -> bool:
     """Whether pair j had a part in the step."""
-    return not is_absent(work, j) and is_active(work, model.contact_height.shape[0] + j)
+    return not is_absent(data, j) and is_active(data, model.contact_height.shape[0] + j)
 
 
 @kernel
-def add_pairs_mass(model: Model, work: Work, i: int, w: float, col: int) -> None:
+def add_pairs_mass(model: Model, data: Data, i: int, w: float, col: int) -> None:
     """Where the forces of collisions act follows the mass of body i: dP = m_b/m^2 (dx_a - dx_b) for a, m = m_a + m_b.
 
     dx = x3 - x2; for b, -m_a/m^2 instead.
@@ -94,33 +94,33 @@ def add_pairs_mass(model: Model, work: Work, i: int, w: float, col: int) -> None
     for j in range(model.pair_kind.shape[0]):
         a = model.coupling_body[model.pair_coupling[j], 0]
         b = model.coupling_body[model.pair_coupling[j], 1]
-        if b < 0 or (i != a and i != b) or not is_felt(model, work, j):
+        if b < 0 or (i != a and i != b) or not is_felt(model, data, j):
             continue
-        if is_taut(model, work, j):
+        if is_taut(model, data, j):
             continue
         m = model.body_mass[a] + model.body_mass[b]
         r = (model.body_mass[b] if i == a else -model.body_mass[a]) / (m * m)
-        x3, x2, y3, y2 = work.pos3[a], work.pos2[a], work.pos3[b], work.pos2[b]
+        x3, x2, y3, y2 = data.pos3[a], data.pos2[a], data.pos3[b], data.pos2[b]
         x, y, z = x3[0] - x2[0] - y3[0] + y2[0], x3[1] - x2[1] - y3[1] + y2[1], x3[2] - x2[2] - y3[2] + y2[2]
-        add_pair(model, work, j, (0.0, 0.0, 0.0), (r * x, r * y, r * z), w, col)
+        add_pair(model, data, j, (0.0, 0.0, 0.0), (r * x, r * y, r * z), w, col)
 
 
 @kernel
-def add_shapes_shift(model: Model, work: Work, h: float, first: int, k: int, w: float, col: int) -> None:
+def add_shapes_shift(model: Model, data: Data, h: float, first: int, k: int, w: float, col: int) -> None:
     """The shape of a (k < 3) or b of the collision whose first pair this is moves along axis k % 3 of its body."""
     side, e = k // 3, unit_vector(k % 3)
     i = model.coupling_body[model.pair_coupling[first], side]
     e1, e2, e3 = e, e, e
     if i >= 0:
-        e1 = rotate(work.rot1, i, e[0], e[1], e[2])
-        e2 = rotate(work.rot2, i, e[0], e[1], e[2])
-        e3 = rotate(work.rot3, i, e[0], e[1], e[2])
+        e1 = rotate(data.rot1, i, e[0], e[1], e[2])
+        e2 = rotate(data.rot2, i, e[0], e[1], e[2])
+        e3 = rotate(data.rot3, i, e[0], e[1], e[2])
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        if is_felt(model, work, j):
-            floor = pair_floor(work, model.contact_height.shape[0] + j, side, e1, e2)
-            if is_taut(model, work, j):
-                add_moved_end(model, work, j, side, e2, e3, floor, w, col)
+        if is_felt(model, data, j):
+            floor = pair_floor(data, model.contact_height.shape[0] + j, side, e1, e2)
+            if is_taut(model, data, j):
+                add_moved_end(model, data, j, side, e2, e3, floor, w, col)
             else:
-                add_moved_shape(model, work, h, j, side, e3, floor, w, col)
+                add_moved_shape(model, data, h, j, side, e3, floor, w, col)
         j += 1

@@ -2,7 +2,7 @@
 
 The minimal state x = (q2, v15) and the input are held fixed; what hangs on them moves with the parameter: poses at all
 three configurations, so also the momentum that enters the step. The factors of H are those that the derivatives by
-state and input have left in `work`.
+state and input have left in `data`.
 
 By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv = dv25/dv15
 
@@ -15,8 +15,8 @@ from sim.derivatives.parameters.columns import fill_columns
 from sim.derivatives.parameters.directions import At, Effect
 from sim.dynamics.elimination_panel import column_count, solve_panel
 from sim.dynamics.loops.coupling_system import solve_coupling_panel
-from sim.model.data import Work
-from sim.model.layout import model_view, work_view
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from solvers.compiler import Table, kernel
 from solvers.rotation import left_jacobian
@@ -24,21 +24,21 @@ from solvers.types import IntegerMatrix, Matrix, Vector
 
 
 @kernel
-def add_time_rates(work: Work, at: At, A: Matrix, w: float, m: int) -> None:
+def add_time_rates(data: Data, at: At, A: Matrix, w: float, m: int) -> None:
     """columns[:, m] += w (A_vv v15 - v25)/h"""
     nv = at.v.shape[0]
     for d in range(nv):
-        t = -work.nu[d]
+        t = -data.nu[d]
         for k in range(nv):
             t += A[nv + d, nv + k] * at.v[k]
-        work.columns[d, m] += w * t / at.h
+        data.columns[d, m] += w * t / at.h
 
 
 @kernel
-def coordinate_rows(model: Model, work: Work, h: float, first: int, count: int, out: Matrix) -> None:
+def coordinate_rows(model: Model, data: Data, h: float, first: int, count: int, out: Matrix) -> None:
     """out[:nv] = h dv25, h J(h w)^T dw of quaternions; out[nv:] = dv25; columns from `first` on."""
-    nv = work.columns.shape[0]
-    X = work.columns
+    nv = data.columns.shape[0]
+    X = data.columns
     for d in range(nv):
         for m in range(count):
             out[nv + d, first + m] = X[d, m]
@@ -47,7 +47,7 @@ def coordinate_rows(model: Model, work: Work, h: float, first: int, count: int, 
         if model.joint_nrot[i] != 3:
             continue
         d = model.body_vadr[i + 1] - 3
-        J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+        J = left_jacobian(h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2])
         for r in range(3):
             for m in range(count):
                 out[d + r, first + m] = h * (J[r] * X[d, m] + J[3 + r] * X[d + 1, m] + J[6 + r] * X[d + 2, m])
@@ -55,29 +55,29 @@ def coordinate_rows(model: Model, work: Work, h: float, first: int, count: int, 
 
 @kernel
 def parameter_jacobian(
-    model_at: Table, work_at: Table, at: At, A: Matrix, terms: IntegerMatrix, weights: Vector, out: Matrix
+    model_at: Table, data_at: Table, at: At, A: Matrix, terms: IntegerMatrix, weights: Vector, out: Matrix
 ) -> None:
-    """out = d(next state)/d(parameters), (2 nv, nparameter), of the step that `linearize` left in the Work.
+    """out = d(next state)/d(parameters), (2 nv, nparameter), of the step that `linearize` left in the Data.
 
     A: (2 nv, 2 nv) of that step.
     """
     model = model_view(model_at)
-    work = work_view(work_at)
+    data = data_view(data_at)
     nv = at.v.shape[0]
-    width = column_count(model, work)
+    width = column_count(model, data)
     first = 0
     start = 0
     while first < out.shape[1]:
-        end = fill_columns(model, work, at, terms, weights, first, start)
-        solve_panel(model, work)
-        solve_coupling_panel(model, work)
+        end = fill_columns(model, data, at, terms, weights, first, start)
+        solve_panel(model, data)
+        solve_coupling_panel(model, data)
         for t in range(start, end):
             if terms[t, 0] == Effect.TIME_STEP:
-                add_time_rates(work, at, A, weights[t], terms[t, 3] - first)
-        coordinate_rows(model, work, at.h, first, min(width, out.shape[1] - first), out)
+                add_time_rates(data, at, A, weights[t], terms[t, 3] - first)
+        coordinate_rows(model, data, at.h, first, min(width, out.shape[1] - first), out)
         for t in range(start, end):
             if terms[t, 0] == Effect.TIME_STEP:
                 for d in range(nv):
-                    out[d, terms[t, 3]] += weights[t] * work.nu[d]
+                    out[d, terms[t, 3]] += weights[t] * data.nu[d]
         first += width
         start = end

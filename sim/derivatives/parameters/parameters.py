@@ -30,7 +30,7 @@ from sim.mechanism.closing import is_weld
 from sim.mechanism.mechanism import Mechanism
 from solvers.types import IntegerMatrix, Vector
 
-__all__ = ["KINDS", "Parameter", "Parameters", "Plan", "all_parameters"]
+__all__ = ["KINDS", "Parameter", "Parameters", "ParameterPlan", "all_parameters"]
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Parameters(NamedTuple):
         return self.values[self.rows[name]]
 
 
-class Plan(NamedTuple):
+class ParameterPlan(NamedTuple):
     """Parameters as kernels need them, see columns.py; heights of terrain apart, see terrain_parameters.py."""
 
     terms: IntegerMatrix  # (m, 4)

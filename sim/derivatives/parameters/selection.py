@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.derivatives.parameters.directions import Effect
 from sim.derivatives.parameters.mechanism_editor import Draft
-from sim.derivatives.parameters.parameters import KINDS, Parameter, Parameters, Plan, all_parameters
+from sim.derivatives.parameters.parameters import KINDS, Parameter, ParameterPlan, Parameters, all_parameters
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 
@@ -53,7 +53,7 @@ def _common(parameters: Sequence[Parameter]) -> list[Parameter]:
     return found
 
 
-def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple[Parameters, Plan]:
+def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple[Parameters, ParameterPlan]:
     """The parameters of the names, in their order, and the terms of their columns."""
     found: list[Parameter] = []
     rows: dict[str, slice] = {}
@@ -67,7 +67,7 @@ def select(call: str, known: Sequence[Parameter], names: Sequence[str]) -> tuple
     weights = np.array([term[3] for p in found for term in p.terms], dtype=np.float64)
     of_terrain = terms[:, 0] == Effect.TERRAIN
     heights = np.ascontiguousarray(terms[of_terrain][:, [1, 3]])
-    plan = Plan(terms[~of_terrain], weights[~of_terrain], len(found), heights, weights[of_terrain])
+    plan = ParameterPlan(terms[~of_terrain], weights[~of_terrain], len(found), heights, weights[of_terrain])
     values = np.array([p.value for p in found])
     values.flags.writeable = False  # kept by the simulator
     return Parameters(tuple(p.name for p in found), values, rows), plan

@@ -16,7 +16,7 @@ from sim.derivatives.parameters.directions import SIDE, Size
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.columns import Bounce, Witness
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.shape_kinds import SWAPPED, Pair
 from solvers.compiler import kernel
@@ -35,16 +35,16 @@ def shape_sizes(model: Model, j: int, side: int) -> tuple[float, float]:
 
 
 @kernel
-def axis_and_side(work: Work, s: int, k: int, x: Vec3) -> tuple[Vec3, float]:
+def axis_and_side(data: Data, s: int, k: int, x: Vec3) -> tuple[Vec3, float]:
     """Axis k of shape s, and the sign of x, from its centre, along it."""
-    R = work.shape_rot[s]
+    R = data.shape_rot[s]
     axis = (R[k], R[3 + k], R[6 + k])
     return axis, 1.0 if dot(axis, x) >= 0.0 else -1.0
 
 
 @kernel
 def element_shift(
-    model: Model, work: Work, j: int, which: int, phi: float, n: Vec3, p: Vec3, configuration: int
+    model: Model, data: Data, j: int, which: int, phi: float, n: Vec3, p: Vec3, configuration: int
 ) -> Vec3:
     """e, world axes, of the shape and size `which` of pair j at configuration 1, 2 or 3.
 
@@ -58,16 +58,16 @@ def element_shift(
         return 0.5 * out * n[0], 0.5 * out * n[1], 0.5 * out * n[2]
     first = j - model.pair_feature[j]
     s = 2 * first + side
-    pos = work.pos1 if configuration == 1 else (work.pos2 if configuration == 2 else work.pos3)
-    rot = work.rot1 if configuration == 1 else (work.rot2 if configuration == 2 else work.rot3)
-    place_shape(model, work, s, model.coupling_body[model.pair_coupling[j], side], pos, rot)
+    pos = data.pos1 if configuration == 1 else (data.pos2 if configuration == 2 else data.pos3)
+    rot = data.rot1 if configuration == 1 else (data.rot2 if configuration == 2 else data.rot3)
+    place_shape(model, data, s, model.coupling_body[model.pair_coupling[j], side], pos, rot)
     radius, half = shape_sizes(model, j, side)
     r = 0.5 * phi + (radius if way == Size.ROD else 0.0)  # from the middle to the surface, or to the segment inside
-    o = row(work.shape_pos[s], 0)
+    o = row(data.shape_pos[s], 0)
     x = (p[0] + out * r * n[0] - o[0], p[1] + out * r * n[1] - o[1], p[2] + out * r * n[2] - o[2])
     if way == Size.SCALE:
         return x
-    axis, end = axis_and_side(work, s, way - Size.SIDE_X.value if Size.SIDE_X <= way <= Size.SIDE_Z else 2, x)
+    axis, end = axis_and_side(data, s, way - Size.SIDE_X.value if Size.SIDE_X <= way <= Size.SIDE_Z else 2, x)
     if way == Size.RIM:
         z = end * half
         return (x[0] - z * axis[0]) / radius, (x[1] - z * axis[1]) / radius, (x[2] - z * axis[2]) / radius
@@ -75,30 +75,30 @@ def element_shift(
 
 
 @kernel
-def earlier_shift(model: Model, work: Work, j: int, which: int, b: Vector, configuration: int) -> Vec3:
+def earlier_shift(model: Model, data: Data, j: int, which: int, b: Vector, configuration: int) -> Vec3:
     """`element_shift` at configuration 1 or 2, from what `look_back` (contact/restitution.py) has kept of it in b."""
     first = configuration == 1
     n = row(b, 2 if first else 8)
     p = row(b, 16 if first else 19)
-    return element_shift(model, work, j, which, b[14 if first else 15], n, p, configuration)
+    return element_shift(model, data, j, which, b[14 if first else 15], n, p, configuration)
 
 
 @kernel
-def add_shapes_size(model: Model, work: Work, h: float, first: int, which: int, w: float, col: int) -> None:
+def add_shapes_size(model: Model, data: Data, h: float, first: int, which: int, w: float, col: int) -> None:
     """A size of a shape of the collision whose first pair this is; which: SIDE side + Size."""
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        if is_felt(model, work, j):
+        if is_felt(model, data, j):
             c = model.contact_height.shape[0] + j
-            b = work.bounce[c]
+            b = data.bounce[c]
             floor = 0.0
             if b[Bounce.RESTITUTION] > 0.0:
-                e1, e2 = earlier_shift(model, work, j, which, b, 1), earlier_shift(model, work, j, which, b, 2)
-                floor = pair_floor(work, c, which // SIDE, e1, e2)
-            p = row(work.pair_frame[j], 9)
-            e = element_shift(model, work, j, which, work.pair_out[j, Witness.GAP], gap_normal(model, work, j), p, 3)
-            if is_taut(model, work, j):  # where it pulls along stays
-                add_moved_end(model, work, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
+                e1, e2 = earlier_shift(model, data, j, which, b, 1), earlier_shift(model, data, j, which, b, 2)
+                floor = pair_floor(data, c, which // SIDE, e1, e2)
+            p = row(data.pair_frame[j], 9)
+            e = element_shift(model, data, j, which, data.pair_out[j, Witness.GAP], gap_normal(model, data, j), p, 3)
+            if is_taut(model, data, j):  # where it pulls along stays
+                add_moved_end(model, data, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
             else:
-                add_moved_shape(model, work, h, j, which // SIDE, e, floor, w, col)
+                add_moved_shape(model, data, h, j, which // SIDE, e, floor, w, col)
         j += 1

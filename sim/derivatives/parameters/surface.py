@@ -11,7 +11,7 @@ from sim.contact.height_field import field_values, height_field
 from sim.contact.terrain_contact import centre, frame_turn
 from sim.derivatives.parameters.contact_columns import add_impulse, add_turn, floor_change, impulse_change, is_active
 from sim.model.columns import Bounce, Kin
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -19,25 +19,25 @@ from solvers.types import Matrix
 
 
 @kernel
-def is_on_terrain(model: Model, work: Work, c: int) -> bool:
+def is_on_terrain(model: Model, data: Data, c: int) -> bool:
     """Whether a height field has a part in the contact, and the contact in the step."""
-    return model.contact_terrain[c] > 0 and is_active(work, c)
+    return model.contact_terrain[c] > 0 and is_active(data, c)
 
 
 @kernel
-def add_ground_place(model: Model, work: Work, h: float, c: int, k: int, col: int) -> None:
+def add_ground_place(model: Model, data: Data, h: float, c: int, k: int, col: int) -> None:
     """columns[:, col] -= dR/d(F, F_x or F_y), k = 0, 1, 2, where contact c is."""
-    if not is_on_terrain(model, work, c):
+    if not is_on_terrain(model, data, c):
         return
-    n = work.contact_frame[c]
+    n = data.contact_frame[c]
     if k == 0:
-        add_impulse(model, work, c, impulse_change(work, c, -n[2], 0.0, 0.0), 1.0, col)
+        add_impulse(model, data, c, impulse_change(data, c, -n[2], 0.0, 0.0), 1.0, col)
         return
     phi = (
-        work.contact_kin[c, Kin.GAP] + work.bounce[c, Bounce.FLOOR]
+        data.contact_kin[c, Kin.GAP] + data.bounce[c, Bounce.FLOOR]
     )  # contact_kin has the gap above the floor of an impact
     turn = frame_turn(n, -1.0 if k == 1 else 0.0, -1.0 if k == 2 else 0.0)
-    add_turn(model, work, h, c, turn, phi * n[2] * n[k - 1], 1.0, col)
+    add_turn(model, data, h, c, turn, phi * n[2] * n[k - 1], 1.0, col)
 
 
 @kernel
@@ -52,16 +52,16 @@ def earlier_rate(model: Model, c: int, phi: float, pos: Matrix, rot: Matrix) -> 
 
 
 @optional(Slot.ADD_SURFACE_RADIUS)
-def add_surface_radius(model: Model, work: Work, h: float, c: int, w: float, col: int) -> None:
+def add_surface_radius(model: Model, data: Data, h: float, c: int, w: float, col: int) -> None:
     """The surface on which the centre of contact c is, made for a larger radius."""
-    if not is_on_terrain(model, work, c):
+    if not is_on_terrain(model, data, c):
         return
-    x, y, _ = centre(model, c, work.pos3, work.rot3)
+    x, y, _ = centre(model, c, data.pos3, data.rot3)
     G, Gx, Gy, _, _, _ = field_values(model, model.terrain_rates, model.contact_terrain[c] - 1, x, y)
-    n = work.contact_frame[c]
-    b = work.bounce[c]
-    gap = -n[2] * (G - (work.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]) * (n[0] * Gx + n[1] * Gy))
+    n = data.contact_frame[c]
+    b = data.bounce[c]
+    gap = -n[2] * (G - (data.contact_kin[c, Kin.GAP] + b[Bounce.FLOOR]) * (n[0] * Gx + n[1] * Gy))
     if b[Bounce.RESTITUTION] > 0.0:
-        d1 = earlier_rate(model, c, b[Bounce.GAP1], work.pos1, work.rot1)
-        gap -= floor_change(work, c, d1, earlier_rate(model, c, b[Bounce.GAP2], work.pos2, work.rot2))
-    add_turn(model, work, h, c, frame_turn(n, -Gx, -Gy), gap, w, col)
+        d1 = earlier_rate(model, c, b[Bounce.GAP1], data.pos1, data.rot1)
+        gap -= floor_change(data, c, d1, earlier_rate(model, c, b[Bounce.GAP2], data.pos2, data.rot2))
+    add_turn(model, data, h, c, frame_turn(n, -Gx, -Gy), gap, w, col)

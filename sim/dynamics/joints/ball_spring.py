@@ -5,7 +5,7 @@ With s the vector part of the rotation from rest, V_d = (h/2) k |(s(2) + s(3))/2
 
 from __future__ import annotations
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -26,21 +26,21 @@ def relative_to_rest(model: Model, i: int, q: Vector) -> Quat:
 
 
 @kernel
-def spring_turns(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> tuple[Quat, Quat, Quat]:
+def spring_turns(model: Model, data: Data, h: float, q: Vector, v: Vector, i: int) -> tuple[Quat, Quat, Quat]:
     """Rotation from rest of quaternion joint i at configurations 1, 2, 3; continuous, so no sign flips between them."""
     d = model.body_vadr[i] + model.joint_ntrans[i]
     r2 = relative_to_rest(model, i, q)
     e1 = quat_exp(-h * v[d], -h * v[d + 1], -h * v[d + 2])
-    e3 = quat_exp(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+    e3 = quat_exp(h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2])
     r1 = quat_mul(r2[0], r2[1], r2[2], r2[3], e1[0], e1[1], e1[2], e1[3])
     r3 = quat_mul(r2[0], r2[1], r2[2], r2[3], e3[0], e3[1], e3[2], e3[3])
     return r1, r2, r3
 
 
 @optional(Slot.SPRING_IMPULSE, default=(0.0, 0.0, 0.0))
-def spring_impulse(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> tuple[float, float, float]:
+def spring_impulse(model: Model, data: Data, h: float, q: Vector, v: Vector, i: int) -> tuple[float, float, float]:
     """(h k/2) (c2 I - [s2]) (s1 + 2 s2 + s3), s the vector parts of the rotations from rest."""
-    r1, r2, r3 = spring_turns(model, work, h, q, v, i)
+    r1, r2, r3 = spring_turns(model, data, h, q, v, i)
     g = 0.5 * h * model.dof_spring[model.body_vadr[i] + model.joint_ntrans[i]]
     x, y, z = r1[1] + 2 * r2[1] + r3[1], r1[2] + 2 * r2[2] + r3[2], r1[3] + 2 * r2[3] + r3[3]
     cx, cy, cz = cross(r2[1], r2[2], r2[3], x, y, z)
@@ -64,15 +64,15 @@ def turn_product(a: Quat, b: Quat) -> Mat3:
 
 
 @optional(Slot.ADD_SPRING_BLOCK)
-def add_spring_block(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> None:
+def add_spring_block(model: Model, data: Data, h: float, q: Vector, v: Vector, i: int) -> None:
     """joint_block[i] += d(spring impulse)/d(nu)."""
     d = model.body_vadr[i]
     n = model.body_vadr[i + 1] - d
-    B = work.joint_block[i]
+    B = data.joint_block[i]
     e = d + n - 3
-    _, r2, r3 = spring_turns(model, work, h, q, v, i)
+    _, r2, r3 = spring_turns(model, data, h, q, v, i)
     P = turn_product(r2, r3)
-    J = left_jacobian(-h * work.nu[e], -h * work.nu[e + 1], -h * work.nu[e + 2])  # right Jacobian
+    J = left_jacobian(-h * data.nu[e], -h * data.nu[e + 1], -h * data.nu[e + 2])  # right Jacobian
     g = h * h * model.dof_spring[e]
     for a in range(3):
         for b in range(3):
@@ -81,10 +81,10 @@ def add_spring_block(model: Model, work: Work, h: float, q: Vector, v: Vector, i
 
 
 @optional(Slot.ADD_BALL_SPRING_DERIVATIVES)
-def add_ball_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vector, i: int) -> None:
+def add_ball_spring_derivatives(model: Model, data: Data, h: float, q: Vector, v: Vector, i: int) -> None:
     """The quaternion part of `add_spring_derivatives`, of joint i."""
     e = model.body_vadr[i] + model.joint_ntrans[i]
-    r1, r2, r3 = spring_turns(model, work, h, q, v, i)
+    r1, r2, r3 = spring_turns(model, data, h, q, v, i)
     g = h * model.dof_spring[e]
     y = (r1[1] + 2 * r2[1] + r3[1], r1[2] + 2 * r2[2] + r3[2], r1[3] + 2 * r2[3] + r3[3])
     c, s = r2[0], (r2[1], r2[2], r2[3])
@@ -92,7 +92,7 @@ def add_ball_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v
     P2 = turn_product(r2, r2)
     P3 = turn_product(r2, r3)
     e1 = quat_exp(-h * v[e], -h * v[e + 1], -h * v[e + 2])
-    e3 = quat_exp(h * work.nu[e], h * work.nu[e + 1], h * work.nu[e + 2])
+    e3 = quat_exp(h * data.nu[e], h * data.nu[e + 1], h * data.nu[e + 2])
     R1 = quat_matrix(e1[0], e1[1], e1[2], e1[3])
     R3 = quat_matrix(e3[0], e3[1], e3[2], e3[3])
     Y = (0.0, -y[2], y[1], y[2], 0.0, -y[0], -y[1], y[0], 0.0)
@@ -106,5 +106,5 @@ def add_ball_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v
                 t += P3[3 * a + k] * R3[3 * b + k]
             if a == b:
                 t -= 0.25 * dot
-            work.dR_dq[e + a, e + b] += g * (t + w)
-            work.dR_dv[e + a, e + b] += g * w
+            data.dR_dq[e + a, e + b] += g * (t + w)
+            data.dR_dv[e + a, e + b] += g * w

@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from sim.model.columns import Bound, BoundRow
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -25,15 +25,15 @@ from solvers.rotation import Vec3, cross, left_jacobian, quat_exp, quat_matrix
 
 
 @kernel
-def _cone_axes(model: Model, work: Work, h: float, k: int) -> tuple[Vec3, Vec3]:
+def _cone_axes(model: Model, data: Data, h: float, k: int) -> tuple[Vec3, Vec3]:
     """v, b: the axes of child and parent at configuration 3, in the child's axes at configuration 2."""
     d = model.limit_dof[k]
     i = model.dof_body[d]
     a = model.joint_axis[i]
     q = model.dof_qadr[d]
-    e = quat_exp(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
+    e = quat_exp(h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2])
     E = quat_matrix(e[0], e[1], e[2], e[3])
-    R = quat_matrix(work.theta3[q], work.theta3[q + 1], work.theta3[q + 2], work.theta3[q + 3])
+    R = quat_matrix(data.theta3[q], data.theta3[q + 1], data.theta3[q + 2], data.theta3[q + 3])
     x = R[0] * a[0] + R[3] * a[1] + R[6] * a[2]
     y = R[1] * a[0] + R[4] * a[1] + R[7] * a[2]
     z = R[2] * a[0] + R[5] * a[1] + R[8] * a[2]
@@ -46,50 +46,50 @@ def _cone_axes(model: Model, work: Work, h: float, k: int) -> tuple[Vec3, Vec3]:
 
 
 @optional(Slot.CONE_GAP)
-def cone_gap(model: Model, work: Work, h: float, k: int) -> None:
+def cone_gap(model: Model, data: Data, h: float, k: int) -> None:
     """bound_gap, and p in bound_row."""
-    v, b = _cone_axes(model, work, h, k)
+    v, b = _cone_axes(model, data, h, k)
     scale = 1.0 / sin(model.limit_bound[k])
     x, y, z = cross(v[0], v[1], v[2], b[0], b[1], b[2])
-    work.bound_gap[k] = scale * (v[0] * b[0] + v[1] * b[1] + v[2] * b[2] - cos(model.limit_bound[k]))
-    work.bound_row[k, BoundRow.TORQUE] = scale * x
-    work.bound_row[k, BoundRow.TORQUE + 1] = scale * y
-    work.bound_row[k, BoundRow.TORQUE + 2] = scale * z
+    data.bound_gap[k] = scale * (v[0] * b[0] + v[1] * b[1] + v[2] * b[2] - cos(model.limit_bound[k]))
+    data.bound_row[k, BoundRow.TORQUE] = scale * x
+    data.bound_row[k, BoundRow.TORQUE + 1] = scale * y
+    data.bound_row[k, BoundRow.TORQUE + 2] = scale * z
 
 
 @optional(Slot.CONE_BLOCK)
-def cone_block(model: Model, work: Work, h: float, k: int) -> None:
+def cone_block(model: Model, data: Data, h: float, k: int) -> None:
     """joint_block += (gamma/s) p c^T - gamma dp h J; fills c."""
     d = model.limit_dof[k]
     i = model.dof_body[d]
     n = model.body_vadr[i + 1] - model.body_vadr[i]
     first = (d - model.body_vadr[i]) * (n + 1)
-    v, b = _cone_axes(model, work, h, k)
-    J = left_jacobian(h * work.nu[d], h * work.nu[d + 1], h * work.nu[d + 2])
-    p = work.bound_row[k]
+    v, b = _cone_axes(model, data, h, k)
+    J = left_jacobian(h * data.nu[d], h * data.nu[d + 1], h * data.nu[d + 2])
+    p = data.bound_row[k]
     x, y, z = p[BoundRow.TORQUE], p[BoundRow.TORQUE + 1], p[BoundRow.TORQUE + 2]
     for j in range(3):
         p[BoundRow.RATE + j] = h * (J[j] * x + J[3 + j] * y + J[6 + j] * z)
     dot = v[0] * b[0] + v[1] * b[1] + v[2] * b[2]
-    ratio = work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
-    g = h * work.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
+    ratio = data.bound[k, Bound.IMPULSE] / data.bound[k, Bound.SLACK]
+    g = h * data.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
     for j in range(3):
         bJ = b[0] * J[j] + b[1] * J[3 + j] + b[2] * J[6 + j]
         for r in range(3):
             bent = g * (v[r] * bJ - dot * J[3 * r + j])
-            work.joint_block[i, first + r * n + j] += ratio * p[r] * p[BoundRow.RATE + j] - bent
+            data.joint_block[i, first + r * n + j] += ratio * p[r] * p[BoundRow.RATE + j] - bent
 
 
 @optional(Slot.CONE_DERIVATIVE)
-def cone_derivative(model: Model, work: Work, h: float, k: int) -> None:
+def cone_derivative(model: Model, data: Data, h: float, k: int) -> None:
     """dR_dq += (gamma/s) p p^T - gamma (b v^T - (v.b) I)/sin angle: b turns with q2, v does not."""
     d = model.limit_dof[k]
-    v, b = _cone_axes(model, work, h, k)
-    p = work.bound_row[k]
-    ratio = work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
-    g = work.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
+    v, b = _cone_axes(model, data, h, k)
+    p = data.bound_row[k]
+    ratio = data.bound[k, Bound.IMPULSE] / data.bound[k, Bound.SLACK]
+    g = data.bound[k, Bound.IMPULSE] / sin(model.limit_bound[k])
     dot = v[0] * b[0] + v[1] * b[1] + v[2] * b[2]
     for r in range(3):
         for j in range(3):
-            work.dR_dq[d + r, d + j] += ratio * p[r] * p[j] - g * b[r] * v[j]
-        work.dR_dq[d + r, d + r] += g * dot
+            data.dR_dq[d + r, d + j] += ratio * p[r] * p[j] - g * b[r] * v[j]
+        data.dR_dq[d + r, d + r] += g * dot

@@ -11,7 +11,7 @@ from __future__ import annotations
 from sim.dynamics.joints.cone_limit import cone_block, cone_derivative, cone_gap
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.model.columns import Bound, BoundRow
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
 from sim.model.slots import Slot
@@ -20,18 +20,18 @@ from solvers.cones import onto_path, return_pair
 
 
 @kernel
-def limit_gaps(model: Model, work: Work, h: float) -> None:
+def limit_gaps(model: Model, data: Data, h: float) -> None:
     """bound_gap, and p of cones."""
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
-            cone_gap(model, work, h, k)
+            cone_gap(model, data, h, k)
             continue
         a = model.dof_qadr[model.limit_dof[k]]
-        work.bound_gap[k] = model.limit_sign[k] * (work.theta3[a] - model.limit_bound[k])
+        data.bound_gap[k] = model.limit_sign[k] * (data.theta3[a] - model.limit_bound[k])
 
 
 @kernel
-def add_limit_blocks(model: Model, work: Work, h: float) -> None:
+def add_limit_blocks(model: Model, data: Data, h: float) -> None:
     """joint_block += h gamma/s on the diagonal, and what a cone has in its place."""
     for k in range(model.limit_dof.shape[0]):
         d = model.limit_dof[k]
@@ -39,72 +39,72 @@ def add_limit_blocks(model: Model, work: Work, h: float) -> None:
         n = model.body_vadr[i + 1] - model.body_vadr[i]
         a = d - model.body_vadr[i]
         if model.limit_cone[k]:
-            cone_block(model, work, h, k)
+            cone_block(model, data, h, k)
         else:
-            work.joint_block[i, a * n + a] += h * work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
+            data.joint_block[i, a * n + a] += h * data.bound[k, Bound.IMPULSE] / data.bound[k, Bound.SLACK]
 
 
 @optional(Slot.ADD_LIMIT_DERIVATIVES)
-def add_limit_derivatives(model: Model, work: Work, h: float) -> None:
+def add_limit_derivatives(model: Model, data: Data, h: float) -> None:
     """dR_dq += gamma/s, and what a cone has in its place."""
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
-            cone_derivative(model, work, h, k)
+            cone_derivative(model, data, h, k)
         else:
             d = model.limit_dof[k]
-            work.dR_dq[d, d] += work.bound[k, Bound.IMPULSE] / work.bound[k, Bound.SLACK]
+            data.dR_dq[d, d] += data.bound[k, Bound.IMPULSE] / data.bound[k, Bound.SLACK]
 
 
 @kernel
-def limit_constants(model: Model, work: Work, target: NewtonTarget) -> None:
+def limit_constants(model: Model, data: Data, target: NewtonTarget) -> None:
     """dnu += (impulse of size w), with d gamma = w - (gamma/s) d gap; w kept in bound_w."""
     for k in range(model.limit_dof.shape[0]):
-        s = work.bound[k, Bound.SLACK]
-        g = work.bound[k, Bound.IMPULSE]
+        s = data.bound[k, Bound.SLACK]
+        g = data.bound[k, Bound.IMPULSE]
         r = target.kappa - s * g
         if target.corrected > 0.0:
-            r -= target.corrected * work.bound_step[k, Bound.SLACK] * work.bound_step[k, Bound.IMPULSE]
-        w = (r - g * target.share * (work.bound_gap[k] - s)) / s
-        work.bound_w[k] = w
-        add_limit_impulse(model, work, k, w, work.dnu)
+            r -= target.corrected * data.bound_step[k, Bound.SLACK] * data.bound_step[k, Bound.IMPULSE]
+        w = (r - g * target.share * (data.bound_gap[k] - s)) / s
+        data.bound_w[k] = w
+        add_limit_impulse(model, data, k, w, data.dnu)
 
 
 @kernel
-def resume_limits(model: Model, work: Work, weight: float, kappa: float, predicted: bool) -> None:
+def resume_limits(model: Model, data: Data, weight: float, kappa: float, predicted: bool) -> None:
     """All pairs on the central path of kappa, near their gaps and the impulses that they had (in bound_trial).
 
     predicted: near the impulses that they have now; those that press stay and give the slacks.
     """
     for k in range(model.limit_dof.shape[0]):
-        b = work.bound[k]
-        impulse = b[Bound.IMPULSE] if predicted else work.bound_trial[k, Bound.IMPULSE]
+        b = data.bound[k]
+        impulse = b[Bound.IMPULSE] if predicted else data.bound_trial[k, Bound.IMPULSE]
         if predicted and weight * impulse * impulse > kappa:
             b[Bound.SLACK] = kappa / impulse
         else:
-            b[Bound.SLACK], b[Bound.IMPULSE] = onto_path(work.bound_gap[k], impulse, weight, kappa)
+            b[Bound.SLACK], b[Bound.IMPULSE] = onto_path(data.bound_gap[k], impulse, weight, kappa)
 
 
 @kernel
-def return_limits(model: Model, work: Work, weight: float, kappa: float) -> None:
+def return_limits(model: Model, data: Data, weight: float, kappa: float) -> None:
     """The pairs that left their cones put back onto the central path of kappa."""
     for k in range(model.limit_dof.shape[0]):
-        return_pair(work.bound[k], work.bound_trial[k], 0, 1, weight, kappa)
+        return_pair(data.bound[k], data.bound_trial[k], 0, 1, weight, kappa)
 
 
 @kernel
-def recover_limits(model: Model, work: Work, h: float, share: float) -> None:
+def recover_limits(model: Model, data: Data, h: float, share: float) -> None:
     """bound_step from dnu."""
     for k in range(model.limit_dof.shape[0]):
-        s = work.bound[k, Bound.SLACK]
+        s = data.bound[k, Bound.SLACK]
         d = model.limit_dof[k]
         if model.limit_cone[k]:
-            c = work.bound_row[k]
+            c = data.bound_row[k]
             t = (
-                c[BoundRow.RATE] * work.dnu[d]
-                + c[BoundRow.RATE + 1] * work.dnu[d + 1]
-                + c[BoundRow.RATE + 2] * work.dnu[d + 2]
+                c[BoundRow.RATE] * data.dnu[d]
+                + c[BoundRow.RATE + 1] * data.dnu[d + 1]
+                + c[BoundRow.RATE + 2] * data.dnu[d + 2]
             )
         else:
-            t = model.limit_sign[k] * h * work.dnu[d]
-        work.bound_step[k, Bound.SLACK] = t + share * (work.bound_gap[k] - s)
-        work.bound_step[k, Bound.IMPULSE] = work.bound_w[k] - work.bound[k, Bound.IMPULSE] / s * t
+            t = model.limit_sign[k] * h * data.dnu[d]
+        data.bound_step[k, Bound.SLACK] = t + share * (data.bound_gap[k] - s)
+        data.bound_step[k, Bound.IMPULSE] = data.bound_w[k] - data.bound[k, Bound.IMPULSE] / s * t

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from math import cos, sin, sqrt
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -126,27 +126,27 @@ def column_derivative(t: Vec3, x: Vector, y: Vector) -> Vec3:
 
 
 @optional(Slot.SWING_CURVATURE)
-def swing_curvature(model: Model, work: Work, i: int, p1: float, p2: float) -> None:
+def swing_curvature(model: Model, data: Data, i: int, p1: float, p2: float) -> None:
     """dR_dq += m . d(column j)/d(p_k) of joint i at p, m the residual moment on the subtree about the joint.
 
     All in the child's axes, in which a test direction changes; that it turns with its joint, `residual_derivatives`
     knows.
     """
     c = model.joint_child_point[i]
-    x, y, z = rotate(work.rot2, i, c[0], c[1], c[2])
+    x, y, z = rotate(data.rot2, i, c[0], c[1], c[2])
     x, y, z = (
-        x + work.pos2[i, 0] - work.origin[0],
-        y + work.pos2[i, 1] - work.origin[1],
-        z + work.pos2[i, 2] - work.origin[2],
+        x + data.pos2[i, 0] - data.origin[0],
+        y + data.pos2[i, 1] - data.origin[1],
+        z + data.pos2[i, 2] - data.origin[2],
     )
-    f = work.subtree[i]
+    f = data.subtree[i]
     x, y, z = cross(x, y, z, f[0], f[1], f[2])
     x, y, z = f[3] - x, f[4] - y, f[5] - z
-    m0, m1, m2 = transposed_times(work.rot2[i], x, y, z)
+    m0, m1, m2 = transposed_times(data.rot2[i], x, y, z)
     d = model.body_vadr[i + 1] - 2
     t = swing(model, i, p1, p2)
     V = model.joint_swing_axes[i]
     for j in range(2):
         for k in range(2):
             g = column_derivative(t, V[3 * j : 3 * j + 3], V[3 * k : 3 * k + 3])
-            work.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2
+            data.dR_dq[d + j, d + k] += g[0] * m0 + g[1] * m1 + g[2] * m2

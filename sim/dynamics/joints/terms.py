@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from sim.dynamics.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
 from sim.dynamics.joints.swing import swing_curvature
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import InputKind, Model
 from solvers.compiler import kernel
 from solvers.types import Vector
 
 
 @kernel
-def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: Vector) -> None:
+def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> None:
     """residual += I (nu - v) + h d nu + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints."""
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
@@ -25,24 +25,24 @@ def joint_impulses(model: Model, work: Work, h: float, q: Vector, v: Vector, u: 
         if model.joint_nrot[i] == 3:
             end -= 3
             if model.dof_spring[end] > 0.0:
-                t = spring_impulse(model, work, h, q, v, i)
+                t = spring_impulse(model, data, h, q, v, i)
                 for k in range(3):
-                    work.residual[end + k] += t[k]
+                    data.residual[end + k] += t[k]
             for k in range(end, end + 3):
-                work.residual[k] += h * model.dof_damper[k] * work.nu[k]
+                data.residual[k] += h * model.dof_damper[k] * data.nu[k]
         for e in range(d, end):
-            r = h * model.dof_damper[e] * work.nu[e] + model.dof_armature[e] * (work.nu[e] - v[e])
+            r = h * model.dof_damper[e] * data.nu[e] + model.dof_armature[e] * (data.nu[e] - v[e])
             if model.dof_spring[e] > 0.0:
-                mid = q[model.dof_qadr[e]] + 0.25 * h * (work.nu[e] - v[e]) - model.dof_rest[e]
+                mid = q[model.dof_qadr[e]] + 0.25 * h * (data.nu[e] - v[e]) - model.dof_rest[e]
                 r += h * model.dof_spring[e] * mid
-            work.residual[e] += r
+            data.residual[e] += r
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:
-            work.residual[model.input_index[j]] -= h * u[j]
+            data.residual[model.input_index[j]] -= h * u[j]
 
 
 @kernel
-def joint_blocks(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """joint_block[i] = d(joint impulses)/d(nu), n x n row-major.
 
     I + h d + h^2 k/4 on the diagonal, and the springs of quaternion joints.
@@ -50,7 +50,7 @@ def joint_blocks(model: Model, work: Work, h: float, q: Vector, v: Vector) -> No
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d
-        B = work.joint_block[i]
+        B = data.joint_block[i]
         for k in range(n * n):
             B[k] = 0.0
         for k in range(n):
@@ -58,11 +58,11 @@ def joint_blocks(model: Model, work: Work, h: float, q: Vector, v: Vector) -> No
             if model.joint_nrot[i] < 3 or k < n - 3:
                 B[k * n + k] += 0.25 * h * h * model.dof_spring[d + k]
         if model.joint_nrot[i] == 3 and model.dof_spring[d + n - 3] > 0.0:
-            add_spring_block(model, work, h, q, v, i)
+            add_spring_block(model, data, h, q, v, i)
 
 
 @kernel
-def add_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+def add_spring_derivatives(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """dR_dq, dR_dv += springs; dR_dv in unit columns, to be multiplied by -h and -h J(h v)^T like all others.
 
     scalar        h k and h k/4 + I/h, I the armature
@@ -73,27 +73,27 @@ def add_spring_derivatives(model: Model, work: Work, h: float, q: Vector, v: Vec
         d = model.body_vadr[i]
         n = model.joint_ntrans[i] if model.joint_nrot[i] == 3 else model.body_vadr[i + 1] - d
         for e in range(d, d + n):
-            work.dR_dq[e, e] += h * model.dof_spring[e]
-            work.dR_dv[e, e] += 0.25 * h * model.dof_spring[e] + model.dof_armature[e] / h
+            data.dR_dq[e, e] += h * model.dof_spring[e]
+            data.dR_dv[e, e] += 0.25 * h * model.dof_spring[e] + model.dof_armature[e] / h
         if model.joint_nrot[i] == 3 and model.dof_spring[d + n] > 0.0:
-            add_ball_spring_derivatives(model, work, h, q, v, i)
+            add_ball_spring_derivatives(model, data, h, q, v, i)
 
 
 @kernel
-def add_swing_curvature(model: Model, work: Work, q: Vector) -> None:
+def add_swing_curvature(model: Model, data: Data, q: Vector) -> None:
     """dR_dq += what changes in the test directions of joints with two rotations, beyond turning (swing.py)."""
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 2:
             a = model.body_qadr[i + 1] - 2
-            swing_curvature(model, work, i, q[a], q[a + 1])
+            swing_curvature(model, data, i, q[a], q[a + 1])
 
 
 @kernel
-def add_limit_impulse(model: Model, work: Work, k: int, size: float, out: Vector) -> None:
+def add_limit_impulse(model: Model, data: Data, k: int, size: float, out: Vector) -> None:
     """out += the generalized impulse of limit k.   out: (nv,)."""
     d = model.limit_dof[k]
     if model.limit_cone[k]:
         for j in range(3):
-            out[d + j] += work.bound_row[k, j] * size
+            out[d + j] += data.bound_row[k, j] * size
     else:
         out[d] += model.limit_sign[k] * size

@@ -14,7 +14,7 @@ from __future__ import annotations
 from sim.dynamics.displacements import Increment, tree_moves, turn_bodies
 from sim.dynamics.loops.closure import loop_rows
 from sim.dynamics.loops.constraint_rows import add_along_path
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.types import Matrix, Vector
@@ -34,7 +34,7 @@ def _largest(a: Vector) -> float:
 
 
 @kernel
-def _add_directions(model: Model, work: Work, S: Matrix, B: Matrix, sign: float, out: Matrix) -> None:
+def _add_directions(model: Model, data: Data, S: Matrix, B: Matrix, sign: float, out: Matrix) -> None:
     """out[row] += sign S^T B, the generalized impulses of unit forces of the rows of loops."""
     for k in range(model.coupling_body.shape[0] - model.loop_ntrans.shape[0], model.coupling_body.shape[0]):
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
@@ -43,16 +43,16 @@ def _add_directions(model: Model, work: Work, S: Matrix, B: Matrix, sign: float,
 
 
 @kernel
-def _next_pivot(work: Work, first: int, last: int) -> tuple[int, int, float, float]:
+def _next_pivot(data: Data, first: int, last: int) -> tuple[int, int, float, float]:
     """Row and column of the largest entry of w in the rows that are left, its size, and that of dw."""
     row, col = -1, 0
     best = 0.0
     change = 0.0
     for r in range(first, last):
-        if work.loop_used[r] != 0:
+        if data.loop_used[r] != 0:
             continue
-        change = max(change, _largest(work.bifurcation_direction[r]))
-        w = work.couple_Y[r]
+        change = max(change, _largest(data.bifurcation_direction[r]))
+        w = data.couple_Y[r]
         for c in range(w.shape[0]):
             if abs(w[c]) > best:
                 best = abs(w[c])
@@ -61,67 +61,67 @@ def _next_pivot(work: Work, first: int, last: int) -> tuple[int, int, float, flo
 
 
 @kernel
-def _eliminate(work: Work, first: int, last: int, p: int, c: int) -> None:
+def _eliminate(data: Data, first: int, last: int, p: int, c: int) -> None:
     """Row p out of the rows that are left: w and dw combined as w says, and dw modulo the row p."""
-    w = work.couple_Y[p]
-    dw = work.bifurcation_direction[p]
-    work.loop_used[p] = 1
+    w = data.couple_Y[p]
+    dw = data.bifurcation_direction[p]
+    data.loop_used[p] = 1
     for r in range(first, last):
-        if work.loop_used[r] != 0:
+        if data.loop_used[r] != 0:
             continue
-        f = work.couple_Y[r, c] / w[c]
+        f = data.couple_Y[r, c] / w[c]
         for d in range(w.shape[0]):
-            work.couple_Y[r, d] -= f * w[d]
-            work.bifurcation_direction[r, d] -= f * dw[d]
-        work.couple_Y[r, c] = 0.0
-        f = work.bifurcation_direction[r, c] / w[c]
+            data.couple_Y[r, d] -= f * w[d]
+            data.bifurcation_direction[r, d] -= f * dw[d]
+        data.couple_Y[r, c] = 0.0
+        f = data.bifurcation_direction[r, c] / w[c]
         for d in range(w.shape[0]):
-            work.bifurcation_direction[r, d] -= f * w[d]
+            data.bifurcation_direction[r, d] -= f * w[d]
 
 
 @kernel
-def _set_rows(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+def _set_rows(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """couple_Y = w at configuration 2 and bifurcation_direction = dw, row by row; loop_scale = sizes of dw."""
-    for row in range(work.bifurcation_direction.shape[0]):
-        for d in range(work.bifurcation_direction.shape[1]):
-            work.couple_Y[row, d] = 0.0
-            work.bifurcation_direction[row, d] = 0.0
-    tree_moves(model, work, Increment(q, v, h), True)
-    turn_bodies(work, work.rot3)
-    _add_directions(model, work, work.S2, work.couple_B, 1.0, work.couple_Y)
+    for row in range(data.bifurcation_direction.shape[0]):
+        for d in range(data.bifurcation_direction.shape[1]):
+            data.couple_Y[row, d] = 0.0
+            data.bifurcation_direction[row, d] = 0.0
+    tree_moves(model, data, Increment(q, v, h), True)
+    turn_bodies(data, data.rot3)
+    _add_directions(model, data, data.S2, data.couple_B, 1.0, data.couple_Y)
     for m in range(model.loop_ntrans.shape[0]):
-        loop_rows(model, work, m, work.pos3, work.rot3, work.couple_G)
-    _add_directions(model, work, work.S3, work.couple_G, 0.5, work.bifurcation_direction)
+        loop_rows(model, data, m, data.pos3, data.rot3, data.couple_G)
+    _add_directions(model, data, data.S3, data.couple_G, 0.5, data.bifurcation_direction)
     for m in range(model.loop_ntrans.shape[0]):
-        loop_rows(model, work, m, work.pos1, work.rot1, work.couple_G)
-    _add_directions(model, work, work.S1, work.couple_G, -0.5, work.bifurcation_direction)
+        loop_rows(model, data, m, data.pos1, data.rot1, data.couple_G)
+    _add_directions(model, data, data.S1, data.couple_G, -0.5, data.bifurcation_direction)
 
 
 @kernel
-def lead_loops(model: Model, work: Work, h: float, q: Vector, v: Vector) -> None:
+def lead_loops(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """bifurcation_direction[row] = dw where it takes the place of a row of couple_B, which is 0 then; their number.
 
     q: (nq,) configuration 2; v: (nv,) a velocity that leads to 3; couple_B: directions at configuration 2.
     """
-    work.bifurcation_count[0] = 0
+    data.bifurcation_count[0] = 0
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     first, last = int(model.coupling_row[pairs]), int(model.coupling_row[model.coupling_body.shape[0]])
-    _set_rows(model, work, h, q, v)
+    _set_rows(model, data, h, q, v)
     size = 0.0
     for row in range(first, last):
-        work.loop_used[row] = 0
-        work.loop_scale[row] = _largest(work.bifurcation_direction[row])
-        size = max(size, _largest(work.couple_Y[row]))
+        data.loop_used[row] = 0
+        data.loop_scale[row] = _largest(data.bifurcation_direction[row])
+        size = max(size, _largest(data.couple_Y[row]))
     for _ in range(first, last):
-        row, col, best, change = _next_pivot(work, first, last)
+        row, col, best, change = _next_pivot(data, first, last)
         if row < 0 or best < _MEETING * change:
             break
-        _eliminate(work, first, last, row, col)
+        _eliminate(data, first, last, row, col)
     for row in range(first, last):
-        dw = _largest(work.bifurcation_direction[row])
-        led = work.loop_used[row] == 0 and dw > max(_SPOKEN * work.loop_scale[row], _ROUNDING * size)
-        for d in range(work.bifurcation_direction.shape[1]):
-            work.bifurcation_direction[row, d] = work.bifurcation_direction[row, d] / dw if led else 0.0
+        dw = _largest(data.bifurcation_direction[row])
+        led = data.loop_used[row] == 0 and dw > max(_SPOKEN * data.loop_scale[row], _ROUNDING * size)
+        for d in range(data.bifurcation_direction.shape[1]):
+            data.bifurcation_direction[row, d] = data.bifurcation_direction[row, d] / dw if led else 0.0
         for c in range(6):
-            work.couple_B[row, c] = 0.0 if led else work.couple_B[row, c]
-        work.bifurcation_count[0] += 1 if led else 0
+            data.couple_B[row, c] = 0.0 if led else data.couple_B[row, c]
+        data.bifurcation_count[0] += 1 if led else 0

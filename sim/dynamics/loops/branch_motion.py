@@ -20,7 +20,7 @@ from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops, start_loops
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.model.columns import CoupleRank
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -33,103 +33,103 @@ _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were n
 
 
 @optional(Slot.LOOPS_REGULAR, default=True)
-def loops_regular(model: Model, work: Work) -> bool:
+def loops_regular(model: Model, data: Data) -> bool:
     """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
-    work.bifurcation_count[0] = 0
-    if work.carried_steps[0] == 0:
-        work.couple_rank[CoupleRank.DEFICIENCY] = 1e300
+    data.bifurcation_count[0] = 0
+    if data.carried_steps[0] == 0:
+        data.couple_rank[CoupleRank.DEFICIENCY] = 1e300
         return False
-    deficiency = work.couple_rank[CoupleRank.SIZE] - work.couple_rank[CoupleRank.RANK]
-    work.couple_rank[CoupleRank.DEFICIENCY] = min(work.couple_rank[CoupleRank.DEFICIENCY], deficiency)
-    regular = deficiency == work.couple_rank[CoupleRank.DEFICIENCY] and work.couple_rank[CoupleRank.PIVOT] > _REGULAR
-    work.couple_rank[CoupleRank.PIVOT] = 0.0
+    deficiency = data.couple_rank[CoupleRank.SIZE] - data.couple_rank[CoupleRank.RANK]
+    data.couple_rank[CoupleRank.DEFICIENCY] = min(data.couple_rank[CoupleRank.DEFICIENCY], deficiency)
+    regular = deficiency == data.couple_rank[CoupleRank.DEFICIENCY] and data.couple_rank[CoupleRank.PIVOT] > _REGULAR
+    data.couple_rank[CoupleRank.PIVOT] = 0.0
     return regular
 
 
 @optional(Slot.STAY_REGULAR, default=True)
-def stay_regular(model: Model, work: Work, status: int) -> bool:
+def stay_regular(model: Model, data: Data, status: int) -> bool:
     """Whether this step is as far, too; if not, the forces of loops are zero again."""
-    deficiency = work.couple_rank[CoupleRank.SIZE] - work.couple_rank[CoupleRank.RANK]
+    deficiency = data.couple_rank[CoupleRank.SIZE] - data.couple_rank[CoupleRank.RANK]
     if (
         status == Status.SOLVED
-        and work.couple_rank[CoupleRank.PIVOT] > _REGULAR
-        and deficiency <= work.couple_rank[CoupleRank.DEFICIENCY]
+        and data.couple_rank[CoupleRank.PIVOT] > _REGULAR
+        and deficiency <= data.couple_rank[CoupleRank.DEFICIENCY]
     ):
         return True
-    start_loops(model, work, False)
+    start_loops(model, data, False)
     return False
 
 
 @optional(Slot.PREDICT_LOOPS, default=False)
-def predict_loops(model: Model, work: Work, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
+def predict_loops(model: Model, data: Data, h: float, q: Vector, v: Vector, guess: Vector) -> bool:
     """loop_velocity = 2 P v - v, and its directions of forces (bifurcation.py); False if a guess is not v.
 
     q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2. Where loops are open v need not be along them; then
     the start is P v.
     """
-    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, work):
+    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, data):
         return False
     given = False
     for d in range(v.shape[0]):
         given = given or guess[d] != v[d]
-        work.loop_velocity[d] = v[d]
-    close_velocity(model, work, h, q, v, work.loop_velocity)
+        data.loop_velocity[d] = v[d]
+    close_velocity(model, data, h, q, v, data.loop_velocity)
     across = 0.0
     whole = 0.0
     for d in range(v.shape[0]):
-        across = max(across, abs(v[d] - work.loop_velocity[d]))
+        across = max(across, abs(v[d] - data.loop_velocity[d]))
         whole = max(whole, abs(v[d]))
     for d in range(v.shape[0]):
         if across < _ACROSS * whole:
-            work.loop_velocity[d] += work.loop_velocity[d] - v[d]
-    work.loop_pivot[0] = work.couple_rank[CoupleRank.PIVOT]
-    _no_step(work)
+            data.loop_velocity[d] += data.loop_velocity[d] - v[d]
+    data.loop_pivot[0] = data.couple_rank[CoupleRank.PIVOT]
+    _no_step(data)
     return not given
 
 
 @optional(Slot.LEAD_AGAIN, default=False)
-def lead_again(model: Model, work: Work, h: float, q: Vector) -> bool:
+def lead_again(model: Model, data: Data, h: float, q: Vector) -> bool:
     """Where directions were led, those by the velocity of the solution, which loop_velocity keeps; False elsewhere."""
-    if work.bifurcation_count[0] == 0:
+    if data.bifurcation_count[0] == 0:
         return False
-    for d in range(work.nu.shape[0]):
-        work.loop_velocity[d] = work.nu[d]
-    _no_step(work)
-    direct_loops(model, work)
-    lead_loops(model, work, h, q, work.loop_velocity)
+    for d in range(data.nu.shape[0]):
+        data.loop_velocity[d] = data.nu[d]
+    _no_step(data)
+    direct_loops(model, data)
+    lead_loops(model, data, h, q, data.loop_velocity)
     return True
 
 
 @optional(Slot.MEET_AHEAD, default=False)
-def meet_ahead(model: Model, work: Work) -> bool:
+def meet_ahead(model: Model, data: Data) -> bool:
     """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
 
     Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
     """
-    if work.bifurcation_count[0] > 0 or not work.couple_rank[CoupleRank.PIVOT] < _CLOSER * work.loop_pivot[0]:
+    if data.bifurcation_count[0] > 0 or not data.couple_rank[CoupleRank.PIVOT] < _CLOSER * data.loop_pivot[0]:
         return False
-    for d in range(work.nu.shape[0]):
-        work.loop_kept[d] = work.nu[d]
-        work.loop_start[d] = 2.0 * work.loop_velocity[d] - work.nu[d]
-    _no_step(work)
+    for d in range(data.nu.shape[0]):
+        data.loop_kept[d] = data.nu[d]
+        data.loop_start[d] = 2.0 * data.loop_velocity[d] - data.nu[d]
+    _no_step(data)
     return True
 
 
 @optional(Slot.IS_FARTHER, default=False)
-def is_farther(model: Model, work: Work, status: int) -> bool:
+def is_farther(model: Model, data: Data, status: int) -> bool:
     """Whether the solution is none, or farther from the prediction than the one kept, which loop_start is then."""
     kept = 0.0
     found = 0.0
-    for d in range(work.nu.shape[0]):
-        kept += (work.loop_kept[d] - work.loop_velocity[d]) ** 2
-        found += (work.nu[d] - work.loop_velocity[d]) ** 2
-        work.loop_start[d] = work.loop_kept[d]
-    _no_step(work)
+    for d in range(data.nu.shape[0]):
+        kept += (data.loop_kept[d] - data.loop_velocity[d]) ** 2
+        found += (data.nu[d] - data.loop_velocity[d]) ** 2
+        data.loop_start[d] = data.loop_kept[d]
+    _no_step(data)
     return status != Status.SOLVED or found > (1.0 + 1e-6) * kept
 
 
 @kernel
-def _no_step(work: Work) -> None:
+def _no_step(data: Data) -> None:
     """The forces of loops are those that a solve begins with."""
-    for row in range(work.couple_step.shape[0]):
-        work.couple_step[row] = 0.0
+    for row in range(data.couple_step.shape[0]):
+        data.couple_step[row] = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sim.dynamics.loops.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.dense import dot
@@ -19,7 +19,7 @@ def is_loop(model: Model, k: int) -> bool:
 
 
 @kernel
-def take_apart(work: Work, k: int, row: int) -> None:
+def take_apart(data: Data, k: int, row: int) -> None:
     """Rows of couple_B, couple_R and couple_E from row on: (K_a, K_b) = B D R by elimination with full pivoting.
 
     coupling_K is used up; what is left when the pivots have fallen to rounding is dropped: forces without effect.
@@ -30,7 +30,7 @@ def take_apart(work: Work, k: int, row: int) -> None:
         i = 0
         j = 0
         for side in range(2):
-            K = work.coupling_K[2 * k + side]
+            K = data.coupling_K[2 * k + side]
             for e in range(36):
                 if abs(K[e]) > abs(best):
                     best = K[e]
@@ -38,22 +38,22 @@ def take_apart(work: Work, k: int, row: int) -> None:
                     j = 6 * side + e % 6
         if r == row:
             first = abs(best)
-        B = work.couple_B[r]
-        R = work.couple_R[r]
+        B = data.couple_B[r]
+        R = data.couple_R[r]
         for c in range(6):
             B[c] = 0.0
             R[c] = 0.0
             R[6 + c] = 0.0
-        work.couple_E[r] = 0.0  # no row, and none after it
+        data.couple_E[r] = 0.0  # no row, and none after it
         if not abs(best) > _ROUNDING * first:
             continue
-        work.couple_E[r] = 1.0 / best
+        data.couple_E[r] = 1.0 / best
         for c in range(6):
-            B[c] = work.coupling_K[2 * k + j // 6, 6 * c + j % 6] / best
-            R[c] = work.coupling_K[2 * k, 6 * i + c] / best
-            R[6 + c] = work.coupling_K[2 * k + 1, 6 * i + c] / best
+            B[c] = data.coupling_K[2 * k + j // 6, 6 * c + j % 6] / best
+            R[c] = data.coupling_K[2 * k, 6 * i + c] / best
+            R[6 + c] = data.coupling_K[2 * k + 1, 6 * i + c] / best
         for side in range(2):
-            K = work.coupling_K[2 * k + side]
+            K = data.coupling_K[2 * k + side]
             for c in range(6):
                 f = best * B[c]
                 for e in range(6):
@@ -71,23 +71,23 @@ def add_along_path(model: Model, S: Matrix, i: int, sign: float, w: Vector, out:
 
 
 @kernel
-def response(model: Model, work: Work, k: int, row: int) -> float:
+def response(model: Model, data: Data, k: int, row: int) -> float:
     """R_a zeta_a + R_b zeta_b of a row of coupling k, with the twists of the last solve."""
-    R = work.couple_R[row]
+    R = data.couple_R[row]
     t = 0.0
     for side in range(2):
         i = model.coupling_body[k, side]
         if i >= 0:
-            z = work.twist[i]
+            z = data.twist[i]
             for c in range(6):
                 t += R[6 * side + c] * z[c]
     return t
 
 
 @kernel
-def response_size(model: Model, work: Work, k: int, row: int) -> float:
+def response_size(model: Model, data: Data, k: int, row: int) -> float:
     """|R||zeta| instead of R zeta, translations and rotations apart: a response far below it is rounding."""
-    R = work.couple_R[row]
+    R = data.couple_R[row]
     t = 0.0
     for side in range(2):
         i = model.coupling_body[k, side]
@@ -97,74 +97,74 @@ def response_size(model: Model, work: Work, k: int, row: int) -> float:
                 z = 0.0
                 for c in range(3 * part, 3 * part + 3):
                     r += R[6 * side + c] ** 2
-                    z += work.twist[i, c] ** 2
+                    z += data.twist[i, c] ** 2
                 t += (r * z) ** 0.5
     return t
 
 
 @kernel
-def enlist(model: Model, work: Work) -> int:
+def enlist(model: Model, data: Data) -> int:
     """couple_live: rows of the dense system, with their coupling, or number of couplings + gear; returns how many."""
     n = 0
     count = model.coupling_body.shape[0]
     for k in range(count):
         if not is_loop(model, k):
-            if work.coupling_live[k] == 0:
+            if data.coupling_live[k] == 0:
                 continue
-            take_apart(work, k, model.coupling_row[k])
+            take_apart(data, k, model.coupling_row[k])
         for row in range(model.coupling_row[k], model.coupling_row[k + 1]):
-            if is_loop(model, k) or work.couple_E[row] > 0.0 or work.couple_E[row] < 0.0:
-                work.couple_live[n, 0] = row
-                work.couple_live[n, 1] = k
+            if is_loop(model, k) or data.couple_E[row] > 0.0 or data.couple_E[row] < 0.0:
+                data.couple_live[n, 0] = row
+                data.couple_live[n, 1] = k
                 n += 1
     for k in range(model.gear_dof.shape[0]):
-        work.couple_live[n, 0] = gear_row(model, k)
-        work.couple_live[n, 1] = count + k
+        data.couple_live[n, 0] = gear_row(model, k)
+        data.couple_live[n, 1] = count + k
         n += 1
     return n
 
 
 @kernel
-def unit_impulse(model: Model, work: Work, p: int, out: Vector) -> None:
+def unit_impulse(model: Model, data: Data, p: int, out: Vector) -> None:
     """out (nv,) = the generalized impulse of a unit force in row p of the dense system."""
-    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+    row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
         unit_gear_impulse(model, k - model.coupling_body.shape[0], out)
         return
     for d in range(out.shape[0]):
         out[d] = 0.0
-    add_along_path(model, work.S2, model.coupling_body[k, 0], 1.0, work.couple_B[row], out)
-    add_along_path(model, work.S2, model.coupling_body[k, 1], -1.0, work.couple_B[row], out)
-    if work.bifurcation_count[0] > 0:
+    add_along_path(model, data.S2, model.coupling_body[k, 0], 1.0, data.couple_B[row], out)
+    add_along_path(model, data.S2, model.coupling_body[k, 1], -1.0, data.couple_B[row], out)
+    if data.bifurcation_count[0] > 0:
         for d in range(out.shape[0]):
-            out[d] += work.bifurcation_direction[row, d]
+            out[d] += data.bifurcation_direction[row, d]
 
 
 @kernel
-def row_response(model: Model, work: Work, p: int, y: Vector) -> float:
-    """Row p of the dense system times the velocities y (nv,), whose twists are in work.twist."""
-    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+def row_response(model: Model, data: Data, p: int, y: Vector) -> float:
+    """Row p of the dense system times the velocities y (nv,), whose twists are in data.twist."""
+    row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     if k >= model.coupling_body.shape[0]:
-        return gear_response(model, work, k - model.coupling_body.shape[0], y)
-    led = dot(work.bifurcation_direction[row], y) if work.bifurcation_replaces[0] > 0 else 0.0
-    return response(model, work, k, row) + led
+        return gear_response(model, data, k - model.coupling_body.shape[0], y)
+    led = dot(data.bifurcation_direction[row], y) if data.bifurcation_replaces[0] > 0 else 0.0
+    return response(model, data, k, row) + led
 
 
 @kernel
-def add_columns(model: Model, work: Work, p: int, x: Vector) -> None:
+def add_columns(model: Model, data: Data, p: int, x: Vector) -> None:
     """x = the row of couple_panel that is row p of the dense system, plus its response to the columns."""
-    row, k = work.couple_live[p, 0], work.couple_live[p, 1]
+    row, k = data.couple_live[p, 0], data.couple_live[p, 1]
     for m in range(x.shape[0]):
-        x[m] = work.couple_panel[row, m]  # p <= row
+        x[m] = data.couple_panel[row, m]  # p <= row
     if k >= model.coupling_body.shape[0]:
-        add_gear_columns(model, work, k - model.coupling_body.shape[0], x)
+        add_gear_columns(model, data, k - model.coupling_body.shape[0], x)
         return
     for side in range(2):
         i = model.coupling_body[k, side]
         if i < 0:
             continue
         for c in range(6):
-            f = work.couple_R[row, 6 * side + c]
-            z = work.panel[6 * i + c]
+            f = data.couple_R[row, 6 * side + c]
+            z = data.panel[6 * i + c]
             for m in range(x.shape[0]):
                 x[m] += f * z[m]

@@ -22,7 +22,7 @@ from __future__ import annotations
 from sim.dynamics.elimination import solve
 from sim.dynamics.loops.constraint_rows import add_columns, enlist, is_loop, response_size, row_response, unit_impulse
 from sim.model.columns import CoupleRank
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -45,88 +45,88 @@ def scale_row(T: Matrix, p: int, size: float) -> float:
 
 
 @optional(Slot.FACTOR_COUPLING, default=True)
-def factor_coupling(model: Model, work: Work) -> bool:
+def factor_coupling(model: Model, data: Data) -> bool:
     """The dense system of the couplings, factored; after `factor`. False if it is singular beyond redundant loops."""
-    n = enlist(model, work)
-    T = work.couple_T[:n, :n]
+    n = enlist(model, data)
+    T = data.couple_T[:n, :n]
     pairs = 0
     for p in range(n):
-        work.couple_scale[p] = 0.0
+        data.couple_scale[p] = 0.0
     for q in range(n):
-        col, k = work.couple_live[q, 0], work.couple_live[q, 1]
-        unit_impulse(model, work, q, work.rhs)
-        y = work.couple_Y[col]
-        solve(model, work, work.rhs, y)
+        col, k = data.couple_live[q, 0], data.couple_live[q, 1]
+        unit_impulse(model, data, q, data.rhs)
+        y = data.couple_Y[col]
+        solve(model, data, data.rhs, y)
         for p in range(n):
-            T[p, q] = -row_response(model, work, p, y)
-            m = work.couple_live[p, 1]
+            T[p, q] = -row_response(model, data, p, y)
+            m = data.couple_live[p, 1]
             if is_loop(model, m) and m < model.coupling_body.shape[0]:
-                work.couple_scale[p] = max(work.couple_scale[p], response_size(model, work, m, work.couple_live[p, 0]))
+                data.couple_scale[p] = max(data.couple_scale[p], response_size(model, data, m, data.couple_live[p, 0]))
         if not is_loop(model, k):
-            T[q, q] += work.couple_E[col]
+            T[q, q] += data.couple_E[col]
             pairs += 1
     for p in range(n):
-        work.couple_scale[p] = scale_row(T, p, work.couple_scale[p])
+        data.couple_scale[p] = scale_row(T, p, data.couple_scale[p])
     least = _DEPENDENT if model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0 else 1e-300
-    rank = full_lu_factor(T, work.couple_pivots, least)
-    work.couple_rank[CoupleRank.RANK] = rank
-    work.couple_rank[CoupleRank.SIZE] = n
-    work.couple_rank[CoupleRank.PIVOT] = 1.0
+    rank = full_lu_factor(T, data.couple_pivots, least)
+    data.couple_rank[CoupleRank.RANK] = rank
+    data.couple_rank[CoupleRank.SIZE] = n
+    data.couple_rank[CoupleRank.PIVOT] = 1.0
     for p in range(rank):
-        work.couple_rank[CoupleRank.PIVOT] = min(work.couple_rank[CoupleRank.PIVOT], abs(T[p, p]))
+        data.couple_rank[CoupleRank.PIVOT] = min(data.couple_rank[CoupleRank.PIVOT], abs(T[p, p]))
     return rank >= pairs
 
 
 @optional(Slot.SOLVE_COUPLING)
-def solve_coupling(model: Model, work: Work, share: float, out: Vector) -> None:
+def solve_coupling(model: Model, data: Data, share: float, out: Vector) -> None:
     """After out = H0^-1 b of the tree: the answer with couplings, its twists, and couple_step, the forces f.
 
     share: part of the loop gaps to close.
     """
-    n = int(work.couple_rank[CoupleRank.SIZE])
-    x = work.couple_x[:n]
+    n = int(data.couple_rank[CoupleRank.SIZE])
+    x = data.couple_x[:n]
     for p in range(n):
-        gap = share * work.couple_gap[work.couple_live[p, 0]]
-        x[p, 0] = work.couple_scale[p] * (gap + row_response(model, work, p, out))
-    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[CoupleRank.RANK]), x)
-    for row in range(work.couple_step.shape[0]):
-        work.couple_step[row] = 0.0
+        gap = share * data.couple_gap[data.couple_live[p, 0]]
+        x[p, 0] = data.couple_scale[p] * (gap + row_response(model, data, p, out))
+    full_lu_solve(data.couple_T[:n, :n], data.couple_pivots, int(data.couple_rank[CoupleRank.RANK]), x)
+    for row in range(data.couple_step.shape[0]):
+        data.couple_step[row] = 0.0
     for p in range(n):
         f = x[p, 0]
-        row = work.couple_live[p, 0]
-        work.couple_step[row] = f
-        Y = work.couple_Y[row]
+        row = data.couple_live[p, 0]
+        data.couple_step[row] = f
+        Y = data.couple_Y[row]
         for d in range(out.shape[0]):
             out[d] += f * Y[d]
-    body_twists(model, work, out)
+    body_twists(model, data, out)
 
 
 @kernel
-def body_twists(model: Model, work: Work, y: Vector) -> None:
+def body_twists(model: Model, data: Data, y: Vector) -> None:
     """twist[i] = twist[parent] + S3nu y."""
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
-        V = work.twist[i]
+        V = data.twist[i]
         for k in range(6):
-            V[k] = work.twist[p, k] if p >= 0 else 0.0
+            V[k] = data.twist[p, k] if p >= 0 else 0.0
         for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
             for k in range(6):
-                V[k] += work.S3nu[d, k] * y[d]
+                V[k] += data.S3nu[d, k] * y[d]
 
 
 @optional(Slot.SOLVE_COUPLING_PANEL)
-def solve_coupling_panel(model: Model, work: Work) -> None:
+def solve_coupling_panel(model: Model, data: Data) -> None:
     """`solve_coupling` for all columns, after `solve_panel`; couple_panel holds g of each column."""
-    n = int(work.couple_rank[CoupleRank.SIZE])
-    X = work.couple_panel[:n]
+    n = int(data.couple_rank[CoupleRank.SIZE])
+    X = data.couple_panel[:n]
     for p in range(n):
-        add_columns(model, work, p, X[p])
+        add_columns(model, data, p, X[p])
         for m in range(X.shape[1]):
-            X[p, m] *= work.couple_scale[p]
-    full_lu_solve(work.couple_T[:n, :n], work.couple_pivots, int(work.couple_rank[CoupleRank.RANK]), X)
+            X[p, m] *= data.couple_scale[p]
+    full_lu_solve(data.couple_T[:n, :n], data.couple_pivots, int(data.couple_rank[CoupleRank.RANK]), X)
     for p in range(n):
-        Y = work.couple_Y[work.couple_live[p, 0]]
-        for d in range(work.columns.shape[0]):
+        Y = data.couple_Y[data.couple_live[p, 0]]
+        for d in range(data.columns.shape[0]):
             f = Y[d]
             for m in range(X.shape[1]):
-                work.columns[d, m] += f * X[p, m]
+                data.columns[d, m] += f * X[p, m]

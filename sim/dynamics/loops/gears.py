@@ -7,7 +7,7 @@ They come after the rows of pairs and loops. Their directions are constant, so t
 
 from __future__ import annotations
 
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -21,7 +21,7 @@ def gear_row(model: Model, k: int) -> int:
 
 
 @optional(Slot.APPLY_GEARS, default=0.0)
-def apply_gears(model: Model, work: Work, h: float) -> float:
+def apply_gears(model: Model, data: Data, h: float) -> float:
     """residual -= impulses of gears; fills couple_gap and gear_rate, d(gap)/d(v25) of both; returns the largest gap.
 
     Impulses of loops along directions in joint space (bifurcation.py) are taken off too.
@@ -31,17 +31,17 @@ def apply_gears(model: Model, work: Work, h: float) -> float:
         a = model.gear_dof[k, 0]
         b = model.gear_dof[k, 1]
         row = gear_row(model, k)
-        gap = work.theta3[model.dof_qadr[a]] - model.gear_ratio[k] * work.theta3[model.dof_qadr[b]]
-        work.couple_gap[row] = gap - model.gear_offset[k]
-        work.gear_rate[k, 0] = h
-        work.gear_rate[k, 1] = -h * model.gear_ratio[k]
-        work.residual[a] -= work.couple_force[row]
-        work.residual[b] += model.gear_ratio[k] * work.couple_force[row]
-        error = max(error, abs(work.couple_gap[row]))
-    if work.bifurcation_count[0] > 0:
+        gap = data.theta3[model.dof_qadr[a]] - model.gear_ratio[k] * data.theta3[model.dof_qadr[b]]
+        data.couple_gap[row] = gap - model.gear_offset[k]
+        data.gear_rate[k, 0] = h
+        data.gear_rate[k, 1] = -h * model.gear_ratio[k]
+        data.residual[a] -= data.couple_force[row]
+        data.residual[b] += model.gear_ratio[k] * data.couple_force[row]
+        error = max(error, abs(data.couple_gap[row]))
+    if data.bifurcation_count[0] > 0:
         for row in range(gear_row(model, 0)):
-            for d in range(work.residual.shape[0]):
-                work.residual[d] -= work.couple_force[row] * work.bifurcation_direction[row, d]
+            for d in range(data.residual.shape[0]):
+                data.residual[d] -= data.couple_force[row] * data.bifurcation_direction[row, d]
     return error
 
 
@@ -55,18 +55,18 @@ def unit_gear_impulse(model: Model, k: int, out: Vector) -> None:
 
 
 @kernel
-def gear_response(model: Model, work: Work, k: int, y: Vector) -> float:
+def gear_response(model: Model, data: Data, k: int, y: Vector) -> float:
     """d(gap of gear k)/d(v25) y."""
-    return work.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + work.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
+    return data.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + data.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
 
 
 @kernel
-def add_gear_columns(model: Model, work: Work, k: int, x: Vector) -> None:
+def add_gear_columns(model: Model, data: Data, k: int, x: Vector) -> None:
     """x += d(gap of gear k)/d(v25) of the columns."""
-    a = work.columns[model.gear_dof[k, 0]]
-    b = work.columns[model.gear_dof[k, 1]]
+    a = data.columns[model.gear_dof[k, 0]]
+    b = data.columns[model.gear_dof[k, 1]]
     for m in range(x.shape[0]):
-        x[m] += work.gear_rate[k, 0] * a[m] + work.gear_rate[k, 1] * b[m]
+        x[m] += data.gear_rate[k, 0] * a[m] + data.gear_rate[k, 1] * b[m]
 
 
 @kernel

@@ -11,7 +11,7 @@ from sim.dynamics.loops.bifurcation import lead_loops
 from sim.dynamics.loops.closure import direct_loops
 from sim.dynamics.loops.coupling_system import body_twists, factor_coupling, solve_coupling
 from sim.model.columns import CoupleRank
-from sim.model.data import Work
+from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
@@ -21,41 +21,41 @@ _WEAK = 1e-3  # a pivot of G M^-1 G^T above this is that of a configuration wher
 
 
 @kernel
-def _set_rows(model: Model, work: Work) -> None:
+def _set_rows(model: Model, data: Data) -> None:
     """couple_R = (B, -B) of loops, and unit rates of gears; no pairs of bodies."""
     pairs = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     for k in range(pairs):
-        work.coupling_live[k] = 0
+        data.coupling_live[k] = 0
     for row in range(model.coupling_row[pairs], model.coupling_row[model.coupling_body.shape[0]]):
         for c in range(6):
-            work.couple_R[row, c] = work.couple_B[row, c]
-            work.couple_R[row, 6 + c] = -work.couple_B[row, c]
+            data.couple_R[row, c] = data.couple_B[row, c]
+            data.couple_R[row, 6 + c] = -data.couple_B[row, c]
     for k in range(model.gear_dof.shape[0]):
-        work.gear_rate[k, 0] = 1.0
-        work.gear_rate[k, 1] = -model.gear_ratio[k]
+        data.gear_rate[k, 0] = 1.0
+        data.gear_rate[k, 1] = -model.gear_ratio[k]
 
 
 @optional(Slot.CLOSE_VELOCITY)
-def close_velocity(model: Model, work: Work, h: float, q: Vector, v: Vector, out: Vector) -> None:
-    """out = P out, with the mass matrix of configuration 2 factored; its twists in work.twist.
+def close_velocity(model: Model, data: Data, h: float, q: Vector, v: Vector, out: Vector) -> None:
+    """out = P out, with the mass matrix of configuration 2 factored; its twists in data.twist.
 
     q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2, which tells the branch where two meet: there rows
     of G are those of bifurcation.py.   out: (nv,).
     """
-    direct_loops(model, work)
-    work.bifurcation_count[0] = 0
-    _set_rows(model, work)
-    solved = factor_coupling(model, work)
+    direct_loops(model, data)
+    data.bifurcation_count[0] = 0
+    _set_rows(model, data)
+    solved = factor_coupling(model, data)
     loops = model.loop_ntrans.shape[0] > 0
     if loops and (
-        work.couple_rank[CoupleRank.RANK] < work.couple_rank[CoupleRank.SIZE]
-        or work.couple_rank[CoupleRank.PIVOT] < _WEAK
+        data.couple_rank[CoupleRank.RANK] < data.couple_rank[CoupleRank.SIZE]
+        or data.couple_rank[CoupleRank.PIVOT] < _WEAK
     ):
-        lead_loops(model, work, h, q, v)
-        _set_rows(model, work)
-        work.bifurcation_replaces[0] = 1
-        solved = factor_coupling(model, work)
+        lead_loops(model, data, h, q, v)
+        _set_rows(model, data)
+        data.bifurcation_replaces[0] = 1
+        solved = factor_coupling(model, data)
     if solved:
-        body_twists(model, work, out)
-        solve_coupling(model, work, 0.0, out)
-    work.bifurcation_replaces[0] = 0
+        body_twists(model, data, out)
+        solve_coupling(model, data, 0.0, out)
+    data.bifurcation_replaces[0] = 0

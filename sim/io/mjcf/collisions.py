@@ -13,7 +13,7 @@ from itertools import combinations
 from typing import Any
 
 from sim.io.mjcf.contacts import KINDS, PLANE, meet, mixed
-from sim.io.mjcf.groups import Group, Where, name_of, solid_of
+from sim.io.mjcf.groups import GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD
@@ -55,12 +55,12 @@ def _pairs(model: Any, where: Where) -> Iterator[tuple[int, int, tuple[float, bo
             yield a, b, mixed(model, a, b)
 
 
-def _owner(model: Any, where: Where, g: int) -> Group | None:
+def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:
     """The group of a geom, None for the world."""
     return where[int(model.geom_bodyid[g])][0]
 
 
-def _related(a: Group | None, b: Group | None) -> bool:
+def _related(a: GeomGroup | None, b: GeomGroup | None) -> bool:
     """Whether one hangs on the other; everything may meet the world."""
     return a is not None and b is not None and (a.parent is b or b.parent is a)
 

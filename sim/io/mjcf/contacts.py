@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, Group, Where, name_of, pose_of
+from sim.io.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, GeomGroup, Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.parts import Contact
 from sim.mechanism.pose import Pose
@@ -61,7 +61,7 @@ def find_contacts(
     return out
 
 
-def _owner(model: Any, where: Where, g: int) -> Group | None:
+def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:
     """The group of a geom, None for the world."""
     return where[int(model.geom_bodyid[g])][0]
 
@@ -80,7 +80,7 @@ def mixed(model: Any, a: int, b: int) -> tuple[float, bool]:
 
 
 def _contact(
-    model: Any, pair: tuple[int, int], group: Group, ball: tuple[Floats, float], name: str, settings: Any
+    model: Any, pair: tuple[int, int], group: GeomGroup, ball: tuple[Floats, float], name: str, settings: Any
 ) -> Contact:
     """One ball of a geom against a plane."""
     g, p = pair

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import Group, Where, name_of, pose_of
+from sim.io.mjcf.groups import GeomGroup, Where, name_of, pose_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.gear import Gear
 from sim.mechanism.parts import WORLD, Joint
@@ -71,7 +71,9 @@ def find_gears(model: Any, homes: dict[int, tuple[str, int]], notes: Notes) -> l
     return out
 
 
-def _ends(model: Any, k: int, kind: int, where: Where) -> tuple[tuple[Group | None, Pose], tuple[Group | None, Pose]]:
+def _ends(
+    model: Any, k: int, kind: int, where: Where
+) -> tuple[tuple[GeomGroup | None, Pose], tuple[GeomGroup | None, Pose]]:
     """The groups (None: the world) of both bodies, and the frames in them that stay on each other."""
     ends, data = [], np.array(model.eq_data[k], dtype=np.float64)
     frames = [HERE, HERE]
@@ -90,7 +92,7 @@ def _ends(model: Any, k: int, kind: int, where: Where) -> tuple[tuple[Group | No
     return ends[0], ends[1]
 
 
-def _joint(name: str, kind: int, first: tuple[Group | None, Pose], second: tuple[Group | None, Pose]) -> Joint:
+def _joint(name: str, kind: int, first: tuple[GeomGroup | None, Pose], second: tuple[GeomGroup | None, Pose]) -> Joint:
     """The closing joint with its frame in the first group; the second is not the world."""
     (parent, frame), (child, other) = first, second
     assert child is not None

@@ -1,4 +1,4 @@
-"""Group: bodies of an MJCF file that are welded together, as one body of the mechanism."""
+"""GeomGroup: bodies of an MJCF file that are welded together, as one body of the mechanism."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
 
 
 @dataclass
-class Group:
+class GeomGroup:
     """A body that joints carry, and the bodies without joints that hang on it; all in the frame of the first."""
 
     name: str
     body: int  # its first one in the file
-    parent: Group | None  # None: the world
+    parent: GeomGroup | None  # None: the world
     pose: Pose  # of its frame in that of the parent, all joints at zero displacement
     inertia: RigidInertia = field(default_factory=lambda: combined([]))
     members: dict[int, Pose] = field(default_factory=dict)
@@ -36,7 +36,9 @@ class Group:
         return self.inertia.com
 
 
-Where = dict[int, tuple[Group | None, Pose]]  # of every body of the file, its group (None: the world) and pose in it
+Where = dict[
+    int, tuple[GeomGroup | None, Pose]
+]  # of every body of the file, its group (None: the world) and pose in it
 
 
 def name_of(model: Any, kind: str, index: int) -> str:
@@ -51,19 +53,19 @@ def pose_of(position: Floats, quaternion: Floats) -> Pose:
     return Pose(rotation_matrix(unit / np.linalg.norm(unit)), np.array(position, dtype=np.float64))
 
 
-def find_groups(model: Any) -> tuple[list[Group], Where]:
+def find_groups(model: Any) -> tuple[list[GeomGroup], Where]:
     """Groups with parents before children; and of every body of the file its group (None: the world) and its pose.
 
     model: a mujoco.MjModel.
     """
-    groups: list[Group] = []
+    groups: list[GeomGroup] = []
     where: Where = {0: (None, HERE)}
     parts: dict[int, list[RigidInertia]] = {}
     for b in range(1, model.nbody):
         carrier, at = where[int(model.body_parentid[b])]
         pose = at.then(pose_of(model.body_pos[b], model.body_quat[b]))
         if model.body_jntnum[b] > 0:
-            group = Group(name_of(model, "body", b), b, carrier, pose)
+            group = GeomGroup(name_of(model, "body", b), b, carrier, pose)
             groups.append(group)
             where[b] = (group, HERE)
             parts[id(group)] = []
@@ -79,7 +81,7 @@ def find_groups(model: Any) -> tuple[list[Group], Where]:
     return groups, where
 
 
-def drawn(model: Any, group: Group, notes: Notes) -> Shape | None:
+def drawn(model: Any, group: GeomGroup, notes: Notes) -> Shape | None:
     """The largest primitive among the geoms of the group that collide, or else among the others."""
     found: tuple[list[Named], list[Named]] = ([], [])
     for b, frame in group.members.items():

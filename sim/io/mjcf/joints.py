@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import Group, name_of
+from sim.io.mjcf.groups import GeomGroup, name_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.axes import translation_axes
 from sim.mechanism.parts import KINDS, WORLD, Body, Joint
@@ -33,7 +33,7 @@ class Carried(NamedTuple):
     homes: dict[int, tuple[str, int]]  # joint of the file: joint of the mechanism, first degree of freedom
 
 
-def carry(model: Any, group: Group, merge: bool, notes: Notes) -> Carried:
+def carry(model: Any, group: GeomGroup, merge: bool, notes: Notes) -> Carried:
     """The joints of one group, from the parent to it."""
     start = int(model.body_jntadr[group.body])
     ids = list(range(start, start + int(model.body_jntnum[group.body])))

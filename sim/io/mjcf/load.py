@@ -14,7 +14,7 @@ from sim.io.mjcf.collisions import find_collisions
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.drives import find_inputs, left_out
 from sim.io.mjcf.equalities import find_gears, find_loops
-from sim.io.mjcf.groups import Group, drawn, find_groups
+from sim.io.mjcf.groups import GeomGroup, drawn, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.urdf.report import Frame, Notes
@@ -102,7 +102,7 @@ def _warn(report: MjcfReport) -> None:
 
 
 def _tree(
-    model: Any, groups: list[Group], merge: bool, notes: Notes
+    model: Any, groups: list[GeomGroup], merge: bool, notes: Notes
 ) -> tuple[list[Body], list[Joint], dict[int, tuple[str, int]]]:
     """Bodies, the joints they hang on, and where every joint of the file went."""
     bodies: list[Body] = []
@@ -185,7 +185,7 @@ def _clear(mech: MjcfMechanism) -> MjcfMechanism:
     return replace(mech, neutral=lifted(mech, bases[0]))
 
 
-def _frames(model: Any, where: dict[int, tuple[Group | None, Pose]]) -> dict[str, Frame]:
+def _frames(model: Any, where: dict[int, tuple[GeomGroup | None, Pose]]) -> dict[str, Frame]:
     """Where the bodies of the file are."""
     out = {}
     for b, (group, pose) in where.items():

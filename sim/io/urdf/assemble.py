@@ -16,7 +16,7 @@ from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import mimic_gears
 from sim.io.urdf.report import Frame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
-from sim.io.urdf.tree import Group, Place, group, ordered
+from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
@@ -112,7 +112,7 @@ def _neutral(robot: Robot, choices: Choices, name: str) -> float:
     return checks.number(f"load_urdf(neutral=...): joint {name!r}", choices.neutral[name])
 
 
-def _inertias(groups: list[Group], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
+def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
     """Inertia of every body in its own frame; what no rigid body has is repaired or refused."""
     out = {body.name: combined(body.inertias) for body in groups}
     if groups and not any(part.mass for part in out.values()):
@@ -138,7 +138,9 @@ def _inertias(groups: list[Group], choices: Choices, notes: Notes) -> dict[str, 
     return out
 
 
-def _joint(body: Group, places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices, base: str) -> Joint:
+def _joint(
+    body: MergedLinks, places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices, base: str
+) -> Joint:
     """The Joint that a body hangs on; `base` is the name of that of the root."""
     com = coms[body.name]
     if body.joint is None:
@@ -165,7 +167,7 @@ def _joint(body: Group, places: Mapping[str, Place], coms: Mapping[str, Floats],
     )
 
 
-def _body(body: Group, part: RigidInertia, notes: Notes) -> Body:
+def _body(body: MergedLinks, part: RigidInertia, notes: Notes) -> Body:
     return Body(body.name, part.mass, part.inertia, drawn(body, part.com, notes))
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Geometry
-from sim.io.urdf.tree import Group, Place
+from sim.io.urdf.tree import MergedLinks, Place
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism.parts import Contact
 from sim.mechanism.pose import HERE, Pose
@@ -128,7 +128,7 @@ def _balls(shape: Geometry, place: Place, rim: int) -> Balls:
     return [(pose.at(end + offset), 0.0) for end in ends for offset in around]
 
 
-def is_wheel(pose: Pose, radius: float, body: Group) -> bool:
+def is_wheel(pose: Pose, radius: float, body: MergedLinks) -> bool:
     """Whether a cylinder with this pose in its body turns about its own axis."""
     if body.joint is None or body.joint.kind != "revolute" or body.fixed:
         return False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Geometry
-from sim.io.urdf.tree import Group
+from sim.io.urdf.tree import MergedLinks
 from sim.mechanism.pose import Pose
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Named = tuple[str, Shape]  # the link or geom, for a note, and its shape in the body
 
 
-def drawn(body: Group, com: Floats, notes: Notes) -> Shape | None:
+def drawn(body: MergedLinks, com: Floats, notes: Notes) -> Shape | None:
     """The largest primitive among the collision shapes of a body, or else among its visual shapes; None without any."""
     return largest(_solids(body, com, "collisions"), notes) or largest(_solids(body, com, "visuals"))
 
@@ -39,7 +39,7 @@ def largest(found: Sequence[Named], notes: Notes | None = None) -> Shape | None:
     return kept
 
 
-def _solids(body: Group, com: Floats, field: str) -> list[Named]:
+def _solids(body: MergedLinks, com: Floats, field: str) -> list[Named]:
     """The primitives among the collision or visual shapes of a body."""
     found = [(link.name, s, pose.then(s.pose)) for link, pose in body.links for s in getattr(link, field)]
     return [(name, solid) for name, s, pose in found if (solid := _solid(s, pose, com)) is not None]

@@ -18,11 +18,11 @@ Floats = NDArray[np.float64]
 
 
 @dataclass
-class Group:
+class MergedLinks:
     """Links that move as one body; its frame is that of its first link, whose name it has."""
 
     joint: UrdfJoint | None  # that it hangs on; None for the root
-    parent: Group | None
+    parent: MergedLinks | None
     links: list[tuple[UrdfLink, Pose]] = field(default_factory=list)
     fixed: bool = False  # whether it stays on its joint as if that was a fixed one
     empty: bool = True  # whether all its links are without mass and inertia
@@ -48,7 +48,7 @@ class Place:
     """Where a link is: its group, and its pose there."""
 
     link: UrdfLink
-    group: Group
+    group: MergedLinks
     pose: Pose
 
 
@@ -108,17 +108,17 @@ def held_pose(joint: UrdfJoint, locked: Mapping[str, float]) -> Pose | None:
 
 def group(
     robot: Robot, root: str, order: list[UrdfJoint], fixed_base: bool, merge: bool, locked: Mapping[str, float]
-) -> tuple[list[Group], dict[str, Place]]:
+) -> tuple[list[MergedLinks], dict[str, Place]]:
     """(the bodies in tree order, where every link is); the world is a group, but not among the bodies.
 
     A link that cannot move relative to its parent joins its body: always when one of the two has no mass, for a body
     must have one, otherwise when `merge`. The root is part of the world when it is fixed there and `merge`, or when its
     name is that of the world.
     """
-    world = Group(None, None)
+    world = MergedLinks(None, None)
     base = robot.links[root]
     joins_world = root == WORLD or (fixed_base and (merge or base.mass == 0.0))
-    first = world if joins_world else Group(None, world, fixed=fixed_base)
+    first = world if joins_world else MergedLinks(None, world, fixed=fixed_base)
     first.add(base, HERE)
     bodies = [] if joins_world else [first]
     places = {root: Place(base, first, HERE)}
@@ -129,7 +129,7 @@ def group(
             places[joint.child] = Place(link, at.group, at.pose.then(held))
             at.group.add(link, places[joint.child].pose)
         else:
-            body = Group(joint, at.group, fixed=held is not None)
+            body = MergedLinks(joint, at.group, fixed=held is not None)
             body.add(link, HERE)
             bodies.append(body)
             places[joint.child] = Place(link, body, HERE)

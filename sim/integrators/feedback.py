@@ -1,4 +1,4 @@
-"""Policy: a trajectory with gains, and the rollout that follows it.
+"""FeedbackLaw: a trajectory with gains, and the rollout that follows it.
 
 What a planner knows about the trajectory makes the steps of a rollout nearby cheap: derivatives predict its velocities,
 and the cone variables of its steps are nearly those of the steps beside them. An iteration of the trot goes from 5 to 2
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import integrate_state, state_difference
 from sim.integrators.rollout import options_of
-from sim.model.layout import model_view, work_view
+from sim.model.layout import data_view, model_view
 from sim.model.options import Guess
 from sim.model.pace import is_due
 from sim.step import step
@@ -24,7 +24,7 @@ from solvers.types import Cube, Matrix, Vector
 _SOLVED = int(Status.SOLVED)
 
 
-class Policy(NamedTuple):
+class FeedbackLaw(NamedTuple):
     """What a rollout follows: a trajectory, its gains, and what is known of its steps; the last four may be empty."""
 
     xs: Matrix  # (T + 1, nx)
@@ -50,7 +50,7 @@ class Path(NamedTuple):
 
 
 @kernel
-def _expected_velocity(policy: Policy, t: int, dx: Vector, u: Vector, out: Vector) -> None:
+def _expected_velocity(policy: FeedbackLaw, t: int, dx: Vector, u: Vector, out: Vector) -> None:
     """out = velocity at knot t + 1 by the linear model of the policy, dx away from its state at knot t under u."""
     n = out.shape[0]
     last = policy.xs.shape[1] - n
@@ -68,9 +68,9 @@ def _expected_velocity(policy: Policy, t: int, dx: Vector, u: Vector, out: Vecto
 @kernel
 def closed_loop(
     model_at: Table,
-    work_at: Table,
+    data_at: Table,
     settings: Vector,
-    policy: Policy,
+    policy: FeedbackLaw,
     alpha: float,
     limits: tuple[Vector, Vector],
     substeps: int,
@@ -83,13 +83,13 @@ def closed_loop(
     u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)),   x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap_t+1
     """
     model = model_view(model_at)
-    work = work_view(work_at)
-    options = options_of(work, settings, first == 0)
-    nq = work.theta1.shape[0]
+    data = data_view(data_at)
+    options = options_of(data, settings, first == 0)
+    nq = data.theta1.shape[0]
     low, high = limits
     ndx = policy.gaps.shape[1]
-    dx = work.chain[0][:ndx]
-    velocity = work.step_x[1, nq:]
+    dx = data.chain[0][:ndx]
+    velocity = data.step_x[1, nq:]
     for t in range(first // substeps, path.us.shape[0]):
         u = path.us[t]
         state_difference(model, policy.xs[t], path.xs[t], dx)
@@ -99,8 +99,8 @@ def closed_loop(
         if substeps == 1:
             _expected_velocity(policy, t, dx, u, velocity)
         if policy.cones.shape[0] > 0:
-            copy(policy.cones[t], work.cone)
-            copy(policy.bounds[t], work.bound)
+            copy(policy.cones[t], data.cone)
+            copy(policy.bounds[t], data.bound)
         known = t > 0 or policy.cones.shape[0] > 0
         b = path.xs[t + 1]
         before = max(first - t * substeps, 0)
@@ -108,23 +108,23 @@ def closed_loop(
             copy_vector(path.xs[t], b)
         due = False
         for s in range(before, substeps):
-            copy_vector(b, work.step_x[0])
-            set_external(work, policy.wrenches, t)
-            guess = Guess(velocity if substeps == 1 else work.step_x[0, nq:], s > 0 or known)
-            if step(model, work, options, work.step_x[0], u, guess, b, path.report) != _SOLVED:
+            copy_vector(b, data.step_x[0])
+            set_external(data, policy.wrenches, t)
+            guess = Guess(velocity if substeps == 1 else data.step_x[0, nq:], s > 0 or known)
+            if step(model, data, options, data.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t * substeps + s
             path.report[6] += path.report[1]
-            due = is_due(work, path.report[1])
+            due = is_due(data, path.report[1])
             if due and s + 1 < substeps:
                 return t * substeps + s + 1
         if path.cones.shape[0] > 0:
-            copy(work.cone, path.cones[t])
-            copy(work.bound, path.bounds[t])
+            copy(data.cone, path.cones[t])
+            copy(data.bound, path.bounds[t])
         if alpha < 1.0:
             for k in range(ndx):
                 dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
-            copy_vector(b, work.step_x[0])
-            integrate_state(model, work.step_x[0], dx, b)
+            copy_vector(b, data.step_x[0])
+            integrate_state(model, data.step_x[0], dx, b)
         if due:
             return (t + 1) * substeps
     path.report[1] = path.report[6]
