@@ -64,7 +64,7 @@ def test_an_edited_callee_reaches_its_caller(copy: Path) -> None:
 def test_the_cache_can_be_switched_off(tmp_path: Path) -> None:
     program = (
         "from solvers import compiler, cones, status; print(compiler.cache_folder())\n"
-        "kernel = jit.kernel(lambda x: x + 1.0); print(kernel(1.0))"
+        "kernel = compiler.kernel(lambda x: x + 1.0); print(kernel(1.0))"
     )
     out = python(program, NUMBA_CACHE_DIR=str(tmp_path), DOJO_OPT_CACHE="0").split()
     assert out == ["None", "2.0"]

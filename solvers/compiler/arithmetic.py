@@ -48,7 +48,7 @@ class KernelTyping(Context):
 
     def __init__(self, context: Any) -> None:
         self._shared = context
-        self.__dict__ = context.__dict__  # type: ignore[misc]
+        object.__setattr__(self, "__dict__", context.__dict__)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Context) and self.__dict__ is other.__dict__
