@@ -1,7 +1,12 @@
 """Fixtures for all tests."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+
+sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from programs import HOME, PACKAGES, python
+
+from support.programs import HOME, PACKAGES, python
 
 # -- the kernel cache --------------------------------------------------------------------------------------------------
 

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import HOME
-from urdf_files import branched, collision, inertial, joint, link, write
 
 import dojo_opt as dojo
 from dojo_opt import cli
 from dojo_opt.report.result import Report, Row
+from support.programs import HOME
+from support.urdf_files import branched, collision, inertial, joint, link, write
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["report"], ["models"], ["show"], ["warmup"]])

@@ -9,10 +9,10 @@ import re
 from pathlib import Path
 
 import pytest
-from programs import HOME, PACKAGES, python
 
 import dojo_opt as dojo
 from dojo_opt import cli
+from support.programs import HOME, PACKAGES, python
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -1,4 +1,4 @@
-"""Reports: studies that measure something and show it as a page, `python -m dojo_opt report NAME`."""
+"""Reports: studies of a robot, shown as tables or as a page; `dojo-opt report NAME ROBOT.urdf`."""
 
 from __future__ import annotations
 

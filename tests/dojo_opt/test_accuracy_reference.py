@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import chain_with, random_state
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
+from benchmarks.engines import mujoco_scene
 from dojo_opt.report.accuracy.reference import Motion, pendulum
 from sim.mechanism.pack import pack
+from support.mechanisms import chain_with, random_state
 
 
 def test_a_pendulum_in_absolute_angles_is_that_of_the_tree() -> None:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator
 from scipy.linalg import solve_discrete_are
 
 from dojo_opt.constraint import Goal
@@ -14,6 +13,7 @@ from dojo_opt.plan import Plan
 from dojo_opt.planner import ilqr
 from dojo_opt.problem import Problem
 from solvers.riccati import Quadratic
+from support.doubles import DoubleIntegrator
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator, FreeBody
 from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import Goal
@@ -11,6 +10,7 @@ from dojo_opt.options import Stage
 from dojo_opt.periodic import Periodic
 from dojo_opt.planner import ilqr
 from dojo_opt.problem import Problem
+from support.doubles import DoubleIntegrator, FreeBody
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 T = 12

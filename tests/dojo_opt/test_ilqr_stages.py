@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import Pendulum, SmoothedWall
-from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
@@ -12,6 +10,8 @@ from dojo_opt.planner import Solver, ilqr
 from dojo_opt.problem import Problem
 from dojo_opt.shooting import Shooting
 from solvers.status import Status
+from support.doubles import Pendulum, SmoothedWall
+from support.small_problems import ONE_STAGE, gaps, lqr, swingup
 
 
 @pytest.mark.parametrize("reopen", ["gaps", "feedback"])

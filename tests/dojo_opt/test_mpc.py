@@ -4,13 +4,13 @@ import pickle
 
 import numpy as np
 import pytest
-from standing_hopper import HOPPER, standing_problem
 
 import dojo_opt as dojo
 from dojo_opt.mpc.tick import Settings, milliseconds
 from dojo_opt.options import Options
 from solvers.jit import local_kernel
 from solvers.status import Status
+from support.standing_hopper import HOPPER, standing_problem
 
 
 @pytest.mark.parametrize(

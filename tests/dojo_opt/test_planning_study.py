@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from benchmarks.engines.mujoco_ilqr import MujocoIlqr, Settings
+from benchmarks.studies.planning import PlanningStudy, families
+from benchmarks.studies.planning import planners as measure
+from benchmarks.studies.planning import planning_cases as cases
+from benchmarks.studies.planning.planners import Outcome
+from benchmarks.studies.planning.planning_cases import Setting
 from dojo_opt.options import Options, Stage
 from dojo_opt.report import Progress
-from dojo_opt.report.mujoco_ilqr import MujocoIlqr, Settings
-from dojo_opt.report.planning import Planning, cases, families, measure
-from dojo_opt.report.planning.cases import Setting
-from dojo_opt.report.planning.measure import Outcome
 
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 
@@ -106,7 +108,7 @@ def test_settings_of_the_yardstick_do_what_they_say():
 
 @pytest.mark.slow
 def test_the_quick_study_runs_and_plans_everything():
-    report = Planning(quick=True).run(Progress())
+    report = PlanningStudy(quick=True).run(Progress())
     assert [row.name for row in report.rows if row.met is False and row.unit != "ms"] == []
     assert len(report.figure.axes) == 12
     numbers = json.loads(report.as_json())

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from benchmarks.studies.timing import planning_time
 from dojo_opt.feet import Feet
-from dojo_opt.report import planning_time
 from dojo_opt.report.result import Report
 
 CROCODDYL = find_spec("crocoddyl") is not None and not planning_time._missing("crocoddyl")
@@ -93,7 +93,7 @@ def test_derivatives_of_a_knot_are_chained_over_its_steps():
 def test_crocoddyl_gets_the_same_robot_and_arrives(trot):
     import pinocchio
 
-    from dojo_opt.report.crocoddyl_trot import CrocoddylTrot, pinocchio_model, pinocchio_state
+    from benchmarks.engines.crocoddyl_trot import CrocoddylTrot, pinocchio_model, pinocchio_state
 
     model, frames = pinocchio_model(trot.sim.model)
     data = model.createData()

@@ -7,11 +7,11 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from programs import python
 
 import dojo_opt as dojo
 from dojo_opt.constraint import Goal, ResidualConstraint
 from dojo_opt.cost import Effort, ResidualCost
+from support.programs import python
 
 SIM = dojo.Simulator(dojo.models.cartpole(), time_step=0.05)
 X = SIM.neutral()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dojo_opt.report.mechanics.collisions import bar, check
-from dojo_opt.report.mechanics.solids import PAIRS
 from sim.model.shape_kinds import Pair
+from support.collision_checks import bar, check
+from support.solids import PAIRS
 
 POLYTOPES = ["sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope"]
 ON_CYLINDERS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder"]

@@ -9,11 +9,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
 from naive import rotation as rot
-from scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 import dojo_opt as dojo
+from support.jacobians import check_jacobian
+from support.scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 H = 0.02
 KAPPAS = (1e-2, 1e-4, 1e-6)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from benchmark import loaded
 from naive import rotation as rot
-from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
 from sim.model.layout import model_view, work_view
 from sim.simulator.link import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
 from solvers.jit import local_kernel
+from support.benchmark import loaded
+from support.scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 
 @local_kernel

@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian, five_point
-from scenes import block
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import kind_of
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from sim.mechanism.shapes import String
+from support.case import kind_of
+from support.encounters import SHAPES, approaching, two
+from support.jacobians import check_jacobian, five_point
+from support.scenes import block
 
 FREE = dojo.Joint("floating", None, "b")
 

@@ -6,9 +6,9 @@ import time
 from pathlib import Path
 
 import pytest
-from urdf_files import inertial, joint, link, write
 
 import dojo_opt as dojo
+from support.urdf_files import inertial, joint, link, write
 
 LINKS = 4000
 

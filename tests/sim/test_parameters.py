@@ -6,14 +6,14 @@ import functools
 
 import numpy as np
 import pytest
-from coupled_scenes import COUPLED, kinds
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import Case
-from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import CASES
 from sim.derivatives.parameters.parameters import KINDS
+from support.case import Case
+from support.coupled_scenes import COUPLED, kinds
+from support.jacobians import check_jacobian
+from support.parameter_errors import error
+from support.situations import CASES
 
 ALL = {**CASES, **COUPLED}
 case_of = functools.cache(lambda name: ALL[name]())

@@ -6,15 +6,15 @@ import functools
 
 import numpy as np
 import pytest
-from hills import GRID, WAVES
-from jacobians import check_jacobian
-from scenes import run
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import Case
-from dojo_opt.report.mechanics.couplings import geared
-from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import HILLS, falling
+from support.case import Case
+from support.couplings import geared
+from support.hills import GRID, WAVES
+from support.jacobians import check_jacobian
+from support.parameter_errors import error
+from support.scenes import run
+from support.situations import HILLS, falling
 
 # restitution, friction, how deep it would sink without the ground [m]
 ON_HILLS = {

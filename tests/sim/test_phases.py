@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import pendulum
 
 import dojo_opt as dojo
+from support.scenes import pendulum
 
 H, KAPPA, TOLERANCE = 0.02, 1e-12, 1e-10
 HOPPER = dojo.models.raiberthopper()

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hills import GRID, WAVES, H, derivatives_of, waves
-from scenes import ball, block, chain, order, run
 
 import dojo_opt as dojo
+from support.hills import GRID, WAVES, H, derivatives_of, waves
+from support.scenes import ball, block, chain, order, run
 
 # -- heights -----------------------------------------------------------------------------------------------------------
 

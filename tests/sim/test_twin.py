@@ -6,9 +6,9 @@ from naive import lagrangian as lag
 from naive import rotation as rot
 from naive.maximal import solve
 from naive.scene import from_mechanism, poses
-from scenes import KINDS, LAWS, block, chain, free_body, gaps, limited, pendulum, random_state
 
 import dojo_opt as dojo
+from support.scenes import KINDS, LAWS, block, chain, free_body, gaps, limited, pendulum, random_state
 
 
 def compare(sim, x, u):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from dojo_opt.report.engines import Engine, Run
+from dojo_opt.report.engine import Engine, Run
 from dojo_opt.report.gauge import complete
 from sim.mechanism.mechanism import Mechanism
 
