@@ -25,7 +25,7 @@ measure() {  # NAME COMMAND...: what it prints goes to NAME.txt
     printf '== %s: %d s\n' "$name" "$((SECONDS - begin))"
 }
 
-measure report "$python" -m dojo_opt report all $quick --out "$out"
+measure report "$python" "$here/benchmarks/compare.py" all $quick --out "$out"
 measure chaos "$python" "$here/benchmarks/chaos.py" $quick --out "$out"  # on all cores: loops over them are a part
 export NUMBA_NUM_THREADS=1  # one core, as the tables say
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"

@@ -1,7 +1,7 @@
 """What the benchmarks share: their command line, and what becomes of the Report that each of them makes.
 
 python benchmarks/NAME.py                print it, progress on stderr
-python benchmarks/NAME.py --out DIR      write DIR/NAME.json: what `benchmarks/report.py` writes for one study
+python benchmarks/NAME.py --out DIR      write DIR/NAME.json: what `benchmarks/compare.py` writes for one study
 python benchmarks/NAME.py --json         print that instead
 python benchmarks/NAME.py --quick        a check that it runs
 """

@@ -2,7 +2,7 @@
 
     python benchmarks/parameter_derivatives.py
 
-How exact they are: `python -m benchmarks.report mechanics`.
+How exact they are: `python benchmarks/compare.py mechanics`.
 """
 
 from __future__ import annotations

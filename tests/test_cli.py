@@ -166,7 +166,7 @@ def test_show_lets_go_of_what_does_not_float(name: str, capsys: pytest.CaptureFi
     assert "let go for 0.02 s" in capsys.readouterr().out
 
 
-@pytest.mark.filterwarnings("ignore::sim.urdf.report.UrdfWarning")
+@pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
 def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = branched(tmp_path)
     assert cli.main(["show", str(path), "--seconds", "0.05", "--drop", "0.2"]) == 0
@@ -174,7 +174,7 @@ def test_show_reads_a_file_and_says_what_is_not_represented(tmp_path: Path, caps
     assert "shoulder" in text and "robot.urdf: 7 links" in text
 
 
-@pytest.mark.filterwarnings("ignore::sim.urdf.report.UrdfWarning")
+@pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
 def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = branched(tmp_path)
     assert cli.main(["show", str(path), "--seconds", "0.05", "--json"]) == 0

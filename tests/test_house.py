@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import dojo_opt as dojo
+from benchmarks import compare
 from dojo_opt import cli
 from support.programs import HOME, PACKAGES, python
 
@@ -92,6 +93,8 @@ def test_commands_of_the_pages_exist() -> None:
             assert name == "all" or name in dojo.report.STUDIES
         if command == "run":
             assert name in cli.LOOPS or name.removeprefix("quadruped_") in cli.PROBLEMS
+    compared = re.findall(r"benchmarks/compare\.py (\w+)", text)
+    assert set(compared) <= {"all", *compare.STUDIES} and "timing" in compared
 
 
 @pytest.mark.parametrize("page", PAGES)

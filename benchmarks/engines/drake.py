@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from benchmarks.engines import drake_scene
 from benchmarks.engines.apart import apart
-from benchmarks.engines.drake_scene import Plant
+from benchmarks.engines.drake_scene import DrakePlant
 from benchmarks.engines.ended import ended
 from dojo_opt.report.engine import Run, clocked, held, nodes, observe
 from sim.mechanism.mechanism import Mechanism
@@ -76,7 +76,7 @@ class _Travel:
     """A plant, and how it is stepped."""
 
     sim: Simulator
-    scene: Plant
+    scene: DrakePlant
     time_step: float
     continuous: bool
 
@@ -143,7 +143,7 @@ class _Travel:
             plant.get_applied_spatial_force_input_port().FixValue(context, forces)
 
 
-def write(model: Model, scene: Plant, context: Any, x: Floats) -> None:
+def write(model: Model, scene: DrakePlant, context: Any, x: Floats) -> None:
     """Our state [q; v], v at the node, into a context."""
     from pydrake.common.eigen_geometry import Quaternion
     from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -170,7 +170,7 @@ def write(model: Model, scene: Plant, context: Any, x: Floats) -> None:
             scene.joints[i][-1].set_angular_velocity(context, turn.matrix() @ w)
 
 
-def read(model: Model, scene: Plant, context: Any) -> Floats:
+def read(model: Model, scene: DrakePlant, context: Any) -> Floats:
     """Our state [q; v], v at the node, from a context."""
     from pydrake.math import RollPitchYaw
 

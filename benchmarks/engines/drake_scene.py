@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass
-class Plant:
+class DrakePlant:
     """A diagram with the plant in it, and where the coordinates of our joints are."""
 
     diagram: Any
@@ -32,7 +32,7 @@ class Plant:
     actuated: list[int] = field(default_factory=list)  # inputs with an actuator
 
 
-def load(model: Model, time_step: float, approximation: str = "") -> Plant:
+def load(model: Model, time_step: float, approximation: str = "") -> DrakePlant:
     """The plant; without an approximation it is continuous.
 
     ValueError: a spring of a ball joint, or limits in a continuous plant, which Drake has not.
@@ -55,7 +55,7 @@ def load(model: Model, time_step: float, approximation: str = "") -> Plant:
     plant.mutable_gravity_field().set_gravity_vector(model.gravity)
     count = len(model.body_mass)
     bodies = [plant.AddRigidBody(f"body{i}", _inertia(model, i)) for i in range(count)]
-    scene = Plant(None, plant, bodies, [is_free(model, i) for i in range(count)])
+    scene = DrakePlant(None, plant, bodies, [is_free(model, i) for i in range(count)])
     for i in range(count):
         scene.joints.append([] if scene.free[i] else _joint(model, scene, i))
     _add_forces(model, scene)
@@ -76,7 +76,7 @@ def _inertia(model: Model, body: int) -> Any:
     return SpatialInertia(mass, np.zeros(3), unit, True)
 
 
-def _joint(model: Model, scene: Plant, i: int) -> list[Any]:
+def _joint(model: Model, scene: DrakePlant, i: int) -> list[Any]:
     """Our joint i: translations along the axes of the joint frame, then the rotation."""
     from pydrake.common.eigen_geometry import Quaternion
     from pydrake.math import RigidTransform, RotationMatrix
@@ -114,7 +114,7 @@ def _joint(model: Model, scene: Plant, i: int) -> list[Any]:
     return [plant.AddJoint(joint) for joint in out]
 
 
-def scalar_joints(model: Model, scene: Plant) -> dict[int, Any]:
+def scalar_joints(model: Model, scene: DrakePlant) -> dict[int, Any]:
     """Degree of freedom -> joint of Drake's with that one coordinate."""
     out = {}
     for i, joints in enumerate(scene.joints):
@@ -125,7 +125,7 @@ def scalar_joints(model: Model, scene: Plant) -> dict[int, Any]:
     return out
 
 
-def _add_forces(model: Model, scene: Plant) -> None:
+def _add_forces(model: Model, scene: DrakePlant) -> None:
     """Springs, limits, and an actuator per input of a joint with one coordinate."""
     from pydrake.multibody.tree import PrismaticJoint, PrismaticSpring, RevoluteSpring
 
@@ -148,7 +148,7 @@ def _add_forces(model: Model, scene: Plant) -> None:
             scene.actuated.append(int(k))
 
 
-def _add_contacts(model: Model, scene: Plant, graph: Any) -> None:
+def _add_contacts(model: Model, scene: DrakePlant, graph: Any) -> None:
     """Spheres and the half-spaces they belong to, one per place and friction; all other pairs are filtered out."""
     from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, HalfSpace, Sphere
     from pydrake.math import RigidTransform

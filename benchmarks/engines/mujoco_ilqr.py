@@ -6,7 +6,7 @@ whose expansion is compiled here, in its favour. Dynamics and their one-sided di
 and line search are NumPy. Multiple shooting with the gaps of FDDP, regularised Q_uu, augmented Lagrangian.
 
 What it does not do: soften contact on the way (it is as soft as MuJoCo's default solimp and solref make it, or switches
-on smoothly with `Settings.smooth`), and control limits in the backward pass: inputs are clipped in the rollouts.
+on smoothly with `MujocoSettings.smooth`), and control limits in the backward pass: inputs are clipped in the rollouts.
 
 Tassa, Mansard, Todorov 2014 (backward pass); Mastalli et al. 2020, "Crocoddyl" (gaps and their line search).
 """
@@ -32,7 +32,7 @@ ARMIJO, ASCENT, HALVINGS = 1e-2, 2.0, 8
 MU_FIRST, MU_LAST = 1e-6, 1e6  # regularisation of Q_uu, relative to the control weight
 
 
-class Settings(NamedTuple):
+class MujocoSettings(NamedTuple):
     """How MuJoCo is used."""
 
     step: float = STEP  # [s] longest time step
@@ -58,7 +58,7 @@ class Solution(NamedTuple):
 class MujocoIlqr:
     """iLQR on `problem`, which has a fixed start, with `substeps` steps per knot, of at most `settings.step`."""
 
-    def __init__(self, problem: Problem, settings: Settings = Settings()) -> None:  # noqa: B008
+    def __init__(self, problem: Problem, settings: MujocoSettings = MujocoSettings()) -> None:  # noqa: B008
         import mujoco
 
         self._mujoco = mujoco

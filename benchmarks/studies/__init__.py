@@ -1,1 +1,1 @@
-"""The studies of `python -m benchmarks.report`: reference scenes, and other engines on the same scenes."""
+"""The studies of `python benchmarks/compare.py`: reference scenes, and other engines on the same scenes."""

@@ -4,6 +4,17 @@ from __future__ import annotations
 
 from dojo_opt.report.page import write_page
 from dojo_opt.report.result import Report, Row, Table
-from dojo_opt.report.study import STUDIES, Progress, Study, run_report, run_reports, study
+from dojo_opt.report.study import STUDIES, Progress, ReportStudy, run_report, run_reports, study
 
-__all__ = ["STUDIES", "Progress", "Report", "Row", "Study", "Table", "run_report", "run_reports", "study", "write_page"]
+__all__ = [
+    "STUDIES",
+    "Progress",
+    "Report",
+    "Row",
+    "ReportStudy",
+    "Table",
+    "run_report",
+    "run_reports",
+    "study",
+    "write_page",
+]

@@ -1,4 +1,4 @@
-"""The command line of studies: `dojo-opt report`, and `benchmarks/report.py` with more of them."""
+"""The command line of studies: `dojo-opt report`, and `benchmarks/compare.py` with more of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from dojo_opt.report.study import STUDIES, Studies, run_reports
 from sim.io.urdf.load import load_urdf
 from sim.mechanism.parts import Contact
 
-CHECKOUT = "Reference scenes and other engines: python benchmarks/report.py --help, from a checkout."
+CHECKOUT = "Reference scenes and other engines: python benchmarks/compare.py --help, from a checkout."
 MOVED = ("contact", "planning", "mechanics", "compile")  # studies that `dojo-opt report` had
 
 
@@ -41,7 +41,7 @@ def _named(names: dict[str, str], moved: Sequence[str]) -> Callable[[str], str]:
 
     def checked(name: str) -> str:
         if name in moved:
-            raise argparse.ArgumentTypeError(f"{name} is run from a checkout: python benchmarks/report.py {name}")
+            raise argparse.ArgumentTypeError(f"{name} is run from a checkout: python benchmarks/compare.py {name}")
         if name not in names:
             raise argparse.ArgumentTypeError(f"no study {name!r}; there are {', '.join(names)}")
         return name

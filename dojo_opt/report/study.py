@@ -57,7 +57,7 @@ class Progress:
         self._stream.flush()
 
 
-class Study(Protocol):
+class ReportStudy(Protocol):
     """A study is a dataclass whose fields are its settings: `quick`, for most of them `mechanism`, and others."""
 
     quick: bool  # fewer and shorter scenes: a check that it runs
@@ -67,7 +67,9 @@ class Study(Protocol):
         ...
 
 
-def study(name: str, *, quick: bool = False, mechanism: Mechanism | None = None, studies: Studies = STUDIES) -> Study:
+def study(
+    name: str, *, quick: bool = False, mechanism: Mechanism | None = None, studies: Studies = STUDIES
+) -> ReportStudy:
     """Make a study.
 
     Args:

@@ -18,7 +18,7 @@ from benchmarks.studies.stability import joint_trials as joints
 from benchmarks.studies.stability import stability_study as study
 from dojo_opt.report import Progress
 from dojo_opt.report.stability.robot_trials import robot_trials
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 
 OURS = Ours(kappa=1e-10, rounds=1)
 PASSING = {
@@ -42,7 +42,7 @@ PASSING = {
 }
 
 
-def ours(trial: Trial) -> Run:
+def ours(trial: StabilityTrial) -> Run:
     return trial.run(replace(OURS, tolerance=trial.tolerance, kappa=trial.kappa or OURS.kappa))
 
 

@@ -52,7 +52,7 @@ def test_the_largest_shape_of_a_merged_body_stays_and_the_others_are_named(tmp_p
     assert "rotor (cylinder)" in str(mech.report)
 
 
-@pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.urdf.report.UrdfWarning")
+@pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.io.urdf.report.UrdfWarning")
 def test_a_trunk_with_rotors_lands_on_a_beam(tmp_path: Path) -> None:
     mech = dojo.load_urdf(trunk(tmp_path), ground=False)
     beam = dojo.Box(0.3, 1.0, 0.2, center=(0.0, 0.0, 0.1))

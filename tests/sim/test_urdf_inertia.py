@@ -14,7 +14,7 @@ from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
 from support.urdf_files import branched, compare_with_mujoco, inertial, joint, link, write
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.urdf.report.UrdfWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.io.urdf.report.UrdfWarning")
 
 
 def test_an_inertia_is_that_of_its_point_masses(tmp_path: Path, rng: np.random.Generator) -> None:

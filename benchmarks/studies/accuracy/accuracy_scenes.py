@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import dojo_opt as dojo
-from dojo_opt.report.accuracy.reference import Motion, pendulum
+from dojo_opt.report.accuracy.reference import TreeReference, pendulum
 from dojo_opt.report.accuracy.smooth_scene import Floats, SmoothScene, kinetic_energy, model_of
 
 
@@ -16,7 +16,9 @@ def free_body(duration: float) -> SmoothScene:
     body = dojo.Body("body", 1.0, (0.1, 0.2, 0.3))
     mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "body")], gravity=(0, 0, 0), name="free body")
     q, v = np.array(mech.neutral, dtype=np.float64), np.array([0.0, 0.0, 0.0, 0.01, 5.0, 0.01])
-    return SmoothScene("free body", mech, q, v, duration, kinetic_energy(mech, q, v), True, Motion(model_of(mech)).run)
+    return SmoothScene(
+        "free body", mech, q, v, duration, kinetic_energy(mech, q, v), True, TreeReference(model_of(mech)).run
+    )
 
 
 def tree(duration: float) -> SmoothScene:
@@ -28,7 +30,7 @@ def tree(duration: float) -> SmoothScene:
     q[7:] += 0.3 * rng.normal(size=12)
     v = rng.normal(size=18)
     v *= np.sqrt(15.84 / kinetic_energy(mech, q, v))
-    return SmoothScene("tree of 13 bodies", mech, q, v, duration, 15.84, True, Motion(model_of(mech)).run)
+    return SmoothScene("tree of 13 bodies", mech, q, v, duration, 15.84, True, TreeReference(model_of(mech)).run)
 
 
 def chain(links: int) -> SmoothScene:

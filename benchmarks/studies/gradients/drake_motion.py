@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.studies.gradients.drake_step import DrakeStep
-from benchmarks.studies.gradients.sliding import SETTLE, Derivative, Motion, derivative
+from benchmarks.studies.gradients.sliding import SETTLE, Derivative, SlidingMotion, derivative
 from benchmarks.studies.gradients.touchdown import RADIUS, SPEED, Curve, H, Vector, ball
 from sim.simulator.simulator import Simulator
 
 CARRIED = "AutoDiffXd, carried"
 
 
-def carried(motion: Motion, time_step: float, approximation: str) -> Derivative:
+def carried(motion: SlidingMotion, time_step: float, approximation: str) -> Derivative:
     """The motion of one AutoDiffXd, the force or the speed, from Drake's own state of rest; NaN where a step fails."""
     from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 

@@ -37,7 +37,7 @@ CHAINED_EPS = 1e-6  # of mjd_transitionFD, centred
 SETTLE = 1.0  # [s] in which a soft contact takes its load
 
 
-class Motion(NamedTuple):
+class SlidingMotion(NamedTuple):
     """One derivative: of the way along `direction` by a force along it [N], or by the speed along it [m/s]."""
 
     name: str
@@ -65,25 +65,25 @@ class Derivative(NamedTuple):
     seconds: float  # processor time
 
 
-def motions() -> list[Motion]:
+def motions() -> list[SlidingMotion]:
     """Pulled at .9, 1.1 and 1.5 times the threshold; sliding at 0 and 30 degrees."""
     threshold = STICK * MASS * GRAVITY
     stuck, slider = (dojo.models.block(mass=MASS, friction=mu) for mu in (STICK, SLIDE))
     x, oblique = np.array([1.0, 0.0, 0.0]), np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0])
     gain = PULL**2 / (2.0 * MASS)
     pulls = [
-        Motion(f"dx/dF at {f:g} of the threshold", stuck, x, True, f * threshold, PULL, gain * (f > 1.0), gain)
+        SlidingMotion(f"dx/dF at {f:g} of the threshold", stuck, x, True, f * threshold, PULL, gain * (f > 1.0), gain)
         for f in (0.9, 1.1, 1.5)
     ]
     slope = SPEED / (SLIDE * GRAVITY)
     slides = [
-        Motion(f"d(stop)/dv0 at {angle} degrees", slider, along, False, SPEED, GLIDE, slope, slope)
+        SlidingMotion(f"d(stop)/dv0 at {angle} degrees", slider, along, False, SPEED, GLIDE, slope, slope)
         for angle, along in ((0, x), (30, oblique))
     ]
     return [*pulls, *slides]
 
 
-def chained(motion: Motion, time_step: float, kappa: float) -> Derivative:
+def chained(motion: SlidingMotion, time_step: float, kappa: float) -> Derivative:
     """Ours:  S_0 = dx_0/dp,  S_t+1 = A_t S_t + B_t du/dp,  (A, B) at the states of one rollout."""
     sim = Simulator(motion.mechanism, time_step=time_step, kappa=kappa)
     x, us = _start(sim, motion, motion.value)
@@ -101,7 +101,7 @@ def chained(motion: Motion, time_step: float, kappa: float) -> Derivative:
     return derivative("dojo-opt", CHAINED, kappa, motion, time_step, run)
 
 
-def ours_differenced(motion: Motion, time_step: float, eps: float, kappa: float) -> Derivative:
+def ours_differenced(motion: SlidingMotion, time_step: float, eps: float, kappa: float) -> Derivative:
     """Ours: what `chained` has to agree with."""
     sim = Simulator(motion.mechanism, time_step=time_step, kappa=kappa)
 
@@ -112,7 +112,7 @@ def ours_differenced(motion: Motion, time_step: float, eps: float, kappa: float)
     return derivative("dojo-opt", f"differences of {eps:g}", kappa, motion, time_step, _central(way, motion, eps))
 
 
-def differenced(engine: Engine, motion: Motion, time_step: float, eps: float) -> Derivative:
+def differenced(engine: Engine, motion: SlidingMotion, time_step: float, eps: float) -> Derivative:
     """Any other engine, from its own state of rest."""
     sim = Simulator(motion.mechanism, time_step=time_step)
     still = np.zeros(sim.nv), np.zeros(sim.nu)
@@ -127,7 +127,7 @@ def differenced(engine: Engine, motion: Motion, time_step: float, eps: float) ->
     return derivative(engine.name, f"differences of {eps:g}", None, motion, time_step, _central(way, motion, eps))
 
 
-def mujoco_chained(motion: Motion, time_step: float, integrator: str) -> Derivative:
+def mujoco_chained(motion: SlidingMotion, time_step: float, integrator: str) -> Derivative:
     """MuJoCo: the recursion of `chained` with (A, B) of mjd_transitionFD, centred."""
     import mujoco
 
@@ -157,7 +157,7 @@ def mujoco_chained(motion: Motion, time_step: float, integrator: str) -> Derivat
         return derivative(f"MuJoCo {integrator}", "mjd_transitionFD chained", None, motion, time_step, run)
 
 
-def _start(sim: Simulator, motion: Motion, p: float) -> tuple[Vector, Vector]:
+def _start(sim: Simulator, motion: SlidingMotion, p: float) -> tuple[Vector, Vector]:
     """The state, standing or sliding, and the inputs of all steps."""
     us = np.zeros((round(motion.duration / sim.time_step), sim.nu))
     if motion.pulled:
@@ -166,7 +166,7 @@ def _start(sim: Simulator, motion: Motion, p: float) -> tuple[Vector, Vector]:
     return sim.start(sim.neutral()[: sim.nq], [*(p * motion.direction), 0.0, 0.0, 0.0]), us
 
 
-def _start_slope(sim: Simulator, motion: Motion) -> Vector:
+def _start_slope(sim: Simulator, motion: SlidingMotion) -> Vector:
     """dx_0/dp: of the velocity of a translation, its direction."""
     S = np.zeros(sim.ndx)
     if not motion.pulled:
@@ -174,7 +174,7 @@ def _start_slope(sim: Simulator, motion: Motion) -> Vector:
     return S
 
 
-def _end(engine: Engine, motion: Motion, h: float, q: Vector, v: Vector, u: Vector, duration: float) -> Vector:
+def _end(engine: Engine, motion: SlidingMotion, h: float, q: Vector, v: Vector, u: Vector, duration: float) -> Vector:
     """Pose at the end, which is what the coordinates of a block are; NaN when the engine stopped before."""
     run = engine.simulate(motion.mechanism, time_step=h, q=q, v=v, duration=duration, samples=1, inputs=u)
     if run.message:
@@ -182,14 +182,14 @@ def _end(engine: Engine, motion: Motion, h: float, q: Vector, v: Vector, u: Vect
     return np.concatenate([run.position[-1, 0], run.quaternion[-1, 0]])
 
 
-def _central(way: Callable[[float], float], motion: Motion, eps: float) -> Callable[[], tuple[float, float]]:
+def _central(way: Callable[[float], float], motion: SlidingMotion, eps: float) -> Callable[[], tuple[float, float]]:
     """(way, its central difference)."""
     p = motion.value
     return lambda: (way(p), (way(p + eps) - way(p - eps)) / (2.0 * eps))
 
 
 def derivative(
-    engine: str, how: str, kappa: float | None, motion: Motion, h: float, run: Callable[[], tuple[float, float]]
+    engine: str, how: str, kappa: float | None, motion: SlidingMotion, h: float, run: Callable[[], tuple[float, float]]
 ) -> Derivative:
     """What `run`, which returns (way, derivative), says, and the time it takes."""
     start = time.process_time()

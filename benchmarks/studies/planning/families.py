@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.studies.planning.planners import Outcome, ours
+from benchmarks.studies.planning.planners import PlanOutcome, ours
 from benchmarks.studies.planning.planning_cases import Setting
 from dojo_opt.problem import Problem
 
@@ -30,7 +30,7 @@ class Score(NamedTuple):
     seconds: float  # median over all, processor time
 
 
-def score(name: str, problems: Sequence[Problem], outcomes: Sequence[tuple[Setting, list[Outcome]]]) -> list[Score]:
+def score(name: str, problems: Sequence[Problem], outcomes: Sequence[tuple[Setting, list[PlanOutcome]]]) -> list[Score]:
     """Scores of all settings, by the costs of replays on hard contact, against the best of each variant."""
     costs = np.array([[o.hard[0] if _true(o) else np.inf for o in found] for _, found in outcomes])
     best = costs.min(axis=0)
@@ -54,10 +54,10 @@ def score(name: str, problems: Sequence[Problem], outcomes: Sequence[tuple[Setti
     return scores
 
 
-def run(problems: Sequence[Problem], setting: Setting) -> list[Outcome]:
+def run(problems: Sequence[Problem], setting: Setting) -> list[PlanOutcome]:
     """One setting on all variants."""
     return [ours(problem, setting.name, max_iterations=_ITERATIONS, **setting.options) for problem in problems]
 
 
-def _true(outcome: Outcome) -> bool:
+def _true(outcome: PlanOutcome) -> bool:
     return outcome.success and outcome.hard[1] <= TRUE  # false for NaN

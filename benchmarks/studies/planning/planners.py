@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from benchmarks.engines.mujoco_ilqr import MujocoIlqr, Settings
+from benchmarks.engines.mujoco_ilqr import MujocoIlqr, MujocoSettings
 from dojo_opt.plan import Plan
 from dojo_opt.problem import Problem
 
@@ -20,7 +20,7 @@ REFINE = 5  # steps of the plant per step of the plan
 OURS, MUJOCO = "dojo-opt", "MuJoCo and NumPy"
 
 
-class Outcome(NamedTuple):
+class PlanOutcome(NamedTuple):
     """A plan and its replays: with its gains and limits, on hard contact."""
 
     planner: str
@@ -37,7 +37,7 @@ class Outcome(NamedTuple):
     history: Matrix  # (iterations, 4) processor time [s], cost, violation, gap
 
 
-def ours(problem: Problem, setting: str = "default", *, rounds: int = 1, **options: Any) -> Outcome:
+def ours(problem: Problem, setting: str = "default", *, rounds: int = 1, **options: Any) -> PlanOutcome:
     """Plan by `ilqr`; the median time of `rounds` after one that is not clocked (none when there is one round)."""
     plan, history, seconds = _clocked(problem, options)
     if rounds > 1:
@@ -46,10 +46,12 @@ def ours(problem: Problem, setting: str = "default", *, rounds: int = 1, **optio
     message = "" if plan.success else plan.status.name
     hard, fine = _replay(plan, 1), _replay(plan, REFINE)
     found = plan.fun, plan.violation, seconds
-    return Outcome(OURS, setting, bool(plan.success), message, plan.nit, *found, hard, fine, upright(plan.x), history)
+    return PlanOutcome(
+        OURS, setting, bool(plan.success), message, plan.nit, *found, hard, fine, upright(plan.x), history
+    )
 
 
-def peer(problem: Problem, settings: Settings) -> Outcome:
+def peer(problem: Problem, settings: MujocoSettings) -> PlanOutcome:
     """Plan by MuJoCo's differences and iLQR in NumPy; the replay at its own time step is the plan itself."""
     solver = MujocoIlqr(problem, settings)
     start = time.process_time()
@@ -62,7 +64,7 @@ def peer(problem: Problem, settings: Settings) -> Outcome:
     history = (
         np.column_stack([np.cumsum(solution.seconds), solution.history]) if solution.iterations else np.zeros((0, 4))
     )
-    return Outcome(
+    return PlanOutcome(
         MUJOCO,
         name,
         not message,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.studies.planning.families import Score
-from benchmarks.studies.planning.planners import Outcome
+from benchmarks.studies.planning.planners import PlanOutcome
 from benchmarks.studies.planning.planning_cases import NAMES
 
 _CLOSED = 1e-6  # gap up to which a trajectory has a cost
@@ -17,9 +17,9 @@ _COLOURS = {"default": "C3", "one stage": "C0", "soft": "C1", "schedule": "C2", 
 
 
 def draw(
-    plans: Mapping[str, Outcome],
-    alone: Mapping[str, Outcome],
-    peers: Mapping[str, Sequence[Outcome]],
+    plans: Mapping[str, PlanOutcome],
+    alone: Mapping[str, PlanOutcome],
+    peers: Mapping[str, Sequence[PlanOutcome]],
     scores: Mapping[str, Sequence[Score]],
 ) -> Any:
     """A column per problem: cost and violation against time, then all settings on its variants."""
@@ -47,7 +47,7 @@ def draw(
     return figure
 
 
-def _history(top: Any, bottom: Any, plan: Outcome, label: str, look: dict[str, Any]) -> None:
+def _history(top: Any, bottom: Any, plan: PlanOutcome, label: str, look: dict[str, Any]) -> None:
     """Cost, where the trajectory has no gaps, and violation; a cross where a solve gave up."""
     seconds, cost, violation, gap = plan.history.T
     ms, closed = 1e3 * seconds, gap <= _CLOSED

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from benchmarks.engines.mujoco_ilqr import Settings
+from benchmarks.engines.mujoco_ilqr import MujocoSettings
 from benchmarks.studies.planning import families
 from benchmarks.studies.planning import planning_cases as cases
-from benchmarks.studies.planning.planners import HARD, REFINE, Outcome, ours, peer
+from benchmarks.studies.planning.planners import HARD, REFINE, PlanOutcome, ours, peer
 from benchmarks.studies.planning.planning_figure import draw
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
@@ -25,7 +25,7 @@ BARS: dict[str, tuple[int, float | None, float | None]] = {
     "trot, damping 5, 1 x 50 ms": (8, None, None),
 }
 VIOLATION, UPRIGHT, TARGETS = 1e-3, 0.99, 26
-PEERS = (Settings(), Settings(step=5e-3), Settings(centred=True), Settings(smooth=True))
+PEERS = (MujocoSettings(), MujocoSettings(step=5e-3), MujocoSettings(centred=True), MujocoSettings(smooth=True))
 _ROUNDS = 3
 
 
@@ -59,9 +59,9 @@ class PlanningStudy:
         report.figure = draw(plans, alone, peers, scores)
         return report
 
-    def _references(self, report: Report, progress: Progress) -> dict[str, Outcome]:
+    def _references(self, report: Report, progress: Progress) -> dict[str, PlanOutcome]:
         """Our plans with default settings, over time steps."""
-        plans: dict[str, Outcome] = {}
+        plans: dict[str, PlanOutcome] = {}
         problems = [(name, (name, problem)) for name, problem in cases.time_steps(quick=self.quick).items()]
         for name, problem in progress(problems, "planning, time steps"):
             plans[name] = plan = ours(problem, rounds=_ROUNDS)
@@ -79,7 +79,7 @@ class PlanningStudy:
         report.details["plans"] = {name: _numbers(plan) for name, plan in plans.items()}
         return plans
 
-    def _peers(self, report: Report, progress: Progress) -> dict[str, list[Outcome]]:
+    def _peers(self, report: Report, progress: Progress) -> dict[str, list[PlanOutcome]]:
         """MuJoCo's plans of the reference problems."""
         if find_spec("mujoco") is None:
             report.notes.append('without MuJoCo; pip install ".[bench]" for its plans')
@@ -120,7 +120,7 @@ class PlanningStudy:
         return scores
 
 
-def _compare(report: Report, plans: dict[str, Outcome], peers: dict[str, list[Outcome]]) -> None:
+def _compare(report: Report, plans: dict[str, PlanOutcome], peers: dict[str, list[PlanOutcome]]) -> None:
     """Rows: the fastest of MuJoCo's plans that succeeded, over ours at every time step."""
     for name, found in peers.items():
         solved = [plan for plan in found if plan.success]
@@ -141,7 +141,7 @@ def _one_stage(kappa: float) -> dict[str, Any]:
     return next(s.options for s in cases.settings(quick=False) if s.name == f"kappa_grad {kappa:g}")
 
 
-def _plans_table(title: str, plans: dict[str, Outcome]) -> Table:
+def _plans_table(title: str, plans: dict[str, PlanOutcome]) -> Table:
     rows: list[list[Cell]] = []
     for name, p in plans.items():
         each = 1e3 * p.seconds / max(p.iterations, 1)
@@ -164,6 +164,6 @@ def _scores_table(name: str, scores: list[families.Score]) -> Table:
     return Table(f"Settings of the planner: {name}", header, rows, note)
 
 
-def _numbers(plan: Outcome, *, history: bool = True) -> dict[str, Any]:
+def _numbers(plan: PlanOutcome, *, history: bool = True) -> dict[str, Any]:
     fields = plan._asdict()
     return fields if history else {name: value for name, value in fields.items() if name != "history"}

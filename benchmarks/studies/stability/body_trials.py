@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dojo_opt.report.stability import measures
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 
 Three = tuple[float, float, float]
 
 
-def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -> Trial:
+def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -> StabilityTrial:
     """A free body that spins and tumbles for 1 s."""
     mechanism = Mechanism([Body("body", 1.0, inertia)], [Joint("floating", None, "body")], gravity=(0.0, 0.0, 0.0))
     moments = ", ".join(f"{moment:g}" for moment in inertia)
-    return Trial(
+    return StabilityTrial(
         "spin",
         f"inertia {moments}, {max(omega):g} rad/s for 1 s at {1e3 * time_step:g} ms",
         f"refused: {refusal}" if refusal else "angular momentum within 1e-10 of its size",
@@ -32,7 +32,7 @@ def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -
     )
 
 
-def trials() -> list[Trial]:
+def trials() -> list[StabilityTrial]:
     """All of them."""
     return [
         spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-4),

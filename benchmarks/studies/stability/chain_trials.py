@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from dojo_opt.report.stability import measures
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Joint
 
@@ -36,11 +36,13 @@ def rods(
     return Mechanism(bodies, joints, touching, inputs=[])
 
 
-def pendulum(links: int, time_step: float, duration: float, *, slow: bool, peer_duration: float = 0.0) -> Trial:
+def pendulum(
+    links: int, time_step: float, duration: float, *, slow: bool, peer_duration: float = 0.0
+) -> StabilityTrial:
     """An undamped chain of 2 m and 2 kg released from the horizontal."""
     mechanism = rods([LENGTH / links] * links, [MASS / links] * links)
     scale = MASS * G * LENGTH
-    return Trial(
+    return StabilityTrial(
         "long chains",
         f"{links} undamped links, {duration:g} s at {1e3 * time_step:g} ms",
         "energy off by at most 5 % of m g L",
@@ -58,13 +60,13 @@ def pendulum(links: int, time_step: float, duration: float, *, slow: bool, peer_
     )
 
 
-def heavy_tip(ratio: float, time_step: float, *, angle: float, refusal: str = "", slow: bool = False) -> Trial:
+def heavy_tip(ratio: float, time_step: float, *, angle: float, refusal: str = "", slow: bool = False) -> StabilityTrial:
     """Ten links of 0.2 m and 0.2 kg in a straight line, the last one heavier; released at `angle` from below.
 
     From 90 degrees links become slack, and snap taut with all the energy of the tip.
     """
     mechanism = rods([0.2] * 10, [0.2] * 9 + [0.2 * ratio])
-    return Trial(
+    return StabilityTrial(
         "mass ratio",
         f"tip {ratio:g} times heavier, from {np.rad2deg(angle):.0f} degrees, 5 s at {1e3 * time_step:g} ms",
         "refused: a step does not reach its tolerance" if refusal else "energy off by at most 1 % of m g L",
@@ -83,10 +85,10 @@ def heavy_tip(ratio: float, time_step: float, *, angle: float, refusal: str = ""
     )
 
 
-def lengths() -> Trial:
+def lengths() -> StabilityTrial:
     """A rod of 10 m, one of 0.1 m and one of 1 mm on one another."""
     sizes = [10.0, 0.1, 1e-3]
-    return Trial(
+    return StabilityTrial(
         "lengths",
         "rods of 10 m, 0.1 m and 1 mm on one another, 1 kg per metre, at 1 ms",
         "energy off by at most 0.1 % of m g L",
@@ -101,13 +103,13 @@ def lengths() -> Trial:
     )
 
 
-def on_the_ground(time_step: float) -> Trial:
+def on_the_ground(time_step: float) -> StabilityTrial:
     """A free chain of 100 links, damped by 1e-3 N m s/rad, falling on the ground at 60 degrees."""
     mechanism = rods([0.02] * 100, [0.02] * 100, floating=True, damper=1e-3)
     tilt = pi / 3.0
     low = 0.01 * np.cos(tilt) + 1.99 * np.cos(tilt)
     q = np.r_[0.0, 0.0, low + 0.2, np.cos(tilt / 2.0), 0.0, np.sin(tilt / 2.0), 0.0, np.zeros(99)]
-    return Trial(
+    return StabilityTrial(
         "long chains",
         f"100 links fall on the ground, 100 contacts, at {1e3 * time_step:g} ms",
         "no gain of energy (0.1 % of that at the start), no penetration (1e-8 m)",
@@ -123,7 +125,7 @@ def on_the_ground(time_step: float) -> Trial:
     )
 
 
-def trials() -> list[Trial]:
+def trials() -> list[StabilityTrial]:
     """All of them."""
     return [
         heavy_tip(5e2, 5e-4, angle=pi / 2.0),

@@ -10,7 +10,7 @@ from dojo_opt.models.block import block
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
 from dojo_opt.report.stability import measures
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Joint
 
@@ -19,7 +19,7 @@ TILTED = (0.8, 0.36, 0.48, 0.0)
 REST = (1.0, 0.0, 0.0, 0.0)
 
 
-def on_a_foot(ratio: float, time_step: float) -> Trial:
+def on_a_foot(ratio: float, time_step: float) -> StabilityTrial:
     """A load on a foot of 1 kg with four contacts, between them a spring that sags by 10 mm, damped."""
     mass, sag = ratio, 0.01
     stiffness = mass * G / sag
@@ -36,7 +36,7 @@ def on_a_foot(ratio: float, time_step: float) -> Trial:
     mechanism = Mechanism(
         bodies, [Joint("floating", None, "foot"), column], [Contact("foot", p) for p in corners], inputs=[]
     )
-    return Trial(
+    return StabilityTrial(
         "mass ratio",
         f"{ratio:g} kg on a foot of 1 kg dropped from 20 mm, at {1e3 * time_step:g} ms",
         "no penetration (1e-4 m), load at its place after 2 s within 0.1 mm",
@@ -50,7 +50,7 @@ def on_a_foot(ratio: float, time_step: float) -> Trial:
     )
 
 
-def impact(what: str, time_step: float) -> Trial:
+def impact(what: str, time_step: float) -> StabilityTrial:
     """A ball, a box on a corner, or a quadruped at 100 m/s.
 
     Its shanks leave the ground with 300 rad/s and more: in 10 ms that is half a turn, which no step represents.
@@ -65,7 +65,7 @@ def impact(what: str, time_step: float) -> Trial:
         mechanism = quadruped(contacts="all", limits=False)
         q, velocity = np.array(mechanism.neutral), np.r_[velocity, np.zeros(12)]
     q[2] += 100.0 * time_step * 3.33
-    return Trial(
+    return StabilityTrial(
         "impacts",
         f"{what} at 100 m/s, at {1e3 * time_step:g} ms",
         "no penetration (1e-8 m)",
@@ -79,9 +79,9 @@ def impact(what: str, time_step: float) -> Trial:
     )
 
 
-def drop(time_step: float, duration: float) -> Trial:
+def drop(time_step: float, duration: float) -> StabilityTrial:
     """A box dropped flat from 0.1 m, at time steps of all sizes."""
-    return Trial(
+    return StabilityTrial(
         "time steps",
         f"box dropped from 0.1 m, {duration:g} s at {1e3 * time_step:g} ms",
         "no penetration, no motion in the last tenth of the time (1e-6 m)",
@@ -98,9 +98,9 @@ def drop(time_step: float, duration: float) -> Trial:
     )
 
 
-def friction(coefficient: float) -> Trial:
+def friction(coefficient: float) -> StabilityTrial:
     """A box thrown along the ground at 3 m/s: with much friction it tips over its front edge."""
-    return Trial(
+    return StabilityTrial(
         "friction",
         f"box thrown along the ground at 3 m/s, friction {coefficient:g}, 2 s at 10 ms",
         "no penetration (1e-6 m), no gain of energy (0.1 % of that at the start)",
@@ -114,14 +114,14 @@ def friction(coefficient: float) -> Trial:
     )
 
 
-def plate(contacts: int, time_step: float) -> Trial:
+def plate(contacts: int, time_step: float) -> StabilityTrial:
     """A plate with a grid of contacts dropped from 0.1 m, tilted a little: 3 of them would hold it."""
     side = round(contacts**0.5)
     grid = np.linspace(-0.5, 0.5, side)
     points = [(x, y, -0.025) for x, y in product(grid, repeat=2)]
     body = Body("plate", 10.0, (10.0 / 12.0, 10.0 / 12.0, 10.0 / 6.0))
     mechanism = Mechanism([body], [Joint("floating", None, "plate")], [Contact("plate", p) for p in points], inputs=[])
-    return Trial(
+    return StabilityTrial(
         "redundant contacts",
         f"plate of 10 kg on {contacts} contacts, dropped from 0.1 m, at {1e3 * time_step:g} ms",
         "no penetration, no motion in the last tenth of 3 s (1e-6 m)",
@@ -135,14 +135,14 @@ def plate(contacts: int, time_step: float) -> Trial:
     )
 
 
-def box_on_8() -> Trial:
+def box_on_8() -> StabilityTrial:
     """A box with four corners below and four points at the middles of the lower edges."""
     half = 0.25
     corners = [(x * half, y * half, -half) for x, y in product((-1, 1), repeat=2)]
     middles = [(half, 0, -half), (-half, 0, -half), (0, half, -half), (0, -half, -half)]
     body = Body("box", 1.0, (1.0 / 24.0, 1.0 / 24.0, 1.0 / 24.0))
     points = [Contact("box", p) for p in [*corners, *middles]]
-    return Trial(
+    return StabilityTrial(
         "redundant contacts",
         "box on 8 contacts, dropped from 0.1 m, at 10 ms",
         "no penetration, no motion in the last tenth of 3 s (1e-6 m)",
@@ -156,9 +156,9 @@ def box_on_8() -> Trial:
     )
 
 
-def small(edge: float, mass: float) -> Trial:
+def small(edge: float, mass: float) -> StabilityTrial:
     """A tiny cube dropped from ten times its size."""
-    return Trial(
+    return StabilityTrial(
         "lengths",
         f"cube of {1e3 * edge:g} mm and {mass:g} kg dropped from ten times its size, at 1 ms",
         "no penetration and at rest within 1 % of its size",
@@ -174,9 +174,9 @@ def small(edge: float, mass: float) -> Trial:
     )
 
 
-def overlap(depth: float) -> Trial:
+def overlap(depth: float) -> StabilityTrial:
     """A box that starts below the surface."""
-    return Trial(
+    return StabilityTrial(
         "deep overlap",
         f"box starts {depth:g} m deep, at 10 ms",
         "out of the ground after 0.1 s, and never in it again (1e-8 m)",
@@ -191,7 +191,7 @@ def overlap(depth: float) -> Trial:
     )
 
 
-def trials() -> list[Trial]:
+def trials() -> list[StabilityTrial]:
     """All of them."""
     return [
         *(on_a_foot(ratio, h) for ratio in (1e2, 1e4, 1e6) for h in (1e-3, 1e-2)),

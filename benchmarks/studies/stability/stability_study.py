@@ -9,7 +9,7 @@ from benchmarks.studies.stability import body_trials, chain_trials, ground_trial
 from dojo_opt.report.result import Report
 from dojo_opt.report.stability import RobotStability
 from dojo_opt.report.stability.judging import KAPPA, judge
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 
@@ -49,7 +49,7 @@ class StabilityStudy:
         judge(report, [trial for trial in self.trials() if not (self.quick and trial.slow)], self._peers(), progress)
         return report
 
-    def trials(self) -> list[Trial]:
+    def trials(self) -> list[StabilityTrial]:
         """What is run."""
         rooms = (ground_trials, stack_trials, joint_trials, body_trials, chain_trials)
         return [trial for room in rooms for trial in room.trials()]

@@ -32,7 +32,7 @@ DOJO_KAPPA = 1e-4  # [N s m]
 FD_STEP = 1e-6
 
 
-class Robot(NamedTuple):
+class TimedRobot(NamedTuple):
     """One line of the table."""
 
     name: str
@@ -44,16 +44,16 @@ class Robot(NamedTuple):
     over_mujoco: float
 
 
-def robots() -> list[Robot]:
+def robots() -> list[TimedRobot]:
     """The four of Table V; the quadrotor is another one (Pelican, not X2), like Dojo's model."""
     hinges = np.array([40.0, 40.0, 40.0, *[40.0, 40.0, 120.0, 80.0, 20.0, 10.0, 10.0, 10.0] * 2])  # gym's, ankles 20
     panda = np.array([87.0] * 4 + [12.0] * 3 + [70.0] * 2)
     hover = 1.04 * 9.81 / 4
     return [
-        Robot("humanoid", models.humanoid, -hinges / 3, hinges / 3, 1750.0, OVER_DOJO, 10.0),
-        Robot("A1", lambda: models.quadruped(contacts="all"), -33.5 / 3, 33.5 / 3, 5235.0, OVER_DOJO, 10.0),
-        Robot("Panda", models.panda, -panda / 3, panda / 3, 1159.0, OVER_DOJO, 1.0),
-        Robot("quadrotor", models.quadrotor, 2 / 3 * hover, 4 / 3 * hover, 807.0, None, 1.0),
+        TimedRobot("humanoid", models.humanoid, -hinges / 3, hinges / 3, 1750.0, OVER_DOJO, 10.0),
+        TimedRobot("A1", lambda: models.quadruped(contacts="all"), -33.5 / 3, 33.5 / 3, 5235.0, OVER_DOJO, 10.0),
+        TimedRobot("Panda", models.panda, -panda / 3, panda / 3, 1159.0, OVER_DOJO, 1.0),
+        TimedRobot("quadrotor", models.quadrotor, 2 / 3 * hover, 4 / 3 * hover, 807.0, None, 1.0),
     ]
 
 
@@ -63,7 +63,7 @@ def add_robots(report: Report, *, quick: bool) -> None:
         _robot(report, robot, STEPS // 10 if quick else STEPS, 1 if quick else 5)
 
 
-def _robot(report: Report, robot: Robot, steps: int, rounds: int) -> None:
+def _robot(report: Report, robot: TimedRobot, steps: int, rounds: int) -> None:
     """Rows of one robot."""
     sim = Simulator(robot.build(), time_step=TIME_STEP)
     smooth = sim.replace(kappa=DOJO_KAPPA)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.accuracy.reference import Motion
+from dojo_opt.report.accuracy.reference import TreeReference
 from dojo_opt.report.engine import Run, observe
 from sim.dynamics.bodies import rotated
 from sim.mechanism.mechanism import Mechanism
@@ -77,7 +77,7 @@ def smooth(mechanism: Mechanism, q: Floats, v: Floats, duration: float) -> Smoot
     mech = without_contact(mechanism)
     floating = mech.joints[0].kind == "floating" and not np.any(np.asarray(mech.gravity))
     scale = max(kinetic_energy(mech, q, v), 1e-300)
-    return SmoothScene(mech.name, mech, q, v, duration, scale, floating, Motion(model_of(mech)).run)
+    return SmoothScene(mech.name, mech, q, v, duration, scale, floating, TreeReference(model_of(mech)).run)
 
 
 def without_contact(mechanism: Mechanism) -> Mechanism:
@@ -87,7 +87,7 @@ def without_contact(mechanism: Mechanism) -> Mechanism:
 
 
 def not_in_reference(mechanism: Mechanism) -> str:
-    """What `Motion` does not represent of a mechanism without contacts; empty if it is all there."""
+    """What `TreeReference` does not represent of a mechanism without contacts; empty if it is all there."""
     model = model_of(replace(mechanism, contacts=(), collisions=()))
     swings = [mechanism.joint_names[i] for i in np.flatnonzero(model.joint_nrot == 2)]
     for what, names in (

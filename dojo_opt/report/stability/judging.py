@@ -10,14 +10,16 @@ from typing import Any
 from dojo_opt.report.engine import Engine
 from dojo_opt.report.ours import Ours
 from dojo_opt.report.result import Cell, Report, Row, Table
-from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, Verdict
 from dojo_opt.report.stability.verdict_figure import picture
 from dojo_opt.report.study import Progress
 
 KAPPA = 1e-10  # [N s m] the default of 1 kg at 10 ms: hard, and solved as reliably as larger ones
 
 
-def judge(report: Report, trials: Sequence[Trial], peers: Sequence[Engine], progress: Progress) -> list[Verdict]:
+def judge(
+    report: Report, trials: Sequence[StabilityTrial], peers: Sequence[Engine], progress: Progress
+) -> list[Verdict]:
     """Run every trial by every engine, and add the verdicts to the report.
 
     Args:
@@ -44,7 +46,7 @@ def judge(report: Report, trials: Sequence[Trial], peers: Sequence[Engine], prog
     return verdicts["dojo-opt"]
 
 
-def _measure(trial: Trial, peers: Sequence[Engine], verdicts: dict[str, list[Verdict]]) -> dict[str, Any]:
+def _measure(trial: StabilityTrial, peers: Sequence[Engine], verdicts: dict[str, list[Verdict]]) -> dict[str, Any]:
     """One trial by every engine; verdicts are appended, numbers returned."""
     ours = Ours(kappa=trial.kappa or KAPPA, tolerance=trial.tolerance, rounds=1)
     numbers: dict[str, Any] = {"group": trial.group, "name": trial.name, "rule": trial.rule, "bar": trial.bar}
@@ -66,7 +68,7 @@ def _measure(trial: Trial, peers: Sequence[Engine], verdicts: dict[str, list[Ver
 
 
 def _tables(
-    trials: Sequence[Trial], verdicts: dict[str, list[Verdict]], numbers: Sequence[dict[str, Any]]
+    trials: Sequence[StabilityTrial], verdicts: dict[str, list[Verdict]], numbers: Sequence[dict[str, Any]]
 ) -> list[Table]:
     """One table per group, the engines side by side."""
     tables = []

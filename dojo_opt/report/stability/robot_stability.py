@@ -9,7 +9,7 @@ from dojo_opt.report.engine import Engine
 from dojo_opt.report.result import Report
 from dojo_opt.report.stability.judging import KAPPA, judge
 from dojo_opt.report.stability.robot_trials import robot_trials
-from dojo_opt.report.stability.trial import Trial, Verdict
+from dojo_opt.report.stability.trial import StabilityTrial, Verdict
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 
@@ -40,7 +40,7 @@ class RobotStability:
         return report
 
 
-def _advice(trials: Sequence[Trial], verdicts: Sequence[Verdict]) -> str:
+def _advice(trials: Sequence[StabilityTrial], verdicts: Sequence[Verdict]) -> str:
     """The largest time step up to which everything passes."""
     good = 0.0
     for trial, verdict in zip(trials, verdicts, strict=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dojo_opt.report.stability import measures
-from dojo_opt.report.stability.trial import Trial
+from dojo_opt.report.stability.trial import StabilityTrial
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 
@@ -14,7 +14,7 @@ RAISED = 0.1  # [m] above where it stands
 SPEED = 1.0  # [m/s, rad/s] of its random start
 
 
-def robot_trials(mechanism: Mechanism) -> list[Trial]:
+def robot_trials(mechanism: Mechanism) -> list[StabilityTrial]:
     """Its neutral pose, a floating base raised by 0.1 m, with random velocities; one second without inputs."""
     sim = Simulator(mechanism)
     q = sim.neutral()[: sim.nq].copy()
@@ -30,6 +30,8 @@ def robot_trials(mechanism: Mechanism) -> list[Trial]:
     else:
         measure = measures.energy_growth(0.02 * float(scale))
     return [
-        Trial(mechanism.name, f"1 s at {1e3 * h:g} ms", rule, mechanism, q, v, h, 1.0, measure, 1.0, samples=20)
+        StabilityTrial(
+            mechanism.name, f"1 s at {1e3 * h:g} ms", rule, mechanism, q, v, h, 1.0, measure, 1.0, samples=20
+        )
         for h in TIME_STEPS
     ]

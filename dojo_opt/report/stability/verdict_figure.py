@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from dojo_opt.report.stability.trial import NOT_GIVEN, Trial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, Verdict
 
 _LEGEND = (
     "green: passed; red: not (x: above the bar of its rule); yellow: refused with a reason; grey: not represented.\n"
@@ -16,7 +16,7 @@ _LEGEND = (
 )
 
 
-def picture(trials: Sequence[Trial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
+def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
     """Green where the rule is met, red where it is not, yellow where a scene is refused, grey where it is not given."""
     rows, columns = len(trials), len(verdicts)
     figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")

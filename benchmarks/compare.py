@@ -1,7 +1,7 @@
 """Measure the toolkit on reference scenes, beside the engines that are installed, and write what it finds.
 
-    python benchmarks/report.py all --out DIR            every study
-    python benchmarks/report.py accuracy ROBOT.urdf      a robot, as `dojo-opt report` does, beside other engines
+    python benchmarks/compare.py all --out DIR            every study
+    python benchmarks/compare.py accuracy ROBOT.urdf      a robot, as `dojo-opt report` does, beside other engines
 
 `pip install ".[bench,drake,bullet]"` adds MuJoCo, Drake and PyBullet; `".[crocoddyl]"` a planner.
 """
@@ -52,14 +52,14 @@ STUDIES: Studies = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     parser = argparse.ArgumentParser(
-        "benchmarks/report.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "benchmarks/compare.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add_arguments(parser, STUDIES)
     args = parser.parse_args(arguments)
     try:
-        return report(args, STUDIES, ("python", "benchmarks/report.py"))
+        return report(args, STUDIES, ("python", "benchmarks/compare.py"))
     except (ValueError, TypeError, OSError, ImportError) as error:
-        print(f"benchmarks/report.py: {error}", file=sys.stderr)
+        print(f"benchmarks/compare.py: {error}", file=sys.stderr)
         return 2
 
 
