@@ -42,7 +42,7 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
         seen.append(digest())
     assert len(set(seen)) == 3
     for folder in ("urdf", "mjcf"):  # files that no kernel reads
-        loader = copy / "sim" / folder / "load.py"
+        loader = copy / "sim" / "io" / folder / "load.py"
         loader.write_text(loader.read_text() + "\n# edited\n")
     assert digest() == seen[-1]
 

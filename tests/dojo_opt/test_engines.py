@@ -122,7 +122,7 @@ def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monke
     assert third.message.startswith("in process") and third.message != first.message
     np.testing.assert_array_equal(third.energy, first.energy)
     trial = replace(joints.spring(1e2, 1e-2), duration=0.3)
-    monkeypatch.setattr(stability.study, "installed", lambda: [Ours(), Killing(deadly=0.3)])
+    monkeypatch.setattr(stability.stability_study, "installed", lambda: [Ours(), Killing(deadly=0.3)])
     monkeypatch.setattr(StabilityStudy, "trials", lambda _: [trial, replace(trial, name="after it", duration=0.5)])
     report = StabilityStudy(quick=True).run(Progress())
     assert [row[3][:9] for row in report.tables[0].rows] == ["ended by ", "failed at"]

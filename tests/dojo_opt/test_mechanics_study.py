@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.compare import STUDIES
 from benchmarks.studies.mechanics import MechanicsStudy
 from benchmarks.studies.mechanics import joint_kinds as joints
 from benchmarks.studies.mechanics.mechanics_study import QUICK_CASES, QUICK_PAIRS
@@ -80,7 +81,7 @@ def test_a_wrong_derivative_by_a_parameter_is_seen() -> None:
 
 
 def test_the_study_by_its_name() -> None:
-    assert isinstance(study("mechanics", quick=True), MechanicsStudy)
+    assert isinstance(study("mechanics", quick=True, studies=STUDIES), MechanicsStudy)
     report = MechanicsStudy(quick=True).run(Progress(io.StringIO()))
     assert report.met(), [row.name for row in report.rows if row.met is False]
     kinds, pairs, by_parameters = report.tables
