@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 STEPS = 10.0 ** np.arange(-1.5, -7.1, -0.5)
+ROUNDING = 100.0  # times the least change: beyond it a smaller step only has more rounding
 
 
 def five_point(f: Callable[[Vector], Vector], direction: Vector, step: float) -> Vector:
@@ -23,15 +24,23 @@ def five_point(f: Callable[[Vector], Vector], direction: Vector, step: float) ->
 
 def differences(f: Callable[[Vector], Vector], n: int) -> tuple[Vector, Vector]:
     """Jacobian of f at 0 and the uncertainty of every column; columns of f that fail give NaN and are not used."""
-    columns, doubts = [], []
-    for direction in np.eye(n):
-        ladder = [five_point(f, direction, step) for step in STEPS]
-        change = [np.abs(b - a).max() for a, b in zip(ladder[:-1], ladder[1:], strict=True)]
-        assert not np.isnan(change).all(), "the function could not be evaluated around the point"
-        best = int(np.nanargmin(change))
-        columns.append(ladder[best + 1])
-        doubts.append(change[best])
+    columns, doubts = zip(*(_column(f, direction) for direction in np.eye(n)), strict=True)
     return np.array(columns).T, np.array(doubts)
+
+
+def _column(f: Callable[[Vector], Vector], direction: Vector) -> tuple[Vector, float]:
+    """The derivative along a direction, and its uncertainty."""
+    coarse, best, doubt = five_point(f, direction, STEPS[0]), None, np.inf
+    for step in STEPS[1:]:
+        fine = five_point(f, direction, step)
+        change = np.abs(fine - coarse).max()
+        if change < doubt:
+            best, doubt = fine, change
+        elif change > ROUNDING * doubt:
+            break
+        coarse = fine
+    assert best is not None, "the function could not be evaluated around the point"
+    return best, float(doubt)
 
 
 def check_jacobian(
