@@ -9,6 +9,19 @@ import pytest
 sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of the cases of a function marked `sweep(n)`, every n-th is among those of `-m "not slow"`."""
+    seen: dict[str, int] = {}
+    for item in items:
+        sweep = item.get_closest_marker("sweep")
+        if sweep is not None:
+            function = item.nodeid.partition("[")[0]
+            case = seen[function] = seen.get(function, -1) + 1
+            if case % sweep.args[0]:
+                item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """One seed for all random tests."""

@@ -170,6 +170,7 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.sweep(7)
 @pytest.mark.parametrize("kind", DAMAGE)
 def test_a_damaged_file_is_compiled_again(filled: Filled, kind: str) -> None:
     DAMAGE[kind](filled.file)

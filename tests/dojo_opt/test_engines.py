@@ -111,6 +111,7 @@ def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
         swing(Breaking(ValueError("no springs")))
 
 
+@pytest.mark.slow
 def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """The calls before it share a process, which is not this one, and those after it share another one."""
     first, second = (swing(Killing(deadly=0.3)) for _ in range(2))

@@ -187,6 +187,7 @@ def test_every_guess_keeps_the_hopper_standing(guess):
     assert dojo.closed_loop(mpc, plant, 0.4).survived
 
 
+@pytest.mark.slow
 def test_hopper_hops_and_survives_a_payload_that_the_open_loop_guess_does_not():
     """Planning facts, section 2.6: what a tick starts from decides."""
     mpc = dojo.tasks.hopper_mpc()

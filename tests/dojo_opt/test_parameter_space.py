@@ -69,6 +69,7 @@ def charts() -> tuple[dojo.ParameterSpace, np.ndarray]:
     return space, moved
 
 
+@pytest.mark.slow
 def test_derivatives_by_coordinates() -> None:
     """Of a step and of a rollout, away from where the space was made."""
     space, theta = charts()

@@ -26,6 +26,7 @@ def trot():
     return dojo.problems.trot()
 
 
+@pytest.mark.slow
 def test_rows_exist_without_the_peers_and_a_note_says_what_is_missing(monkeypatch):
     monkeypatch.setattr(planning_time, "find_spec", lambda name: None)
     report = Report("title", "command")
@@ -49,6 +50,7 @@ def test_crocoddyl_with_another_pin_is_left_out(monkeypatch):
     assert planning_time._missing("crocoddyl") == ""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 def test_mujoco_and_numpy_plan_the_same_trot(trot):
     """The yardstick reaches what ours is asked for: the goal, upright, without gaps, and a cost of the same size."""

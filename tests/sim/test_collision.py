@@ -23,6 +23,7 @@ ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are 
 # -- derivatives -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("depth", [-0.1, -1e-9, 0.05], ids=["near", "touching", "deep"])
 @pytest.mark.parametrize("kind", SIMPLE, ids=NAMES.get)
 def test_derivatives_are_central_differences(kind: Pair, depth: float, rng: np.random.Generator) -> None:

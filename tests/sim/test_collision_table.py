@@ -14,6 +14,7 @@ NAMES = [*(p.name.lower() for p in Pair if not p.name.startswith("POLYTOPE")), *
 ROUNDED = ("cylinder_halfspace", "box_cylinder", "polytope_cylinder", "cylinder_cylinder")
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_distance_frame_and_derivatives(name: str) -> None:
     errors = check(name)

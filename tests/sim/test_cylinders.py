@@ -178,6 +178,7 @@ def test_no_step_is_accepted_whose_impulses_give_energy(radius: float, length: f
     assert np.abs(t.contacts.impulse).max() > 0.1
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", ["capsule", "box", "rock"])
 def test_derivatives_of_a_step(name: str) -> None:
     """In the step that hits, and in the one before."""

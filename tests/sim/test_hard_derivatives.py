@@ -113,6 +113,7 @@ def check(sim: dojo.Simulator, x: np.ndarray) -> float:
     return float(np.abs(here.contacts.impulse).max())
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("h, speed", [(1e-3, 5.0), (1e-3, 20.0), (1e-4, 5.0)])
 @pytest.mark.parametrize("name", SCENES)
 def test_impacts(name: str, h: float, speed: float) -> None:

@@ -19,6 +19,7 @@ ALL = {**CASES, **COUPLED}
 case_of = functools.cache(lambda name: ALL[name]())
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("name", ALL)
 def test_every_kind_in_every_situation(name: str) -> None:
     case = case_of(name)
@@ -90,6 +91,7 @@ def test_the_sweep_is_the_chain_of_the_steps(name: str) -> None:
     np.testing.assert_allclose(found, parameters, rtol=1e-7, atol=1e-8 * np.abs(parameters).max())
 
 
+@pytest.mark.slow
 def test_the_sweep_against_differences_of_the_rollout() -> None:
     case = case_of("sliding")
     sim = case.sim

@@ -46,6 +46,7 @@ WHERE = {
 }
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("where", WHERE)
 @pytest.mark.parametrize("pair", PAIRS)
 def test_sizes_of_two_shapes(pair: str, where: str) -> None:

@@ -38,6 +38,7 @@ def moved(sim: dojo.Simulator, after: np.ndarray, x: np.ndarray) -> np.ndarray:
     return sim.difference(sim.step(x, throw=True).x, after)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", OTHERS)
 def test_derivatives_of_a_step(name: str) -> None:
     """In the step that hits, and in the one before."""
