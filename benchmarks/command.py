@@ -1,7 +1,7 @@
 """What the benchmarks share: their command line, and what becomes of the Report that each of them makes.
 
 python benchmarks/NAME.py                print it, progress on stderr
-python benchmarks/NAME.py --out DIR      write DIR/NAME.json: what `dojo-opt report` writes for one study
+python benchmarks/NAME.py --out DIR      write DIR/NAME.json: what `benchmarks/compare.py` writes for one study
 python benchmarks/NAME.py --json         print that instead
 python benchmarks/NAME.py --quick        a check that it runs
 """
@@ -16,6 +16,9 @@ from pathlib import Path
 
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
+
+# scenes that tests and benchmarks share; behind what is installed, so that an installed dojo_opt is the one measured
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 __all__ = ["deliver", "number", "parser", "progress"]
 

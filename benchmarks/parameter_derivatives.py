@@ -2,7 +2,7 @@
 
     python benchmarks/parameter_derivatives.py
 
-How exact they are: `dojo-opt report mechanics`.
+How exact they are: `python benchmarks/compare.py mechanics`.
 """
 
 from __future__ import annotations

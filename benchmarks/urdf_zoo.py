@@ -45,7 +45,7 @@ STILL = ("no joint is free to move", "nothing that moves has a mass")  # reasons
 
 
 @dataclass
-class Outcome:
+class ZooOutcome:
     """What became of one file."""
 
     file: str
@@ -99,22 +99,22 @@ def _raised(path: Path, mech: Any, floating: bool, repair: bool) -> Any:
     return dojo.load_urdf(path, floating=floating, repair=repair, position=(0.0, 0.0, up)) if up > 0.0 else mech
 
 
-def run(path: Path) -> Outcome:
+def run(path: Path) -> ZooOutcome:
     """Load one file and simulate it."""
     mech, how, reason = load(path)
     name = "/".join(path.parts[-2:])
     if mech is None:
-        return Outcome(name, "refused", reason=reason)
-    out = fall(Outcome(name, "fine", how, reason), mech, TIME_STEPS[0])
+        return ZooOutcome(name, "refused", reason=reason)
+    out = fall(ZooOutcome(name, "fine", how, reason), mech, TIME_STEPS[0])
     for before, time_step in pairwise(TIME_STEPS):
         if out.verdict == "fine":
             break
         tried = f"{time_step * 1e3:g} ms; with {before * 1e3:g} ms: {out.verdict}"
-        out = fall(Outcome(name, "fine", ", ".join(filter(None, (how, tried))), reason), mech, time_step)
+        out = fall(ZooOutcome(name, "fine", ", ".join(filter(None, (how, tried))), reason), mech, time_step)
     return out
 
 
-def fall(out: Outcome, mech: Any, time_step: float) -> Outcome:
+def fall(out: ZooOutcome, mech: Any, time_step: float) -> ZooOutcome:
     """Simulate without inputs, and fill in the outcome."""
     sim = dojo.Simulator(mech, time_step=time_step)
     t = sim.rollout(sim.neutral(), np.zeros((round(DURATION / time_step), sim.nu)))
@@ -150,7 +150,7 @@ HEADER = (
 )
 
 
-def line(o: Outcome) -> list[Cell]:
+def line(o: ZooOutcome) -> list[Cell]:
     """One row of the table."""
     why = " ".join(o.reason.split())[:160]
     if o.verdict == "refused":
@@ -158,7 +158,7 @@ def line(o: Outcome) -> list[Cell]:
     return [o.file, o.copies, o.bodies, o.dofs, o.contacts, o.iterations, o.growth, o.depth, o.verdict, o.how, why]
 
 
-def study(paths: list[Path]) -> list[Outcome]:
+def study(paths: list[Path]) -> list[ZooOutcome]:
     """All files; of the random objects of PyBullet, those with the same body as one."""
     several = [path for path in paths if "random_urdfs" not in path.parts]
     outcomes = [run(path) for path in progress()([(path.name, path) for path in several], "files")]
@@ -175,19 +175,19 @@ def study(paths: list[Path]) -> list[Outcome]:
     return outcomes
 
 
-def number_of(outcomes: Iterable[Outcome]) -> int:
+def number_of(outcomes: Iterable[ZooOutcome]) -> int:
     """How many files they stand for."""
     return sum(o.copies for o in outcomes)
 
 
-def summary(outcomes: list[Outcome]) -> Report:
+def summary(outcomes: list[ZooOutcome]) -> Report:
     """Counts as rows, one line per file as a table."""
     report = Report("URDF files of others", "")
     fine = [o for o in outcomes if o.verdict == "fine"]
     refused = [o for o in outcomes if o.verdict == "refused"]
     still = [o for o in refused if any(reason in o.reason for reason in STILL)]
 
-    def row(name: str, chosen: Iterable[Outcome], bar: float | None = None) -> Row:
+    def row(name: str, chosen: Iterable[ZooOutcome], bar: float | None = None) -> Row:
         return number(name, number_of(chosen), bar)
 
     report.rows = [

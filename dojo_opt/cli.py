@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import ast
 import json
-import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -21,7 +20,8 @@ import numpy as np
 
 import dojo_opt as dojo
 from dojo_opt.plant.tick import milliseconds
-from dojo_opt.report import STUDIES, run_reports, write_page
+from dojo_opt.report import STUDIES
+from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
 from dojo_opt.viewer.show import add_show, show
 from sim.mechanism.checks import nearest
 
@@ -50,22 +50,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
 
-    what = "Run studies: tables on the terminal; with --out a page with figures, and every number as JSON."
-    report = commands.add_parser("report", help="measure, and show it", description=what)
-    names = {"all": "every study", **{name: what for name, (what, *_) in STUDIES.items()}}
-    report.add_argument("name", choices=list(names), metavar="NAME", help=_listing(names))
-    report.add_argument("robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="measure this robot instead")
-    report.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
-    report.add_argument(
-        "--contacts",
-        nargs="+",
-        metavar="LINK[=RADIUS]",
-        help="links of ROBOT.urdf that touch the ground, with their shapes, or a ball about their origin [m]",
-    )
-    report.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
-    report.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
-    report.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
-    report.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
+    what = "Measure a robot: tables on the terminal; with --out a page with figures, and every number as JSON."
+    measure = commands.add_parser("report", help="measure a robot", description=what, epilog=CHECKOUT)
+    add_arguments(measure, STUDIES, MOVED)
 
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
     models.add_argument("--json", action="store_true", help="print JSON")
@@ -76,10 +63,6 @@ def _parser() -> argparse.ArgumentParser:
     warmup = commands.add_parser("warmup", help="compile ahead of time", description="Compile and cache every kernel.")
     warmup.add_argument("--json", action="store_true", help="print JSON")
     return parser
-
-
-def _listing(names: dict[str, str]) -> str:
-    return "; ".join(f"{name}: {what}" for name, what in names.items())
 
 
 def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
@@ -150,45 +133,6 @@ def _run_loop(args: argparse.Namespace) -> int:
     return 0 if loop.survived else 1
 
 
-def _contacts(words: Sequence[str] | None) -> list[str | dojo.Contact] | None:
-    """Links, and balls about their origins.  ValueError: a radius is no number."""
-    if words is None:
-        return None
-    found: list[str | dojo.Contact] = []
-    for word in words:
-        link, ball, radius = word.partition("=")
-        try:
-            found.append(dojo.Contact(link, (0.0, 0.0, 0.0), float(radius)) if ball else link)
-        except ValueError as error:
-            raise ValueError(f"--contacts {word}: expected LINK or LINK=RADIUS in metres: {error}") from None
-    return found
-
-
-def _report(args: argparse.Namespace) -> int:
-    mechanism = None
-    if args.robot is not None:
-        mechanism = dojo.load_urdf(args.robot, floating=not args.fixed, contacts=_contacts(args.contacts))
-    names = list(STUDIES) if args.name == "all" else [args.name]
-    reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True)
-    for name, report in reports.items():
-        report.command = _report_command(args, name)
-    if args.json:
-        print(json.dumps({name: json.loads(report.as_json()) for name, report in reports.items()}, indent=1))
-    else:
-        print("\n\n".join(report.as_text() for report in reports.values()))
-    if args.out:
-        write_page(reports, args.out, _report_command(args, args.name))
-    missed = args.strict and not all(report.met() for report in reports.values())
-    return 1 if missed or any("error" in report.details for report in reports.values()) else 0
-
-
-def _report_command(args: argparse.Namespace, name: str) -> str:
-    """The command that measures a study again, with all that decides what is measured."""
-    robot, fixed = [str(args.robot)] if args.robot else [], ["--fixed"] * args.fixed
-    contacts = ["--contacts", *args.contacts] if args.contacts else []
-    return shlex.join(["dojo-opt", "report", name, *robot, *fixed, *contacts, *["--quick"] * args.quick])
-
-
 def _models(args: argparse.Namespace) -> int:
     entries = dojo.models.catalogue()
     if args.thumbnails:
@@ -224,7 +168,7 @@ def _warmup(args: argparse.Namespace) -> int:
 
 _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "run": _run,
-    "report": _report,
+    "report": report,
     "models": _models,
     "show": show,
     "warmup": _warmup,

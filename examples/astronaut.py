@@ -13,8 +13,8 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
-from dojo_opt.report.mujoco_warnings import quiet
+from benchmarks.engines import mujoco_scene
+from benchmarks.engines.mujoco_warnings import quiet
 
 DURATION, STEPS = (3, (0.05, 0.02, 0.01)) if QUICK else (11, (0.05, 0.02, 0.01, 0.005, 0.002))  # [s]
 robot = replace(dojo.models.humanoid(damper=0.0, gravity=(0.0, 0.0, 0.0)), contacts=())

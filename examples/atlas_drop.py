@@ -12,7 +12,7 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
+from benchmarks.engines import mujoco_scene
 
 MUJOCO = find_spec("mujoco") is not None
 HEIGHT, DURATION = 0.1, 0.8  # [m], [s]

@@ -13,7 +13,7 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
+from benchmarks.engines import mujoco_scene
 
 KAPPAS, TIME_STEP, STEPS, POINTS = (1e-3, 1e-4, 1e-5, 1e-6), 0.01, 5, 21 if QUICK else 81
 sim = dojo.Simulator(dojo.models.block(friction=0.5), time_step=TIME_STEP)

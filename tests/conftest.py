@@ -1,7 +1,25 @@
 """Fixtures for all tests."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
+
+sys.path.append(str(Path(__file__).parent.parent))  # benchmarks; at the end, so that an installed dojo_opt is tested
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of the cases of a function marked `sweep(n)`, every n-th is among those of `-m "not slow"`."""
+    seen: dict[str, int] = {}
+    for item in items:
+        sweep = item.get_closest_marker("sweep")
+        if sweep is not None:
+            function = item.nodeid.partition("[")[0]
+            case = seen[function] = seen.get(function, -1) + 1
+            if case % sweep.args[0]:
+                item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from refusals import check_refused
-from scenes import ball, block, chain, free_body, pendulum, run
 
 import dojo_opt as dojo
+from support.refusals import check_refused
+from support.scenes import ball, block, chain, free_body, pendulum, run
 
 BODY = dojo.Body("arm", 1.0, (1.0, 1.0, 1.0))
 HINGE = dojo.Joint("revolute", None, "arm", name="hinge")

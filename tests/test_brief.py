@@ -42,6 +42,7 @@ def objects():
     ]
 
 
+@pytest.mark.slow
 def test_texts_are_short_and_say_what_it_is(objects):
     for thing in objects:
         text = repr(thing)

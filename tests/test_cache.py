@@ -14,7 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from programs import HOME, PACKAGES, python
+
+from support.programs import HOME, PACKAGES, python
 
 # -- the kernel cache --------------------------------------------------------------------------------------------------
 
@@ -41,7 +42,7 @@ def test_the_cache_folder_changes_with_every_source(copy: Path) -> None:
         seen.append(digest())
     assert len(set(seen)) == 3
     for folder in ("urdf", "mjcf"):  # files that no kernel reads
-        loader = copy / "sim" / folder / "load.py"
+        loader = copy / "sim" / "io" / folder / "load.py"
         loader.write_text(loader.read_text() + "\n# edited\n")
     assert digest() == seen[-1]
 
@@ -169,6 +170,7 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.sweep(7)
 @pytest.mark.parametrize("kind", DAMAGE)
 def test_a_damaged_file_is_compiled_again(filled: Filled, kind: str) -> None:
     DAMAGE[kind](filled.file)

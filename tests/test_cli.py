@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import HOME
-from urdf_files import branched, collision, inertial, joint, link, write
 
 import dojo_opt as dojo
+from benchmarks import compare
 from dojo_opt import cli
+from dojo_opt.report.command import MOVED
 from dojo_opt.report.result import Report, Row
+from support.programs import HOME
+from support.urdf_files import branched, collision, inertial, joint, link, write
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["report"], ["models"], ["show"], ["warmup"]])
@@ -88,18 +90,37 @@ def test_a_study_that_fails_takes_no_other_with_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def run(name: str, **_: object) -> Report:
-        if name == "contact":
+        if name == "stability":
             raise RuntimeError("MuJoCo has no license")
         return Report(name, "command", [Row("fast", 1.0, "us", 2.0)])
 
     monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", run)
     assert cli.main(["report", "all", "--out", str(tmp_path)]) == 1
     studies = json.loads((tmp_path / "report.json").read_text())["studies"]
-    assert [name for name, study in studies.items() if not study["met"]] == ["contact"]
-    assert studies["contact"]["details"] == {"error": "RuntimeError: MuJoCo has no license"}
+    assert [name for name, study in studies.items() if not study["met"]] == ["stability"]
+    assert studies["stability"]["details"] == {"error": "RuntimeError: MuJoCo has no license"}
     assert "MuJoCo has no license" in capsys.readouterr().out
     with pytest.raises(RuntimeError, match="no license"):
-        cli.main(["report", "contact"])
+        cli.main(["report", "stability"])
+
+
+def test_a_study_that_moved_is_refused_with_the_command_that_has_it(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["report", "mechanics"])
+    assert stop.value.code == 2
+    assert "python benchmarks/compare.py mechanics" in capsys.readouterr().err
+    assert set(MOVED) == set(compare.STUDIES) - set(dojo.report.STUDIES)
+
+
+def test_studies_beside_other_engines_have_a_command_line_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = Report("title", rows=[Row("slow", 3.0, "us", 2.0)])
+    monkeypatch.setattr(import_module("dojo_opt.report.study"), "run_report", lambda name, **_: report)
+    assert compare.main(["mechanics", "--out", str(tmp_path)]) == 0
+    assert compare.main(["mechanics", "--strict", "--quick"]) == 1
+    assert json.loads((tmp_path / "report.json").read_text())["command"] == "python benchmarks/compare.py mechanics"
+    assert "command: python benchmarks/compare.py mechanics --quick" in capsys.readouterr().out
 
 
 def test_links_that_touch_the_ground_are_named(

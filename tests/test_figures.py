@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from benchmark import loaded
+
+from support.benchmark import loaded
 
 
 @pytest.fixture(scope="module")

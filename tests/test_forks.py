@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from programs import HOME
+
+from support.programs import HOME
 
 LAYERS = ("omp", "workqueue")
 PATIENCE = 240  # [s]; a hang is one that lasts longer

@@ -4,7 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from benchmark import loaded
+
+from support.benchmark import loaded
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
-from programs import PACKAGES
+
+from support.programs import PACKAGES
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = {file: ast.parse(file.read_text()) for package in PACKAGES for file in (ROOT / package).rglob("*.py")}

@@ -3,7 +3,8 @@
 import json
 
 import numpy as np
-from programs import python
+
+from support.programs import python
 
 PROGRAM = """
 import json, warnings, numpy as np, dojo_opt as dojo

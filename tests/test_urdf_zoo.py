@@ -5,10 +5,10 @@ import warnings
 
 import numpy as np
 import pytest
-from benchmark import loaded
-from urdf_files import collision, compare_with_mujoco, inertial, joint, link, write
 
 import dojo_opt as dojo
+from support.benchmark import loaded
+from support.urdf_files import collision, compare_with_mujoco, inertial, joint, link, write
 
 # part of a path: why it is in the sample
 SAMPLE = {

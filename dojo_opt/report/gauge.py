@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.report.engines.run import Run
+from dojo_opt.report.engine import Run
 from sim.mechanism.mechanism import Mechanism
 
 Floats = NDArray[np.float64]

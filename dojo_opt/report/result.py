@@ -61,7 +61,7 @@ class Report:
     """What one study measured, on which machine, by which command."""
 
     title: str
-    command: str
+    command: str = ""  # run_report writes it
     rows: list[Row] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     details: dict[str, Any] = field(default_factory=dict)  # every raw number

@@ -1,10 +1,11 @@
-"""Study: something that measures a toolkit on scenes, or on a user's own mechanism, and says what it found."""
+"""Studies: measurements of a robot, or of scenes, whose results are reports."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING
 from importlib import import_module
 from typing import Protocol, TextIO, TypeVar
 
@@ -13,17 +14,19 @@ from sim.mechanism.mechanism import Mechanism
 
 Item = TypeVar("Item")
 
-# name -> (what it measures, module, class); in the order of `report all`
-STUDIES = {
-    "accuracy": ("error against run time of motion without contact", "accuracy", "Accuracy"),
-    "contact": ("sliding, sticking, impact and rest against analytic answers", "contact", "Contact"),
-    "gradients": ("error and cost of derivatives, of one step and of whole motions", "gradients", "Gradients"),
-    "planning": ("cost and violation of plans against run time", "planning", "Planning"),
-    "stability": ("stiff and extreme scenes, each with its pass rule", "stability", "Stability"),
-    "mechanics": ("joint kinds, pairs of shapes and parameters, each against its bar", "mechanics", "Mechanics"),
-    "lean": ("what a scene leaves out, and what that saves", "lean", "Lean"),
-    "timing": ("microseconds per step, gradient and planner iteration", "timing", "Timing"),
-    "compile": ("seconds from a cold and a warm start to the first plan", "compile_time", "CompileTime"),
+Studies = Mapping[str, tuple[str, str, str]]  # name -> (what it measures, module, class)
+
+# the studies of one robot, in the order of `report all`
+STUDIES: Studies = {
+    "accuracy": (
+        "error against run time, and the time step and kappa that the robot needs",
+        "dojo_opt.report.accuracy",
+        "RobotAccuracy",
+    ),
+    "stability": ("the time steps at which it is stable", "dojo_opt.report.stability", "RobotStability"),
+    "gradients": ("error and cost of its derivatives", "dojo_opt.report.gradients", "RobotGradients"),
+    "lean": ("omitted terms, and what each feature costs", "dojo_opt.report.lean", "OmittedTerms"),
+    "timing": ("microseconds per step and gradient, by time step", "dojo_opt.report.robot_timing", "RobotTiming"),
 }
 
 
@@ -54,11 +57,8 @@ class Progress:
         self._stream.flush()
 
 
-class Study(Protocol):
-    """What every study can do; a dataclass whose fields are its settings.
-
-    `mechanism` is None for the reference scenes of the study; studies that make sense for one mechanism take it.
-    """
+class ReportStudy(Protocol):
+    """A study is a dataclass whose fields are its settings: `quick`, for most of them `mechanism`, and others."""
 
     quick: bool  # fewer and shorter scenes: a check that it runs
 
@@ -67,39 +67,74 @@ class Study(Protocol):
         ...
 
 
-def study(name: str, *, quick: bool = False, mechanism: Mechanism | None = None) -> Study:
-    """The study of that name.  ValueError: no such study, or it does not take a mechanism."""
-    if name not in STUDIES:
-        raise ValueError(f"report: no report {name!r}; there are {', '.join(STUDIES)}")
-    _, module, kind = STUDIES[name]
-    make = getattr(import_module(f"dojo_opt.report.{module}"), kind)
-    if mechanism is None:
+def study(
+    name: str, *, quick: bool = False, mechanism: Mechanism | None = None, studies: Studies = STUDIES
+) -> ReportStudy:
+    """Make a study.
+
+    Args:
+        name: A key of `studies`.
+        quick: Fewer and shorter scenes.
+        mechanism: The robot to measure; None for the scenes of the study, or, in a study of one robot, the quadruped.
+        studies: What there is; those of one robot by default.
+
+    Raises:
+        ValueError: There is no such study, or it takes no mechanism.
+    """
+    if name not in studies:
+        raise ValueError(f"report: no report {name!r}; there are {', '.join(studies)}")
+    _, module, kind = studies[name]
+    make = getattr(import_module(module), kind)
+    field = make.__dataclass_fields__.get("mechanism")
+    if field is None:
+        if mechanism is not None:
+            raise ValueError(f"report: {name} has scenes of its own, and takes no mechanism")
         return make(quick=quick)
-    if "mechanism" not in make.__dataclass_fields__:
-        raise ValueError(f"report: {name} has scenes of its own, and takes no mechanism")
+    if mechanism is None and field.default is MISSING:
+        mechanism = import_module("dojo_opt.models").quadruped()
     return make(quick=quick, mechanism=mechanism)
 
 
-def run_report(name: str, *, quick: bool = False, mechanism: Mechanism | None = None, verbose: bool = False) -> Report:
-    """Run the study of that name; verbose shows a progress bar on stderr."""
-    return study(name, quick=quick, mechanism=mechanism).run(Progress(sys.stderr if verbose else None))
+def run_report(
+    name: str,
+    *,
+    quick: bool = False,
+    mechanism: Mechanism | None = None,
+    verbose: bool = False,
+    studies: Studies = STUDIES,
+) -> Report:
+    """Run the study of that name; verbose shows a progress bar on stderr. Arguments as in `study`."""
+    made = study(name, quick=quick, mechanism=mechanism, studies=studies)
+    report = made.run(Progress(sys.stderr if verbose else None))
+    report.command = f"dojo-opt report {name}{' --quick' if quick else ''}"  # the command line knows it better
+    return report
 
 
 def run_reports(
-    names: Sequence[str], *, quick: bool = False, mechanism: Mechanism | None = None, verbose: bool = False
+    names: Sequence[str],
+    *,
+    quick: bool = False,
+    mechanism: Mechanism | None = None,
+    verbose: bool = False,
+    studies: Studies = STUDIES,
 ) -> dict[str, Report]:
-    """The studies of those names; of several, one that ends with an error is a report that says so.
+    """Run several studies; arguments as in `study`.
 
-    Its only bar is missed, and its details have the "error". A single study raises it.
+    Returns:
+        The reports by name. Of several studies, one that ends with an error is a report that says so: its only bar is
+        missed, and its details have the "error".
+
+    Raises:
+        Exception: Whatever a single study raises.
     """
     reports: dict[str, Report] = {}
     for name in names:
         try:
-            reports[name] = run_report(name, quick=quick, mechanism=mechanism, verbose=verbose)
+            reports[name] = run_report(name, quick=quick, mechanism=mechanism, verbose=verbose, studies=studies)
         except Exception as error:
             if len(names) == 1:
                 raise
-            reports[name] = Report(STUDIES[name][0], f"dojo-opt report {name}")
+            reports[name] = Report(studies[name][0])
             reason = f"{type(error).__name__}: {error}"
             reports[name].details["error"] = reason
             reports[name].rows = [Row("run to its end", 0.0, "", 1.0, at_least=True, note=reason)]

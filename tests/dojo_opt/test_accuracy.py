@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from benchmarks.engines import Ours
+from benchmarks.studies.accuracy import AccuracyStudy
+from benchmarks.studies.accuracy import accuracy_scenes as scenes
 from dojo_opt.report import Progress, study
-from dojo_opt.report.accuracy import Accuracy, advice, curves, robot, scenes, start
-from dojo_opt.report.accuracy.curves import Point
-from dojo_opt.report.accuracy.robot import Trial
-from dojo_opt.report.engines import Ours
+from dojo_opt.report.accuracy import advice, smooth_scene
+from dojo_opt.report.accuracy import error_curves as curves
+from dojo_opt.report.accuracy import robot_accuracy as robot
+from dojo_opt.report.accuracy import starting_pose as start
+from dojo_opt.report.accuracy.error_curves import Point
+from dojo_opt.report.accuracy.robot_accuracy import SettingTrial
 
 
 def points(*pairs: tuple[float, float]) -> list[Point]:
@@ -83,17 +88,17 @@ def test_lost_runs_have_infinite_errors() -> None:
 
 
 def test_a_mechanism_that_an_order_refuses_is_left_out_with_the_reason() -> None:
-    scene = scenes.smooth(dojo.models.npendulum(2, damper=5.0), np.array([0.3, 0.1]), np.zeros(2), 0.5)
+    scene = smooth_scene.smooth(dojo.models.npendulum(2, damper=5.0), np.array([0.3, 0.1]), np.zeros(2), 0.5)
     refused = curves.point(scene, curves.ours(4, 0), 0.05, scene.exact())
     assert refused.errors["position"] == np.inf and "too fast" in refused.message
 
 
 def test_the_largest_step_that_is_good_enough_is_chosen() -> None:
     trials = [
-        Trial(0.02, 1e-4, 1e-8, 5e-3, 1e-3, ""),
-        Trial(0.01, 1e-6, 1e-8, 2e-4, 2e-3, ""),
-        Trial(0.01, 1e-5, 1e-8, 9e-4, 2e-3, ""),
-        Trial(0.001, 1e-8, 1e-8, 1e-6, 2e-2, ""),
+        SettingTrial(0.02, 1e-4, 1e-8, 5e-3, 1e-3, ""),
+        SettingTrial(0.01, 1e-6, 1e-8, 2e-4, 2e-3, ""),
+        SettingTrial(0.01, 1e-5, 1e-8, 9e-4, 2e-3, ""),
+        SettingTrial(0.001, 1e-8, 1e-8, 1e-6, 2e-2, ""),
     ]
     assert robot.choose(trials) is trials[2]
     assert robot.choose(trials[:1]) is trials[0]
@@ -147,8 +152,8 @@ def test_a_robot_that_the_reference_does_not_know_is_compared_with_itself() -> N
     assert "not compared with an independent ODE: that has no joint with two rotations ('joint_1')" in report.notes
 
 
-def trial(h: float, kappa: float, error: float, message: str = "") -> robot.Trial:
-    return robot.Trial(h, kappa, 1e-8, error, 0.05, message)
+def trial(h: float, kappa: float, error: float, message: str = "") -> robot.SettingTrial:
+    return robot.SettingTrial(h, kappa, 1e-8, error, 0.05, message)
 
 
 def test_advice_is_what_the_trials_say() -> None:
@@ -169,13 +174,13 @@ def test_advice_is_what_the_trials_say() -> None:
 
 
 def test_what_the_reference_does_not_know_is_named() -> None:
-    assert scenes.not_in_reference(dojo.models.fourbar()).startswith("loop (")
-    assert scenes.not_in_reference(dojo.models.quadruped()) == ""
+    assert smooth_scene.not_in_reference(dojo.models.fourbar()).startswith("loop (")
+    assert smooth_scene.not_in_reference(dojo.models.quadruped()) == ""
 
 
 @pytest.mark.slow
 def test_the_study_runs_quickly() -> None:
-    report = Accuracy(quick=True).run(Progress())
+    report = AccuracyStudy(quick=True).run(Progress())
     assert report.figure is not None and len(report.tables) >= 6
     drift = {row.name: row.value for row in report.rows if "drift" in row.name}
     assert all(value < 1e-12 for name, value in drift.items() if "order" in name)

@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import chain_with, random_state
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
-from dojo_opt.report.accuracy.reference import Motion, pendulum
+from benchmarks.engines import mujoco_scene
+from dojo_opt.report.accuracy.reference import TreeReference, pendulum
 from sim.mechanism.pack import pack
+from support.mechanisms import chain_with, random_state
 
 
 def test_a_pendulum_in_absolute_angles_is_that_of_the_tree() -> None:
     model = pack(dojo.models.npendulum(3, length=0.7, mass=0.4))
     q, v, times = np.array([1.0, -0.5, 0.3]), np.array([0.2, 1.0, -2.0]), np.linspace(0.0, 0.5, 3)
-    for a, b in zip(pendulum(model, q, v, times), Motion(model).run(q, v, times), strict=True):
+    for a, b in zip(pendulum(model, q, v, times), TreeReference(model).run(q, v, times), strict=True):
         np.testing.assert_allclose(a, b, atol=1e-9)
 
 
@@ -35,7 +35,7 @@ def test_accelerations_are_those_of_mujoco(kind: str) -> None:
     data = mujoco_scene.state(twin, np.concatenate([q, v]))
     data.ctrl[:] = u
     mujoco.mj_forward(twin, data)
-    np.testing.assert_allclose(Motion(model).accelerations(q, v, u), data.qacc, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(TreeReference(model).accelerations(q, v, u), data.qacc, rtol=1e-7, atol=1e-7)
 
 
 def test_ball_springs_and_dampers_are_those_of_the_simulator() -> None:
@@ -44,11 +44,11 @@ def test_ball_springs_and_dampers_are_those_of_the_simulator() -> None:
     q, v = random_state(np.random.default_rng(3), mech)
     sim = dojo.Simulator(mech, time_step=0.005, order=8, tolerance=1e-13)
     x = sim.rollout(sim.start(q, v), np.zeros((20, sim.nu)), throw=True).x[-1]
-    exact = np.concatenate([part[-1] for part in Motion(sim.model).run(q, v, np.array([0.0, 0.1]))])
+    exact = np.concatenate([part[-1] for part in TreeReference(sim.model).run(q, v, np.array([0.0, 0.1]))])
     assert np.abs(sim.difference(x, exact)).max() < 1e-8
 
 
 def test_inputs_on_bodies_are_refused() -> None:
-    motion = Motion(pack(dojo.models.block()))
+    motion = TreeReference(pack(dojo.models.block()))
     with pytest.raises(ValueError, match="inputs on bodies"):
         motion.accelerations(np.r_[0, 0, 1, 1, 0, 0, 0.0], np.zeros(6), np.ones(6))

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from refusals import check_refused
 
 import dojo_opt as dojo
+from support.refusals import check_refused
 
 HOP = dojo.problems.hop()
 SIM, START = HOP.sim, HOP.start

@@ -47,6 +47,7 @@ def test_reference_step_is_in_balance(atlas):
     np.testing.assert_allclose(gait.x[-1, atlas.nq :], 0.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_steps_in_a_row(atlas):
     """Left, right past it, left beside it: in balance, at rest between them, and with velocities of its own path."""
     gait = None
@@ -64,6 +65,7 @@ def test_steps_in_a_row(atlas):
     np.testing.assert_allclose(gait.x[1:, atlas.nq :], mean, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_wrong_steps_are_named(atlas):
     with pytest.raises(ValueError, match=r"gaits\.step\(swinging=\.\.\.\): 'head' is not one of: l_foot, r_foot"):
         dojo.gaits.step(atlas, swinging="head")

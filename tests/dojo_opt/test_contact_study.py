@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.engines import Ours
+from benchmarks.studies.contact import ContactStudy, simbenchmark
+from benchmarks.studies.contact import contact_measures as measure
+from benchmarks.studies.contact import contact_scenes as scenes
+from benchmarks.studies.contact import contact_study as study
 from dojo_opt.report import Progress
-from dojo_opt.report.contact import Contact, measure, scenes, simbenchmark, study
-from dojo_opt.report.engines import Ours
 
 HARD = Ours(kappa=1e-10, rounds=1)
 
@@ -48,7 +51,7 @@ def test_an_engine_that_stops_is_not_a_number() -> None:
 @pytest.mark.slow
 def test_bars_of_the_quick_study_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "installed", list)
-    report = Contact(quick=True).run(Progress())
+    report = ContactStudy(quick=True).run(Progress())
     assert report.met(), [row for row in report.rows if row.met is False]
     assert report.figure is not None and len(report.tables) == 6
 

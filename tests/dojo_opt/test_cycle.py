@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator
 from scipy.linalg import solve_discrete_are
 
 from dojo_opt.constraint import Goal, Periodic
@@ -13,6 +12,7 @@ from dojo_opt.planning.options import Stage
 from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from solvers.riccati import Quadratic
+from support.doubles import DoubleIntegrator
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 

@@ -9,13 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from killing import Killing
 
 import dojo_opt as dojo
-from dojo_opt.report import Progress, stability
-from dojo_opt.report.engines import Engine, Ours, Run, installed
-from dojo_opt.report.engines.run import ended, nodes
-from dojo_opt.report.stability import Stability, joints
+from benchmarks.engines import Engine, Ours, Run, installed
+from benchmarks.engines.ended import ended
+from benchmarks.studies import stability
+from benchmarks.studies.stability import StabilityStudy
+from benchmarks.studies.stability import joint_trials as joints
+from dojo_opt.report import Progress
+from dojo_opt.report.engine import nodes
+from support.killing import Killing
 
 ENGINES = [Ours(rounds=1), *installed()]
 SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]
@@ -108,6 +111,7 @@ def test_an_engine_that_raises_is_a_run_that_ends_at_its_start() -> None:
         swing(Breaking(ValueError("no springs")))
 
 
+@pytest.mark.slow
 def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """The calls before it share a process, which is not this one, and those after it share another one."""
     first, second = (swing(Killing(deadly=0.3)) for _ in range(2))
@@ -119,9 +123,9 @@ def test_an_engine_that_kills_its_process_is_a_cell_and_the_report_goes_on(monke
     assert third.message.startswith("in process") and third.message != first.message
     np.testing.assert_array_equal(third.energy, first.energy)
     trial = replace(joints.spring(1e2, 1e-2), duration=0.3)
-    monkeypatch.setattr(stability.study, "installed", lambda: [Ours(), Killing(deadly=0.3)])
-    monkeypatch.setattr(Stability, "trials", lambda _: [trial, replace(trial, name="after it", duration=0.5)])
-    report = Stability(quick=True).run(Progress())
+    monkeypatch.setattr(stability.stability_study, "installed", lambda: [Ours(), Killing(deadly=0.3)])
+    monkeypatch.setattr(StabilityStudy, "trials", lambda _: [trial, replace(trial, name="after it", duration=0.5)])
+    report = StabilityStudy(quick=True).run(Progress())
     assert [row[3][:9] for row in report.tables[0].rows] == ["ended by ", "failed at"]
     assert report.tables[0].rows[0][3] == "ended by signal 11 (Segmentation fault)"
 

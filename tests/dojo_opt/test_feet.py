@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hills import WAVES
 
 from dojo_opt import Terrain, models
 from dojo_opt.gaits.equilibrium import equilibrium, potential_gradient
 from dojo_opt.gaits.feet import Feet
 from sim.simulator.simulator import Simulator
+from support.hills import WAVES
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator, FreeBody
 from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import Goal, Periodic
@@ -10,6 +9,7 @@ from dojo_opt.cost import Effort, Tracking
 from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.problem import Problem
+from support.doubles import DoubleIntegrator, FreeBody
 
 ONE_STAGE = (Stage(1e-4, 1e-4),)
 T = 12

@@ -4,10 +4,8 @@ import io
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator, FreeBody, Pendulum
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
-from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import ControlBounds, Goal, StateBounds
 from dojo_opt.cost import Effort, Tracking
@@ -17,6 +15,8 @@ from dojo_opt.planning.plan import Plan
 from dojo_opt.planning.problem import Problem
 from dojo_opt.problems import hop
 from solvers.status import Status
+from support.doubles import DoubleIntegrator, FreeBody, Pendulum
+from support.small_problems import ONE_STAGE, gaps, lqr, swingup
 
 
 def test_lqr_in_one_iteration():

@@ -1,8 +1,6 @@
 """How iLQR ends: every status, with a plan that fits it."""
 
 import numpy as np
-from doubles import DoubleIntegrator, Pendulum, SmoothedWall
-from small_problems import gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
@@ -11,6 +9,8 @@ from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from solvers.riccati import Promise
 from solvers.status import MESSAGES, Status
+from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
+from support.small_problems import gaps, lqr, swingup
 
 
 def test_start_at_the_optimum():

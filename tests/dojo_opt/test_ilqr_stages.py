@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator, Pendulum, SmoothedWall
-from small_problems import ONE_STAGE, gaps, lqr, swingup
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
@@ -13,6 +11,8 @@ from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from solvers.riccati import Promise
 from solvers.status import Status
+from support.doubles import DoubleIntegrator, Pendulum, SmoothedWall
+from support.small_problems import ONE_STAGE, gaps, lqr, swingup
 
 
 @pytest.mark.parametrize("reopen", ["gaps", "feedback"])

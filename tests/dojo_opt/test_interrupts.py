@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from interrupts import heard
-from programs import HOME
 
 import dojo_opt as dojo
 from solvers.compiler import local_kernel
 from solvers.status import Status
+from support.interrupts import heard
+from support.programs import HOME
 
 TROT = dojo.problems.trot(cycles=30)
 ENDLESS: dict[str, Any] = {"tolerance": 1e-12, "violation": 1e-14}

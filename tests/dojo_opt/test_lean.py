@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report import Progress, lean
-from dojo_opt.report.lean_measure import costs, new_process
-from dojo_opt.report.lean_scenes import MANY, absent, features, pendulum_scene, without
+from benchmarks.studies.lean import lean_study as lean
+from benchmarks.studies.lean.lean_scenes import MANY, absent, features, pendulum_scene
+from benchmarks.studies.lean.new_process import new_process
+from dojo_opt.report import Progress
+from dojo_opt.report.costs import costs
+from dojo_opt.report.lean.variants import without
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +80,7 @@ def test_the_report_of_a_robot():
 
 @pytest.mark.slow
 def test_the_report_of_the_pendulum():
-    report = lean.Lean(quick=True).run(Progress())
+    report = lean.LeanStudy(quick=True).run(Progress())
     rows = {row.name: row for row in report.rows}
     assert rows["heavy libraries imported by a simulation"].met
     assert len(report.tables) == 2 and len(report.figure.axes) == 2

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from planned_legs import lands, lowest_foot
 
 from dojo_opt import problems
 from dojo_opt.planning.ilqr import ilqr
+from support.planned_legs import lands, lowest_foot
 
 
 @pytest.mark.parametrize(

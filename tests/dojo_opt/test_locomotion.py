@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from planned_legs import check, lands, lowest_foot, upright
 
 from dojo_opt import gaits, models, plots, problems
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.planning.ilqr import ilqr
 from dojo_opt.viewer.motion import motion
 from sim.simulator.simulator import Simulator
+from support.planned_legs import check, lands, lowest_foot, upright
 
 
 @pytest.mark.parametrize("damping, iterations", [(5.0, 8), (0.5, 30)])

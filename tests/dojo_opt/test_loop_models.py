@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmark import loaded
-from linkage import COUPLER, CRANK, ROCKER, fourbar
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
+from support.benchmark import loaded
+from support.linkage import COUPLER, CRANK, ROCKER, fourbar
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from standing_hopper import HOPPER, standing_problem
 
 from dojo_opt.mpc.delay import Delay
 from dojo_opt.mpc.measurement import Measurement
+from support.standing_hopper import HOPPER, standing_problem
 
 
 def test_measured_velocity_becomes_the_mean_one_of_a_model_step():

@@ -8,12 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dojo_opt.report.mechanics import Mechanics, collisions, joints, parameters
-from dojo_opt.report.mechanics.situations import CASES
-from dojo_opt.report.mechanics.study import QUICK_CASES, QUICK_PAIRS
+from benchmarks.compare import STUDIES
+from benchmarks.studies.mechanics import MechanicsStudy
+from benchmarks.studies.mechanics import joint_kinds as joints
+from benchmarks.studies.mechanics.mechanics_study import QUICK_CASES, QUICK_PAIRS
 from dojo_opt.report.study import Progress, study
 from sim.mechanism.parts import KINDS
 from sim.model.shape_kinds import OUT
+from support import collision_checks as collisions
+from support import parameter_errors as parameters
+from support.situations import CASES
 
 
 @pytest.mark.parametrize("kind", ["fixed", "revolute", "planar_orbital", "spherical"])
@@ -77,8 +81,8 @@ def test_a_wrong_derivative_by_a_parameter_is_seen() -> None:
 
 
 def test_the_study_by_its_name() -> None:
-    assert isinstance(study("mechanics", quick=True), Mechanics)
-    report = Mechanics(quick=True).run(Progress(io.StringIO()))
+    assert isinstance(study("mechanics", quick=True, studies=STUDIES), MechanicsStudy)
+    report = MechanicsStudy(quick=True).run(Progress(io.StringIO()))
     assert report.met(), [row.name for row in report.rows if row.met is False]
     kinds, pairs, by_parameters = report.tables
     assert kinds.header[1:] == tuple(joints.BARS)

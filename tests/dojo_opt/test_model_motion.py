@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
 
 from dojo_opt import models
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
+from support.jacobians import check_jacobian
 
 H = 0.01
 HEAVY = {"atlas", "humanoid", "quadruped", "youbot"}

@@ -4,7 +4,6 @@ import pickle
 
 import numpy as np
 import pytest
-from standing_hopper import HOPPER, standing_problem
 
 import dojo_opt as dojo
 from dojo_opt.mpc.settings import MPCSettings
@@ -12,6 +11,7 @@ from dojo_opt.planning.options import Options
 from dojo_opt.plant.tick import milliseconds
 from solvers.compiler import local_kernel
 from solvers.status import Status
+from support.standing_hopper import HOPPER, standing_problem
 
 
 @pytest.mark.parametrize(
@@ -188,6 +188,7 @@ def test_every_guess_keeps_the_hopper_standing(guess):
     assert dojo.closed_loop(mpc, plant, 0.4).survived
 
 
+@pytest.mark.slow
 def test_hopper_hops_and_survives_a_payload_that_the_open_loop_guess_does_not():
     """Planning facts, section 2.6: what a tick starts from decides."""
     mpc = dojo.tasks.hopper_mpc()

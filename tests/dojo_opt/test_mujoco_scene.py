@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
+from benchmarks.engines import mujoco_scene
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.model.model import Model

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
 from scipy.optimize import least_squares
 
 import dojo_opt as dojo
 from dojo_opt.identification import inertia_coordinates
+from support.jacobians import check_jacobian
 
 INERTIA = np.array([0.02, 0.03, 0.04, 0.004, -0.002, 0.003])  # xx, yy, zz, xy, xz, yz
 
@@ -69,6 +69,7 @@ def charts() -> tuple[dojo.ParameterSpace, np.ndarray]:
     return space, moved
 
 
+@pytest.mark.slow
 def test_derivatives_by_coordinates() -> None:
     """Of a step and of a rollout, away from where the space was made."""
     space, theta = charts()

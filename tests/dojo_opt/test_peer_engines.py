@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import chain
 
 import dojo_opt as dojo
-from dojo_opt.report.engines import Ours, Run
+from benchmarks.engines import Ours, Run
+from support.scenes import chain
 
 drake = pytest.mark.skipif(find_spec("pydrake") is None, reason="needs drake")
 bullet = pytest.mark.skipif(find_spec("pybullet") is None, reason="needs pybullet")
@@ -18,10 +18,10 @@ bullet = pytest.mark.skipif(find_spec("pybullet") is None, reason="needs pybulle
 
 def make(name: str) -> Any:
     if name == "bullet":
-        from dojo_opt.report.engines.bullet import Bullet
+        from benchmarks.engines.bullet import Bullet
 
         return Bullet(rounds=1)
-    from dojo_opt.report.engines.drake import Drake
+    from benchmarks.engines.drake import Drake
 
     return Drake({"lagged": "Lagged", "rk3": ""}[name])
 

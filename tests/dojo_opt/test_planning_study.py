@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from benchmarks.engines.mujoco_ilqr import MujocoIlqr, MujocoSettings
+from benchmarks.studies.planning import PlanningStudy, families
+from benchmarks.studies.planning import planners as measure
+from benchmarks.studies.planning import planning_cases as cases
+from benchmarks.studies.planning.planners import PlanOutcome
+from benchmarks.studies.planning.planning_cases import Setting
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.report import Progress
-from dojo_opt.report.mujoco_ilqr import MujocoIlqr, Settings
-from dojo_opt.report.planning import Planning, cases, families, measure
-from dojo_opt.report.planning.cases import Setting
-from dojo_opt.report.planning.measure import Outcome
 
 needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 
@@ -57,9 +59,9 @@ def test_settings_differ_from_the_default_in_one_thing():
     assert {s.name for s in cases.settings(quick=True)} < {s.name for s in every}
 
 
-def outcome(cost: float, *, success: bool = True, replayed: float = 1e-4, seconds: float = 1.0) -> Outcome:
+def outcome(cost: float, *, success: bool = True, replayed: float = 1e-4, seconds: float = 1.0) -> PlanOutcome:
     found = ("", 10, cost, 1e-4, seconds, (cost, replayed), (cost, replayed), 1.0, np.zeros((0, 4)))
-    return Outcome("planner", "setting", success, *found)
+    return PlanOutcome("planner", "setting", success, *found)
 
 
 def test_scores_count_what_is_solved_true_and_good():
@@ -77,7 +79,7 @@ def test_scores_count_what_is_solved_true_and_good():
 def test_mujoco_lifts_the_block_at_ten_times_the_cost():
     """Its differences see no contact that would end: it leaves the ground in the last knot."""
     problem = dojo.problems.block("up")
-    plan = measure.peer(problem, Settings())
+    plan = measure.peer(problem, MujocoSettings())
     assert plan.success and plan.violation <= 1e-3 and plan.message == ""
     assert plan.cost > 5.0 * measure.ours(problem).cost
     assert plan.history.shape == (plan.iterations, 4)
@@ -88,7 +90,7 @@ def test_mujoco_lifts_the_block_at_ten_times_the_cost():
 def test_a_lost_guess_of_mujoco_is_an_outcome():
     problem = dojo.problems.block("right")
     lost = dojo.Problem(problem.sim, problem.start, 3, cost=problem.specs[0], controls0=1e200)
-    plan = measure.peer(lost, Settings(step=0.1))
+    plan = measure.peer(lost, MujocoSettings(step=0.1))
     assert not plan.success and plan.message == "the rollout of the guess is lost"
     assert plan.iterations == 0 and not np.isfinite(plan.fine[0])
 
@@ -96,17 +98,17 @@ def test_a_lost_guess_of_mujoco_is_an_outcome():
 @needs_mujoco
 def test_settings_of_the_yardstick_do_what_they_say():
     problem = dojo.problems.block("up")
-    assert MujocoIlqr(problem, Settings(step=5e-3)).substeps == 20
-    assert np.all(MujocoIlqr(problem, Settings(smooth=True))._model.pair_solimp[:, 0] == 0.0)
+    assert MujocoIlqr(problem, MujocoSettings(step=5e-3)).substeps == 20
+    assert np.all(MujocoIlqr(problem, MujocoSettings(smooth=True))._model.pair_solimp[:, 0] == 0.0)
     xs, us = np.tile(problem.start, (11, 1)), np.ones((10, 3))
     xs[:, 2] += 1.0
-    one, two = (MujocoIlqr(problem, Settings(centred=centred))._linearize(xs, us)[0] for centred in (False, True))
+    one, two = (MujocoIlqr(problem, MujocoSettings(centred=centred))._linearize(xs, us)[0] for centred in (False, True))
     assert 0.0 < np.abs(one - two).max() < 1e-5
 
 
 @pytest.mark.slow
 def test_the_quick_study_runs_and_plans_everything():
-    report = Planning(quick=True).run(Progress())
+    report = PlanningStudy(quick=True).run(Progress())
     assert [row.name for row in report.rows if row.met is False and row.unit != "ms"] == []
     assert len(report.figure.axes) == 12
     numbers = json.loads(report.as_json())

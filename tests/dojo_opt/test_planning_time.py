@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from benchmarks.studies.timing import planning_time
 from dojo_opt.gaits.feet import Feet
-from dojo_opt.report import planning_time
 from dojo_opt.report.result import Report
 
 CROCODDYL = find_spec("crocoddyl") is not None and not planning_time._missing("crocoddyl")
@@ -26,6 +26,7 @@ def trot():
     return dojo.problems.trot()
 
 
+@pytest.mark.slow
 def test_rows_exist_without_the_peers_and_a_note_says_what_is_missing(monkeypatch):
     monkeypatch.setattr(planning_time, "find_spec", lambda name: None)
     report = Report("title", "command")
@@ -49,6 +50,7 @@ def test_crocoddyl_with_another_pin_is_left_out(monkeypatch):
     assert planning_time._missing("crocoddyl") == ""
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
 def test_mujoco_and_numpy_plan_the_same_trot(trot):
     """The yardstick reaches what ours is asked for: the goal, upright, without gaps, and a cost of the same size."""
@@ -93,7 +95,7 @@ def test_derivatives_of_a_knot_are_chained_over_its_steps():
 def test_crocoddyl_gets_the_same_robot_and_arrives(trot):
     import pinocchio
 
-    from dojo_opt.report.crocoddyl_trot import CrocoddylTrot, pinocchio_model, pinocchio_state
+    from benchmarks.engines.crocoddyl_trot import CrocoddylTrot, pinocchio_model, pinocchio_state
 
     model, frames = pinocchio_model(trot.sim.model)
     data = model.createData()

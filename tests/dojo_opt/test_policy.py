@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from standing_hopper import HOPPER, random_policy
 
 from dojo_opt.mpc.policy import Policy
+from support.standing_hopper import HOPPER, random_policy
 
 
 def repeat_last(policy):

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from standing_hopper import HOPPER, random_policy, standing_problem
 
 import dojo_opt as dojo
 from dojo_opt.mpc.horizon import shift_multipliers, tail
 from dojo_opt.mpc.moving import References, Sampled
 from dojo_opt.mpc.policy import Policy
+from support.standing_hopper import HOPPER, random_policy, standing_problem
 
 
 def _ahead(distance):

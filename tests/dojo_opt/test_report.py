@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
+from benchmarks.compare import STUDIES
 from dojo_opt.report import Progress, Report, Row, Table, write_page
 
 
@@ -99,7 +100,19 @@ def test_unknown_studies_and_robots_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="no report 'nonsense'; there are"):
         dojo.report.study("nonsense")
     with pytest.raises(ValueError, match="compile has scenes of its own"):
-        dojo.report.study("compile", mechanism=dojo.models.pendulum())
+        dojo.report.study("compile", mechanism=dojo.models.pendulum(), studies=STUDIES)
+
+
+def test_without_a_file_the_quadruped_is_measured() -> None:
+    assert dojo.report.study("timing").mechanism.name == "quadruped"
+
+
+def test_the_time_of_a_robot() -> None:
+    measured = dojo.report.run_report("timing", quick=True, mechanism=dojo.models.raiberthopper())
+    rows = {row.name: row.value for row in measured.rows}
+    assert len(rows) == 10 and all(value > 0.0 for value in rows.values())
+    assert [line[0] for line in measured.tables[0].rows] == ["1 ms", "2 ms", "5 ms", "10 ms", "20 ms"]
+    assert measured.figure is not None and measured.command == "dojo-opt report timing --quick"
 
 
 def test_progress_names_what_is_worked_on(capsys: pytest.CaptureFixture[str]) -> None:

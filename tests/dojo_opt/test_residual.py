@@ -7,11 +7,11 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from programs import python
 
 import dojo_opt as dojo
 from dojo_opt.constraint import Goal, ResidualConstraint
 from dojo_opt.cost import Effort, ResidualCost
+from support.programs import python
 
 SIM = dojo.Simulator(dojo.models.cartpole(), time_step=0.05)
 X = SIM.neutral()
@@ -45,6 +45,7 @@ def test_a_plain_function_is_a_constraint_that_holds():
     assert np.abs(held.x[:, 2]).max() < 0.901
 
 
+@pytest.mark.slow
 def test_a_kernel_may_allocate_and_call_another_one():
     term = problem(ResidualCost(high, 2)).costs[1]
     xs, us = np.random.default_rng(0).normal(size=(31, 4)), np.zeros((30, 1))

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report import Progress, engines
-from dojo_opt.report.engines import Ours, Run
-from dojo_opt.report.stability import Stability, bodies, chains, ground, joints, study
-from dojo_opt.report.stability.robot import robot_trials
-from dojo_opt.report.stability.trial import Trial
+from benchmarks import engines
+from benchmarks.engines import Ours, Run
+from benchmarks.studies.stability import StabilityStudy
+from benchmarks.studies.stability import body_trials as bodies
+from benchmarks.studies.stability import chain_trials as chains
+from benchmarks.studies.stability import ground_trials as ground
+from benchmarks.studies.stability import joint_trials as joints
+from benchmarks.studies.stability import stability_study as study
+from dojo_opt.report import Progress
+from dojo_opt.report.stability.robot_trials import robot_trials
+from dojo_opt.report.stability.trial import StabilityTrial
 
 OURS = Ours(kappa=1e-10, rounds=1)
 PASSING = {
@@ -36,7 +42,7 @@ PASSING = {
 }
 
 
-def ours(trial: Trial) -> Run:
+def ours(trial: StabilityTrial) -> Run:
     return trial.run(replace(OURS, tolerance=trial.tolerance, kappa=trial.kappa or OURS.kappa))
 
 
@@ -78,16 +84,16 @@ def test_a_chain_beyond_the_limit_of_the_time_step_says_so() -> None:
 def test_trials_of_a_robot_and_what_they_advise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "installed", list)
     mechanism = dojo.models.raiberthopper()
-    report = Stability(quick=True, mechanism=mechanism).run(Progress())
+    report = StabilityStudy(quick=True, mechanism=mechanism).run(Progress())
     assert len(report.rows) == len(robot_trials(mechanism)) + 1
     assert report.notes[0].startswith(mechanism.name) and report.figure is not None
-    pendulum = Stability(quick=True, mechanism=dojo.models.npendulum(3)).run(Progress())
+    pendulum = StabilityStudy(quick=True, mechanism=dojo.models.npendulum(3)).run(Progress())
     assert pendulum.met() and "stable up to a time step of 50 ms" in pendulum.notes[0]
 
 
 @pytest.mark.slow
 def test_every_quick_trial_passes() -> None:
-    report = Stability(quick=True).run(Progress())
+    report = StabilityStudy(quick=True).run(Progress())
     missed = [row.name for row in report.rows if row.met is False]
     assert not missed
     assert len(report.tables[-1].header) == 2 + min(1, len(engines.installed()[1:2]))

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from doubles import DoubleIntegrator, FreeBody
 from scipy.spatial.transform import Rotation
 
 from dojo_opt.constraint import ControlBounds, Goal, ResidualConstraint, StateBounds
 from dojo_opt.cost import Effort, ResidualCost, Tracking
 from dojo_opt.planning.manifold import tangent_layout
 from solvers.compiler import kernel
+from support.doubles import DoubleIntegrator, FreeBody
 
 T = 4
 

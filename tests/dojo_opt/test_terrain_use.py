@@ -6,15 +6,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hills import GRID, WAVES
-from scenes import ball
 
 import dojo_opt as dojo
+from benchmarks.engines.bullet_scene import check
+from benchmarks.engines.mujoco_scene import mjcf
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.plant.perturbation import Perturbation
-from dojo_opt.report.engines.bullet_scene import check
-from dojo_opt.report.mujoco_scene import mjcf
+from support.hills import GRID, WAVES
+from support.scenes import ball
 
 SIM = dojo.Simulator(ball(radius=0.1).on(WAVES), time_step=0.02)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dojo_opt.report import timing
+from benchmarks.studies.timing import timing_study as timing
 from dojo_opt.report.result import Report
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import chain, free_body, order, pendulum, random_state, run, slider
 
 import dojo_opt as dojo
+from support.scenes import chain, free_body, order, pendulum, random_state, run, slider
 
 MECHANISMS = {
     "pendulum": (pendulum(1), [1.0], [0.5]),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import free_body, order, run
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
+from support.scenes import free_body, order, run
 
 INERTIA = np.array([0.1, 0.2, 0.3])
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import LAWS, ball, block, gaps, run
 
 import dojo_opt as dojo
+from support.scenes import LAWS, ball, block, gaps, run
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import pendulum, run, slider
 
 import dojo_opt as dojo
+from support.scenes import pendulum, run, slider
 
 
 @pytest.mark.parametrize("time_step", [1e-3, 1e-2, 5e-2])

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from linkage import plain_fourbar
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 
 import dojo_opt as dojo
+from support.linkage import plain_fourbar
 
 DURATION = 0.8  # [s]
 PUSH, SPRING = 1.5, 4.0  # first speed along the loop's freedom [rad/s]; of the five-bar's motors [N m/rad]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import KINDS, chain, free_body, random_state, run
 
 import dojo_opt as dojo
+from support.scenes import KINDS, chain, free_body, random_state, run
 
 
 def rest(kind):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import ball, block, gaps, run
 
 import dojo_opt as dojo
+from support.scenes import ball, block, gaps, run
 
 SPEED, FRICTION, G, H, KAPPA = 3.0, 0.3, 9.81, 0.01, 1e-8
 DIRECTIONS = np.deg2rad([0.0, 11.3, 30.0, 45.0, 90.0, 135.0, 200.0, 300.0])

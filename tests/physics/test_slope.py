@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import ball, block, run, tilted
 
 import dojo_opt as dojo
+from support.scenes import ball, block, run, tilted
 
 REST = np.r_[0.0, 0.0, 0.25 + 1e-7, 1.0, 0.0, 0.0, 0.0, np.zeros(6)]
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 from naive import rotation as rot
-from scenes import block, chain, random_state
 
 import dojo_opt as dojo
+from support.scenes import block, chain, random_state
 
 
 def moved(x, nq, shift, yaw):

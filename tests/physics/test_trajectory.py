@@ -1,10 +1,10 @@
 """Jointed mechanisms follow their ordinary differential equations to second order."""
 
 import numpy as np
-from scenes import order, pendulum, run, slider
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
+from support.scenes import order, pendulum, run, slider
 
 
 def test_double_pendulum():

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urdf_files import collision, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.io.urdf.drawing import largest
+from support.urdf_files import collision, inertial, joint, link, write
 
 LEFT_OUT = "a body keeps one collision shape, its largest.*left out of those"
 TRUNK = '<box size="0.4 0.1 0.12"/>'

@@ -6,15 +6,15 @@ from math import inf
 
 import numpy as np
 import pytest
-from jacobians import differences
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
-from shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
 from sim.contact.collision.collide import arrange, choose, collide, collide_chosen, open_sides
 from sim.contact.collision.edge_axes import OPEN
 from sim.mechanism.bounding_spheres import bounding_radius
 from sim.model.shape_kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
+from support.jacobians import differences
+from support.shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
 Array = np.ndarray
 ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are a radius around the core
@@ -23,6 +23,7 @@ ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are 
 # -- derivatives -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("depth", [-0.1, -1e-9, 0.05], ids=["near", "touching", "deep"])
 @pytest.mark.parametrize("kind", SIMPLE, ids=NAMES.get)
 def test_derivatives_are_central_differences(kind: Pair, depth: float, rng: np.random.Generator) -> None:

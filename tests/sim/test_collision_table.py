@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dojo_opt.report.mechanics.collisions import bar, check
-from dojo_opt.report.mechanics.solids import PAIRS
 from sim.model.shape_kinds import Pair
+from support.collision_checks import bar, check
+from support.solids import PAIRS
 
 POLYTOPES = ["sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope"]
 ON_CYLINDERS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder"]
@@ -14,6 +14,7 @@ NAMES = [*(p.name.lower() for p in Pair if not p.name.startswith("POLYTOPE")), *
 ROUNDED = ("cylinder_halfspace", "box_cylinder", "polytope_cylinder", "cylinder_cylinder")
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_distance_frame_and_derivatives(name: str) -> None:
     errors = check(name)

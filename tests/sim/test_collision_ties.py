@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 from scipy.spatial.transform import Rotation
-from shape_pairs import features
 
 from sim.model.shape_kinds import SIZES, Pair
+from support.shape_pairs import features
 
 Array = np.ndarray
 EYE = np.eye(3)

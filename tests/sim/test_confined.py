@@ -8,12 +8,12 @@ import warnings
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import random_state
 
 import dojo_opt as dojo
 from sim.mechanism.confined import IDLE, SUNK
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.engine import REPORT, refuse
+from support.scenes import random_state
 
 SUNKEN = dojo.Status.CONTACT_SUNK
 CUBE = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mechanisms import CASES, chain_with, random_state
 
 from sim.mechanism.parts import KINDS
 from sim.simulator.simulator import Simulator
+from support.mechanisms import CASES, chain_with, random_state
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from sim.dynamics.coordinates import maximal_states, minimal_states
@@ -14,6 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import pack
 from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
+from support.mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 H = 0.05

@@ -6,19 +6,19 @@ from functools import partial
 
 import numpy as np
 import pytest
-from free_collision import check_motion
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.collisions import chosen, contact, derivative_error, nearest, turn
-from dojo_opt.report.mechanics.encounters import ALL, ROCK, SHAPES, approaching, two
-from dojo_opt.report.mechanics.solids import distance, random_case
 from sim.contact.collision.cylinders import separation_of_cylinder
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box, Capsule, Cylinder
 from sim.model.shape_kinds import OUT
+from support.collision_checks import chosen, contact, derivative_error, nearest, turn
+from support.encounters import ALL, ROCK, SHAPES, approaching, two
+from support.free_collision import check_motion
+from support.jacobians import check_jacobian
+from support.solids import distance, random_case
 
 OTHERS = {"capsule": SHAPES["capsule"], "box": SHAPES["box"], "rock": ROCK, "cylinder": Cylinder(0.25, 0.3)}
 PAIRS = ["capsule_cylinder", "box_cylinder", "polytope_cylinder", "cylinder_cylinder"]
@@ -178,6 +178,7 @@ def test_no_step_is_accepted_whose_impulses_give_energy(radius: float, length: f
     assert np.abs(t.contacts.impulse).max() > 0.1
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", ["capsule", "box", "rock"])
 def test_derivatives_of_a_step(name: str) -> None:
     """In the step that hits, and in the one before."""

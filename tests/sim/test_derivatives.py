@@ -9,11 +9,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
 from naive import rotation as rot
-from scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 import dojo_opt as dojo
+from support.jacobians import check_jacobian
+from support.scenes import KINDS, LAWS, ball, block, chain, gaps, limited, pendulum, random_state, slider
 
 H = 0.02
 KAPPAS = (1e-2, 1e-4, 1e-6)
@@ -70,6 +70,7 @@ def assert_regime(mech, result, regime, law, kappa):
         assert ratio > 0.99 and impulse[2] > 1e-2, ratio
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("links", [1, 2])
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints(kind, links, rng):
@@ -109,6 +110,7 @@ def test_cone_limits(kind, angle, rng):
         check(mech, x, rng.normal(size=sim.nu), kappa)
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("regime", GAP)
 @pytest.mark.parametrize("kind", KINDS)
 def test_contact_behind_every_joint(kind, regime, rng):
@@ -139,6 +141,7 @@ MECHANISMS = {
 }
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("regime", GAP)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -170,6 +173,7 @@ def test_limits(push, fast, rng):
             check(mech, x, push * rng.normal(size=nv), kappa)
 
 
+@pytest.mark.sweep(5)
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fixed"])
 def test_limits_of_every_kind(kind, rng):
     """Every plain coordinate arrives at its bound in this very step."""

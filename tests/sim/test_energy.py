@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import CASES, chain_with, random_state
 from numpy.typing import NDArray
 
 from dojo_opt import models
@@ -15,6 +14,7 @@ from sim.mechanism.pack import pack
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.layout import allocate_data, sizes_of, table
 from sim.simulator.link import link_poses
+from support.mechanisms import CASES, chain_with, random_state
 
 Floats = NDArray[np.float64]
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from benchmark import loaded
 from naive import rotation as rot
-from scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 import dojo_opt as dojo
 from sim.model.layout import data_view, model_view
 from sim.simulator.link import link_step
 from sim.solve.energy_balance import arriving_energy, constraint_work, work_at_node
 from solvers.compiler import local_kernel
+from support.benchmark import loaded
+from support.scenes import KINDS, block, chain, free_body, order, pendulum, random_state
 
 
 @local_kernel
@@ -171,12 +171,14 @@ def attacks():
     yield from loaded("attacks")
 
 
+@pytest.mark.slow
 def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
     """300 falls of the 10,000 of benchmarks/attacks.py. Before this balance, 3 of 100 gained more than a tenth."""
     assert attacks.main(["--only", "motions", "--count", "300", "--first", "20000"]) == 0
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_rounding_of_the_state_does_not_flip_the_energy(attacks):
     """Passive trees at 50 ms, some with solutions a rounding apart: whichever is found first, none gains energy."""
     refused = 0

@@ -11,11 +11,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import LAWS, ball, block, chain, gaps, pendulum
 
 import dojo_opt as dojo
 from sim.model.columns import Inactive
 from sim.simulator.omitted_contacts import reach
+from support.scenes import LAWS, ball, block, chain, gaps, pendulum
 
 TOLERANCE = 1e-8
 EXACT = 1e-13

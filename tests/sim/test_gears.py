@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
-from linkage import fourbar
-from urdf_files import joint, link, write
 
 import dojo_opt as dojo
 from sim.mechanism.gear import Gear
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import Box
+from support.jacobians import check_jacobian
+from support.linkage import fourbar
+from support.urdf_files import joint, link, write
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 

@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian, five_point
-from scenes import block
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import kind_of
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from sim.mechanism.shapes import String
+from support.case import kind_of
+from support.encounters import SHAPES, approaching, two
+from support.jacobians import check_jacobian, five_point
+from support.scenes import block
 
 FREE = dojo.Joint("floating", None, "b")
 
@@ -113,6 +113,7 @@ def check(sim: dojo.Simulator, x: np.ndarray) -> float:
     return float(np.abs(here.contacts.impulse).max())
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("h, speed", [(1e-3, 5.0), (1e-3, 20.0), (1e-4, 5.0)])
 @pytest.mark.parametrize("name", SCENES)
 def test_impacts(name: str, h: float, speed: float) -> None:

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from benchmark import loaded
 from naive import rotation as rot
-from scenes import ball, block, gaps
 
 import dojo_opt as dojo
+from support.benchmark import loaded
+from support.scenes import ball, block, gaps
 
 # cells of benchmarks/robustness.py at seed 0: mechanism, friction, time step, kappa, number of the state
 CELLS = (

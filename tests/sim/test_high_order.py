@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from branches import ORDERS, apart, branch, end
-from mechanisms import random_state
 
 import dojo_opt as dojo
 from sim.integrators.tableau import stable
 from sim.mechanism.mechanism import Mechanism
+from support.branches import ORDERS, apart, branch, end
+from support.mechanisms import random_state
 
 
 @pytest.mark.parametrize("kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "prismatic", "fixed"])

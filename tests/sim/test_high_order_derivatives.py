@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from branches import branch
-from mechanisms import random_state
 
 import dojo_opt as dojo
+from support.branches import branch
+from support.mechanisms import random_state
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from interrupts import heard
 
 import dojo_opt as dojo
 from sim.model import pace
+from support.interrupts import heard
 
 HOPPER = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
 QUADRUPED = dojo.Simulator(dojo.models.quadruped(), 0.02)

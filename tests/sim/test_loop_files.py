@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from linkage import fourbar
-from urdf_files import SKEWED, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.mechanism.parts import KINDS
 from sim.mechanism.pose import roll_pitch_yaw
+from support.linkage import fourbar
+from support.urdf_files import SKEWED, inertial, joint, link, write
 
 BAR = "<axis xyz='0 1 0'/>"
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
-from linkage import COUPLER, CRANK, ROCKER, bar, fourbar
 
 import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.shapes import Sphere, rotation_matrix
+from support.jacobians import check_jacobian
+from support.linkage import COUPLER, CRANK, ROCKER, bar, fourbar
 
 Y = (0.0, 1.0, 0.0)
 ACTIONS: dict[str, dict[str, Any]] = {

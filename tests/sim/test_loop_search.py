@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linkage import COUPLER, CRANK, ROCKER, fourbar, plain_fourbar, worst_gap
 
 import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
+from support.linkage import COUPLER, CRANK, ROCKER, fourbar, plain_fourbar, worst_gap
 
 BRANCHES = (-1.0, 1.0)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linkage import plain_fourbar as fourbar
-from linkage import worst_gap
 from scipy.integrate import solve_ivp
 
 import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
+from support.linkage import plain_fourbar as fourbar
+from support.linkage import worst_gap
 
 
 def ring(kind: str = "spherical") -> Mechanism:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import BALL, CASES, INF, chain_with, hip, two
 
 from sim.mechanism.axes import contact_frame, translation_axes
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.mechanism.parts import KINDS, Body, Contact, Input, Joint
 from sim.model.model import InputKind, Law
+from support.mechanisms import BALL, CASES, INF, chain_with, hip, two
 
 
 def test_tree_order_keeps_the_given_order_where_it_can() -> None:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from mechanisms import BALL, INF, hip, two
 
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box
+from support.mechanisms import BALL, INF, hip, two
 
 ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("", shape=BALL), r"Body\(name=\.\.\.\): expected a name"),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import CASES, chain_with, random_state
 
 from sim.simulator.simulator import Simulator
+from support.mechanisms import CASES, chain_with, random_state
 
 FAR = 100.0  # [m]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from branches import ORDERS
 
 from sim.integrators.tableau import tableau
+from support.branches import ORDERS
 
 
 def trees(size: int) -> list[tuple]:

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import block, run
 
 import dojo_opt as dojo
+from support.scenes import block, run
 
 
 def test_deep_overlap_at_the_start_is_solved():

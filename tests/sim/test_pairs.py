@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
-from dojo_opt.report.stability.stacks import tower
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box, Cylinder, HalfSpace, Sphere, String
+from support.encounters import SHAPES, approaching, two
+from support.towers import tower
 
 
 def touching(sim: dojo.Simulator, seed: int) -> np.ndarray:

@@ -6,19 +6,20 @@ import functools
 
 import numpy as np
 import pytest
-from coupled_scenes import COUPLED, kinds
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import Case
-from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import CASES
 from sim.derivatives.parameters.parameters import KINDS
+from support.case import Case
+from support.coupled_scenes import COUPLED, kinds
+from support.jacobians import check_jacobian
+from support.parameter_errors import error
+from support.situations import CASES
 
 ALL = {**CASES, **COUPLED}
 case_of = functools.cache(lambda name: ALL[name]())
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("name", ALL)
 def test_every_kind_in_every_situation(name: str) -> None:
     case = case_of(name)
@@ -90,6 +91,7 @@ def test_the_sweep_is_the_chain_of_the_steps(name: str) -> None:
     np.testing.assert_allclose(found, parameters, rtol=1e-7, atol=1e-8 * np.abs(parameters).max())
 
 
+@pytest.mark.slow
 def test_the_sweep_against_differences_of_the_rollout() -> None:
     case = case_of("sliding")
     sim = case.sim

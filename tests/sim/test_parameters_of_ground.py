@@ -6,15 +6,15 @@ import functools
 
 import numpy as np
 import pytest
-from hills import GRID, WAVES
-from jacobians import check_jacobian
-from scenes import run
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import Case
-from dojo_opt.report.mechanics.couplings import geared
-from dojo_opt.report.mechanics.parameters import error
-from dojo_opt.report.mechanics.situations import HILLS, falling
+from support.case import Case
+from support.couplings import geared
+from support.hills import GRID, WAVES
+from support.jacobians import check_jacobian
+from support.parameter_errors import error
+from support.scenes import run
+from support.situations import HILLS, falling
 
 # restitution, friction, how deep it would sink without the ground [m]
 ON_HILLS = {
@@ -29,6 +29,7 @@ STAIRS = dojo.Terrain.steps([0.1, 0.08], depth=0.4, edge=0.3, direction=(1.0, 0.
 hills_case = functools.cache(lambda name: falling(HILLS, *ON_HILLS[name]))
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize("name", ON_HILLS)
 def test_heights_of_hills(name: str) -> None:
     case = hills_case(name)
@@ -36,6 +37,7 @@ def test_heights_of_hills(name: str) -> None:
     assert all(e < 1e-6 for e in errors.values()), errors
 
 
+@pytest.mark.slow
 def test_each_height_of_stairs() -> None:
     """One number per line across the stairs, under two balls of one radius and a point."""
     box = dojo.Body("box", 1.0, shape=dojo.Box(0.3, 0.2, 0.1))
@@ -63,6 +65,7 @@ def test_each_height_of_stairs() -> None:
     np.testing.assert_allclose(J.sum(axis=1), up, atol=1e-8 * np.abs(up).max())
 
 
+@pytest.mark.slow
 def test_rises_of_stairs_by_the_chain_rule() -> None:
     """What a docstring of Terrain says: a loss by the rises, against differences."""
     rises = np.array([0.1, 0.08])

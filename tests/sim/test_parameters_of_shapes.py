@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.couplings import STONE, touching
-from dojo_opt.report.mechanics.parameters import error
+from support.couplings import STONE, touching
+from support.parameter_errors import error
 
 SHAPES = {
     "sphere": dojo.Sphere(0.2),
@@ -46,6 +46,7 @@ WHERE = {
 }
 
 
+@pytest.mark.sweep(8)
 @pytest.mark.parametrize("where", WHERE)
 @pytest.mark.parametrize("pair", PAIRS)
 def test_sizes_of_two_shapes(pair: str, where: str) -> None:

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes import pendulum
 
 import dojo_opt as dojo
+from support.scenes import pendulum
 
 H, KAPPA, TOLERANCE = 0.02, 1e-12, 1e-10
 HOPPER = dojo.models.raiberthopper()
@@ -36,6 +36,7 @@ def near(sim: dojo.Simulator, x: np.ndarray, us: np.ndarray) -> np.ndarray:
     return np.asarray(sim._engine.march(x, us).near)
 
 
+@pytest.mark.slow
 def test_flight_has_the_higher_order_and_lands() -> None:
     """0.6 s of flight against order 8 with a tenth of the time step; it ends on the ground."""
     q = thrown(simulator(4), 1.0, 2.0)
@@ -107,6 +108,7 @@ def test_what_flies_does_not_depend_on_how_it_is_asked() -> None:
     assert not t.contacts.impulse[0].any()
 
 
+@pytest.mark.sweep(3)
 @pytest.mark.parametrize(
     ("height", "up"), [(1.0, 0.0), (0.08, -1.0), (0.03, -1.0)], ids=["flying", "handover", "landing"]
 )

@@ -6,16 +6,16 @@ from functools import partial
 
 import numpy as np
 import pytest
-from free_collision import check_motion
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.encounters import ROCK, SHAPES, approaching, two
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.shapes import Box
+from support.encounters import ROCK, SHAPES, approaching, two
+from support.free_collision import check_motion
+from support.jacobians import check_jacobian
 
 OTHERS = {**SHAPES, "polytope": Polytope.about_centroid([[0.3, 0, 0], [-0.3, 0.2, 0], [-0.1, -0.3, 0], [0, 0, 0.4]])}
 
@@ -38,6 +38,7 @@ def moved(sim: dojo.Simulator, after: np.ndarray, x: np.ndarray) -> np.ndarray:
     return sim.difference(sim.step(x, throw=True).x, after)
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("name", OTHERS)
 def test_derivatives_of_a_step(name: str) -> None:
     """In the step that hits, and in the one before."""

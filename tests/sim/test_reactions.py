@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkage import fourbar
 from naive import rotation as rot
 from naive.lagrangian import arriving_momentum, leaving_momentum
 
@@ -16,6 +15,7 @@ from dojo_opt import models
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.mechanism.shapes import Box, Sphere
+from support.linkage import fourbar
 
 G = 9.81
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hills import WAVES, derivatives_of
-from scenes import ball, block, chain, random_state, run
 
 import dojo_opt as dojo
+from support.hills import WAVES, derivatives_of
+from support.scenes import ball, block, chain, random_state, run
 
 LEVEL = dojo.Terrain.slope(0.0)
 

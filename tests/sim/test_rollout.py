@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import block
 
 from dojo_opt import models
-from dojo_opt.report.mechanics.encounters import SHAPES, approaching, two
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
+from support.encounters import SHAPES, approaching, two
+from support.scenes import block
 
 PENDULUM = Simulator(models.double_pendulum(), time_step=0.01)
 

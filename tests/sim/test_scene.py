@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 from naive import rotation as rot
-from scenes import ball, block, run
 
 import dojo_opt as dojo
+from support.scenes import ball, block, run
 
 YAW = rot.exp(np.array([0.0, 0.0, 0.7]))
 

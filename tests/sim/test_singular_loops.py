@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linkage import plain_fourbar, worst_gap
 
 import dojo_opt as dojo
 from sim.mechanism.mechanism import Mechanism
 from solvers.status import Status
+from support.linkage import plain_fourbar, worst_gap
 
 SIDEWAYS = (9.81, 0.0, 0.0)  # gravity along the ground link: the lowest pose is the one with all links in line
 GRASHOF = (0.5, 0.7, 0.8, 1.0)  # shortest + longest = the other two

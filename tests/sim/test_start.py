@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanisms import CASES, chain_with, random_state
 
 from dojo_opt import models
 from sim.mechanism.mechanism import Mechanism
@@ -12,6 +11,7 @@ from sim.mechanism.parts import Body, Joint
 from sim.simulator.results import SimulationError
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
+from support.mechanisms import CASES, chain_with, random_state
 
 
 @pytest.mark.parametrize(("kind", "on_world"), CASES)

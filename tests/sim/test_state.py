@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mechanisms import chain_with
 
 from sim.simulator.simulator import Simulator
+from support.mechanisms import chain_with
 
 SIM = Simulator(chain_with("planar_free", on_world=False))
 PROPERTY = settings(deadline=None, derandomize=True, max_examples=60)

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkage import plain_fourbar
 
 import dojo_opt as dojo
 from sim.simulator.results import SimulationError
+from support.linkage import plain_fourbar
 
 
 @cache

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
 
 import dojo_opt as dojo
-from dojo_opt.report.mechanics.case import Case
-from dojo_opt.report.mechanics.parameters import error
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.shapes import String
+from support.case import Case
+from support.jacobians import check_jacobian
+from support.parameter_errors import error
 
 
 def test_a_string_holds_and_does_not_push() -> None:

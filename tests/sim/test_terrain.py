@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hills import GRID, WAVES, H, derivatives_of, waves
-from scenes import ball, block, chain, order, run
 
 import dojo_opt as dojo
+from support.hills import GRID, WAVES, H, derivatives_of, waves
+from support.scenes import ball, block, chain, order, run
 
 # -- heights -----------------------------------------------------------------------------------------------------------
 
@@ -101,6 +101,7 @@ def test_an_inclined_plane_on_a_grid_is_the_half_space(rng):
         np.testing.assert_allclose(first, second, atol=1e-6)
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("law", ["impact", "linear", "nonlinear"])
 @pytest.mark.parametrize("height", [-0.01, 0.0, 0.3])

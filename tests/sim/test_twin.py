@@ -6,9 +6,9 @@ from naive import lagrangian as lag
 from naive import rotation as rot
 from naive.maximal import solve
 from naive.scene import from_mechanism, poses
-from scenes import KINDS, LAWS, block, chain, free_body, gaps, limited, pendulum, random_state
 
 import dojo_opt as dojo
+from support.scenes import KINDS, LAWS, block, chain, free_body, gaps, limited, pendulum, random_state
 
 
 def compare(sim, x, u):
@@ -45,6 +45,7 @@ def test_double_pendulum(rng):
         compare(sim, 3.0 * rng.normal(size=4), rng.normal(size=2))
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("base", ["floating", None])
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_joint(kind, base, rng):
@@ -63,6 +64,7 @@ def test_spring_with_a_rotated_rest(kind, rng):
         compare(sim, random_state(sim, rng, 3.0), rng.normal(size=sim.nu))
 
 
+@pytest.mark.sweep(6)
 @pytest.mark.parametrize("kappa", [1e-2, 1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize("law", LAWS)
 def test_block(law, kappa, rng):
@@ -146,6 +148,7 @@ def quadruped(law="nonlinear", friction=0.8):
     return dojo.Mechanism(bodies, joints, contacts)
 
 
+@pytest.mark.sweep(12)
 @pytest.mark.parametrize("time_step", [0.01, 0.05])
 @pytest.mark.parametrize("height", [1.0, 0.01])
 @pytest.mark.parametrize("law", LAWS)
@@ -160,6 +163,7 @@ def test_floating_tree_in_flight_and_in_contact(law, height, time_step, rng):
         compare(sim, x, rng.normal(size=12))
 
 
+@pytest.mark.sweep(4)
 @pytest.mark.parametrize("kind", KINDS)
 def test_energy_momentum_and_start(kind, rng):
     """What is reported at the nodes is the discrete Legendre transform."""

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urdf_files import AXIS, BALL, SKEWED, arm, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.mechanism import parts
 from sim.mechanism.pose import Pose, quaternion, roll_pitch_yaw, turn
 from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
+from support.urdf_files import AXIS, BALL, SKEWED, arm, inertial, joint, link, write
 
 KINDS = {  # type in the file: (kind, nq, nv)
     "revolute": ("revolute", 1, 1),

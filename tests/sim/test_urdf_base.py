@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urdf_files import AXIS, BALL, arm, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.mechanism.poses import poses
+from support.urdf_files import AXIS, BALL, arm, inertial, joint, link, write
 
 
 def test_a_fixed_base_stands_where_it_is_put(tmp_path: Path) -> None:

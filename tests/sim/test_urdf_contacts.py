@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jacobians import check_jacobian
-from urdf_files import collision, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.mechanism.stance import gaps
+from support.jacobians import check_jacobian
+from support.urdf_files import collision, inertial, joint, link, write
 
 SPHERE, BOX = '<sphere radius="0.1"/>', '<box size="0.2 0.4 0.6"/>'
 CYLINDER, CAPSULE = '<cylinder radius="0.3" length="0.2"/>', '<capsule radius="0.05" length="0.4"/>'

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from urdf_files import collision, inertial, joint, link, write
 
 import dojo_opt as dojo
+from support.urdf_files import collision, inertial, joint, link, write
 
 TWO = (link("base"), link("arm"))
 AXIS = '<axis xyz="0 1 0"/>'

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from urdf_files import branched, compare_with_mujoco, inertial, joint, link, write
 
 import dojo_opt as dojo
 from sim.io.urdf.inertia import BALL_MASS, BALL_RADIUS, RigidInertia, combined, fault, repaired
 from sim.mechanism.pose import roll_pitch_yaw
 from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
+from support.urdf_files import branched, compare_with_mujoco, inertial, joint, link, write
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*keeps one collision shape:sim.io.urdf.report.UrdfWarning")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import ball, chain, random_state
 
 import dojo_opt as dojo
+from support.scenes import ball, chain, random_state
 
 
 def floating(rng):

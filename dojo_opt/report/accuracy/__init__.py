@@ -1,7 +1,7 @@
-"""Study `accuracy`: error against run time of motion without contact, and what time step a robot needs."""
+"""Accuracy of a robot: error against run time, and the settings that it needs."""
 
 from __future__ import annotations
 
-from dojo_opt.report.accuracy.study import Accuracy
+from dojo_opt.report.accuracy.robot_accuracy import RobotAccuracy
 
-__all__ = ["Accuracy"]
+__all__ = ["RobotAccuracy"]

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
+from dojo_opt.report.accuracy.setting_trial import SettingTrial
 from sim.mechanism.mechanism import Mechanism
 
-if TYPE_CHECKING:
-    from dojo_opt.report.accuracy.robot import Trial
-
+Choose = Callable[[Sequence["SettingTrial"], float], "SettingTrial"]
 _ROUGH = 1e-2  # [m] good enough for a plan that feedback follows
 
 
-def recommendation(best: Trial, target: float, own: float) -> str:
+def recommendation(best: SettingTrial, target: float, own: float) -> str:
     """The first sentences of the report; own: what the converged motion changes by when its step is doubled [m]."""
     asked = f"{1e3 * target:.2g} mm"
     if target == 2.0 * own:
@@ -28,7 +26,10 @@ def recommendation(best: Trial, target: float, own: float) -> str:
 
 
 def hints(
-    mechanism: Mechanism, best: Trial, trials: Sequence[Trial], choose: Callable[[Sequence[Trial], float], Trial]
+    mechanism: Mechanism,
+    best: SettingTrial,
+    trials: Sequence[SettingTrial],
+    choose: Choose,
 ) -> list[str]:
     """What else there is to know: contacts that are missing, planning, derivatives, kappa."""
     contacts = bool(mechanism.contacts or mechanism.collisions)

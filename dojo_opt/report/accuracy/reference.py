@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 _TOLERANCE = 1e-12
 
 
-class Motion:
+class TreeReference:
     """q'' of a tree without contacts, limits and loops: M(q) v' = forces - M-free accelerations, in NumPy.
 
     Springs, dampers, armatures and inputs of joints are represented; inputs on bodies are not, and must be zero; joints

@@ -1,7 +1,7 @@
-"""Study `gradients`: error and cost of derivatives, of one step and of whole motions."""
+"""Derivatives of a robot: error and cost of (A, B) of one step."""
 
 from __future__ import annotations
 
-from dojo_opt.report.gradients.study import Gradients
+from dojo_opt.report.gradients.robot_gradients import RobotGradients
 
-__all__ = ["Gradients"]
+__all__ = ["RobotGradients"]

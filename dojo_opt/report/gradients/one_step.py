@@ -7,17 +7,12 @@ exactly a derivative is computed, not how exact the contact is.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-import dojo_opt as dojo
-from dojo_opt.report import mujoco_scene
 from dojo_opt.report.clock import interleave
-from dojo_opt.report.gradients import drake_step
 from dojo_opt.report.gradients.differences import Stepper, extrapolated, relative_error
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
@@ -27,22 +22,20 @@ Vector = NDArray[np.float64]
 KAPPAS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 EPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 DIFFERENCED = 1e-6  # the kappa at which our step is differenced: that of our simulations
-MUJOCO_EPS = 1e-6  # what MuJoCo's documentation uses
+CLOCKED_EPS = 1e-6  # step size of the differences that are clocked
 TIGHT = (
     1e-13  # tolerance of steps that are differenced: at 1e-8 neighbours stop at other iterations, and differ by that
 )
-_KNOTS, _BATCHES, _CALLS = 50, 5, 10  # Jacobians per clocked call: ours and MuJoCo's, by differences of ours, Drake's
+KNOTS, _BATCHES = 50, 5  # Jacobians per clocked call: implicit, by differences
 
 IMPLICIT, TIGHTLY = "implicit", "implicit, solved to 1e-13"
 FORWARD, CENTRED = "differences, one-sided", "differences, centred"
-AUTODIFF = "AutoDiffXd, by the state alone"
-MUJOCO_FORWARD, MUJOCO_CENTRED = "mjd_transitionFD, one-sided", "mjd_transitionFD, centred"
 
 
 Cases = dict[str, tuple[Callable[[], Any], int]]  # what is clocked, and how many Jacobians it computes
 
 
-class Scene(NamedTuple):
+class StepScene(NamedTuple):
     """A state to differentiate at: where `steps` steps from `start` lead."""
 
     name: str
@@ -50,10 +43,9 @@ class Scene(NamedTuple):
     start: Vector
     u: Vector
     steps: int
-    integrator: str  # of MuJoCo: the one that holds the scene
 
 
-class Point(NamedTuple):
+class JacobianPoint(NamedTuple):
     """One way to get a Jacobian."""
 
     method: str
@@ -64,40 +56,32 @@ class Point(NamedTuple):
     microseconds: float  # a step and its Jacobian, or all steps that are differenced
 
 
-def scenes() -> list[Scene]:
-    """A sliding block, a standing hopper, a landing quadruped two of whose feet slide."""
-    block = Simulator(dojo.models.block(friction=0.3), time_step=0.01)
-    hop = dojo.problems.hop()
-    robot = Simulator(dojo.models.quadruped(spring=80.0, damper=4.0), time_step=0.02)
-    drop = robot.rollout(robot.neutral(), np.zeros((200, robot.nu)), throw=True).x[-1].copy()
-    drop[2] += 0.1
-    drop[robot.nq] = 1.0
-    slide = block.start(block.neutral()[:7], [3.0 * np.cos(np.pi / 6), 3.0 * np.sin(np.pi / 6), 0, 0, 0, 0])
-    return [
-        Scene("block, sliding", block, slide, np.zeros(3), 10, "discrete"),
-        Scene("hopper, standing", hop.sim.replace(time_step=0.01), hop.start, hop.controls0[0], 50, "discrete"),
-        Scene("quadruped, landing", robot, drop, np.zeros(robot.nu), 8, "discrete"),
-    ]
+Peer = tuple[str, Callable[[StepScene], tuple[list[JacobianPoint], Cases]]]  # an engine: its name, and what it measures
 
 
-def scene_of(mechanism: Mechanism) -> Scene:
+def scene_of(mechanism: Mechanism) -> StepScene:
     """A mechanism half a second after it is let go in its neutral state."""
     sim = Simulator(mechanism, time_step=0.01)
-    return Scene(mechanism.name, sim, sim.neutral(), np.zeros(sim.nu), 50, "discrete")
+    return StepScene(mechanism.name, sim, sim.neutral(), np.zeros(sim.nu), 50)
 
 
-def measure(scene: Scene, rounds: int) -> tuple[list[Point], list[str]]:
-    """All ways, and notes. Others' where they are installed and can represent the mechanism.
+def measure(scene: StepScene, rounds: int, peers: Sequence[Peer] = ()) -> tuple[list[JacobianPoint], list[str]]:
+    """Error and cost of all ways to the Jacobian.
 
-    SimulationError: the scene cannot be stepped.
+    Args:
+        scene: The state to differentiate at.
+        rounds: Clocked calls of each way.
+        peers: Other engines, each with its name.
+
+    Returns:
+        The ways, and a note for every peer that cannot represent the scene.
+
+    Raises:
+        SimulationError: The scene cannot be stepped.
     """
     points, cases = _ours(scene)
     notes = []
-    peers: list[tuple[str, str, Callable[[Scene], tuple[list[Point], Cases]]]] = [("MuJoCo", "mujoco", _mujoco)]
-    peers += [(f"Drake {name.lower()}", "pydrake", partial(_drake, name)) for name in drake_step.APPROXIMATIONS]
-    for name, package, peer in peers:
-        if find_spec(package) is None:
-            continue
+    for name, peer in peers:
         try:
             found, clocked = peer(scene)
         except (ValueError, RuntimeError) as error:
@@ -110,11 +94,11 @@ def measure(scene: Scene, rounds: int) -> tuple[list[Point], list[str]]:
     return [p._replace(microseconds=each[f"{p.method} {p.kappa}"]) for p in points], notes
 
 
-def _ours(scene: Scene) -> tuple[list[Point], Cases]:
+def _ours(scene: StepScene) -> tuple[list[JacobianPoint], Cases]:
     """The implicit function theorem at every kappa, differences at one."""
     x = scene.sim.rollout(scene.start, np.tile(scene.u, (scene.steps, 1)), throw=True).x[-1]
     hard = scene.sim.ncontact > 0 or len(scene.sim.model.limit_dof) > 0
-    points: list[Point] = []
+    points: list[JacobianPoint] = []
     cases: Cases = {}
     for kappa in KAPPAS if hard else (DIFFERENCED,):
         sim = scene.sim.replace(kappa=kappa)
@@ -122,8 +106,8 @@ def _ours(scene: Scene) -> tuple[list[Point], Cases]:
         reference = extrapolated(Stepper(tight, x, scene.u).jacobian)
         for name, solved in ((IMPLICIT, sim), (TIGHTLY, tight)):
             error = relative_error(np.concatenate(solved.linearize(x, scene.u, kappa=kappa), axis=1), reference.value)
-            points.append(Point(name, kappa, None, error, reference.doubt, np.nan))
-            cases[f"{name} {kappa}"] = _implicit(solved, x, scene.u), _KNOTS
+            points.append(JacobianPoint(name, kappa, None, error, reference.doubt, np.nan))
+            cases[f"{name} {kappa}"] = _implicit(solved, x, scene.u), KNOTS
         if kappa == DIFFERENCED:
             points += _differences(tight, x, scene.u, reference)
             for name, centred in ((FORWARD, False), (CENTRED, True)):
@@ -131,7 +115,7 @@ def _ours(scene: Scene) -> tuple[list[Point], Cases]:
     return points, cases
 
 
-def loads(scene: Scene) -> Vector:
+def loads(scene: StepScene) -> Vector:
     """Normal forces [N] of the contacts that carry at least a hundredth of the weight."""
     if not scene.sim.ncontact:
         return np.zeros(0)
@@ -140,7 +124,7 @@ def loads(scene: Scene) -> Vector:
     return np.asarray(forces[-1][forces[-1] > 0.01 * weight])
 
 
-def smoothed(scene: Scene, kappas: Sequence[float] = KAPPAS) -> list[float]:
+def smoothed(scene: StepScene, kappas: Sequence[float] = KAPPAS) -> list[float]:
     """Relative difference of (A, B) at each kappa from that at a hundredth of the last."""
     x = scene.sim.rollout(scene.start, np.tile(scene.u, (scene.steps, 1)), throw=True).x[-1]
     sim = scene.sim.replace(tolerance=TIGHT)
@@ -148,74 +132,22 @@ def smoothed(scene: Scene, kappas: Sequence[float] = KAPPAS) -> list[float]:
     return [relative_error(level, levels[-1]) for level in levels[:-1]]
 
 
-def _differences(sim: Simulator, x: Vector, u: Vector, reference: Any) -> list[Point]:
+def _differences(sim: Simulator, x: Vector, u: Vector, reference: Any) -> list[JacobianPoint]:
     stepper = Stepper(sim, x, u)
     points = []
     for name, centred in ((FORWARD, False), (CENTRED, True)):
         for eps in EPS:
             error = relative_error(stepper.jacobian(eps, centred=centred), reference.value)
-            points.append(Point(name, sim.kappa, eps, error, reference.doubt, np.nan))
+            points.append(JacobianPoint(name, sim.kappa, eps, error, reference.doubt, np.nan))
     return points
 
 
 def _implicit(sim: Simulator, x: Vector, u: Vector) -> Callable[[], Any]:
-    xs, us = np.tile(x, (_KNOTS, 1)), np.tile(u, (_KNOTS, 1))
+    xs, us = np.tile(x, (KNOTS, 1)), np.tile(u, (KNOTS, 1))
     return lambda: sim.linearize_trajectory(xs, us, kappa=sim.kappa)
 
 
 def _batch(sim: Simulator, x: Vector, u: Vector, *, centred: bool) -> Callable[[], Any]:
-    xs, us = Stepper(sim, x, u).points(MUJOCO_EPS, centred=centred)
+    xs, us = Stepper(sim, x, u).points(CLOCKED_EPS, centred=centred)
     xs, us = np.tile(xs, (_BATCHES, 1)), np.tile(us, (_BATCHES, 1))[:, None]
     return lambda: sim.rollout_batch(xs, us)
-
-
-def _mujoco(scene: Scene) -> tuple[list[Point], Cases]:
-    """MuJoCo's own differences, against their own extrapolation with a solver that converges to round-off."""
-    import mujoco
-
-    model = mujoco_scene.load(scene.sim.model, scene.sim.time_step, integrator=scene.integrator)
-    data = mujoco_scene.state(model, scene.start)
-    data.ctrl[:] = scene.u
-    mujoco.mj_step(model, data, scene.steps)
-    n, m = 2 * model.nv, model.nu
-    A, B = np.zeros((n, n)), np.zeros((n, m))
-
-    def jacobian(eps: float, centred: bool) -> Vector:
-        mujoco.mjd_transitionFD(model, data, eps, centred, A, B if m else None, None, None)
-        return np.concatenate([A, B], axis=1)
-
-    default = model.opt.tolerance, model.opt.iterations
-    model.opt.tolerance, model.opt.iterations = 0.0, 500
-    reference = extrapolated(lambda eps: jacobian(eps, True))
-    model.opt.tolerance, model.opt.iterations = default
-    points: list[Point] = []
-    cases: Cases = {}
-    for name, centred in ((MUJOCO_FORWARD, False), (MUJOCO_CENTRED, True)):
-        for eps in EPS:
-            error = relative_error(jacobian(eps, centred), reference.value)
-            points.append(Point(name, None, eps, error, reference.doubt, np.nan))
-
-        def clocked(centred: bool = centred) -> None:
-            for _ in range(_KNOTS):
-                jacobian(MUJOCO_EPS, centred)
-
-        cases[f"{name} None"] = clocked, _KNOTS
-    return points, cases
-
-
-def _drake(approximation: str, scene: Scene) -> tuple[list[Point], Cases]:
-    """Drake's automatic differentiation, against the extrapolated differences of its update.
-
-    RuntimeError: a step of Drake's does not converge.
-    """
-    step = drake_step.DrakeStep(scene.sim.model, scene.sim.time_step, approximation)
-    step.settle(scene.start, scene.u, scene.steps)
-    jacobian, reference = step.autodiff(), step.reference()
-    name = f"Drake {approximation.lower()}, {AUTODIFF}"
-    point = Point(name, None, None, relative_error(jacobian(), reference.value), reference.doubt, np.nan)
-
-    def clocked() -> None:
-        for _ in range(_CALLS):
-            jacobian()
-
-    return [point], {f"{name} None": (clocked, _CALLS)}

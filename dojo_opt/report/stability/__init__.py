@@ -1,5 +1,7 @@
-"""Stability: stiff and extreme scenes, each with its pass rule."""
+"""Stability of a robot: trials with a pass rule, at time steps of 1 to 50 ms."""
 
-from dojo_opt.report.stability.study import Stability
+from __future__ import annotations
 
-__all__ = ["Stability"]
+from dojo_opt.report.stability.robot_stability import RobotStability
+
+__all__ = ["RobotStability"]

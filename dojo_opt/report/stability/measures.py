@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dojo_opt.report import gauge
-from dojo_opt.report.engines import Run
+from dojo_opt.report.engine import Run
 from dojo_opt.report.stability.trial import Measure
 from sim.mechanism.mechanism import Mechanism
 

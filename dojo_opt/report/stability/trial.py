@@ -1,4 +1,4 @@
-"""Trial: one extreme scene with the rule by which it passes, stated before it runs."""
+"""A trial: one extreme scene with the rule by which it passes, stated before it runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from dojo_opt.report.engines import Engine, Run
+from dojo_opt.report.engine import Engine, Run
 from dojo_opt.report.gauge import complete
 from sim.mechanism.mechanism import Mechanism
 
@@ -28,7 +28,7 @@ NOT_GIVEN = "not given"  # a scene that this study does not translate for an eng
 
 
 @dataclass(frozen=True)
-class Trial:
+class StabilityTrial:
     """A motion, what is measured on it, and the largest value that passes.
 
     rule      in words, with unit and bar

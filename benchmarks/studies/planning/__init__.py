@@ -1,0 +1,7 @@
+"""Cost and violation of plans against run time, beside a planner on MuJoCo."""
+
+from __future__ import annotations
+
+from benchmarks.studies.planning.planning_study import PlanningStudy
+
+__all__ = ["PlanningStudy"]

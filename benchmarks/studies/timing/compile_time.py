@@ -1,0 +1,79 @@
+"""Report `compile`: what the first plan costs in a new process, with an empty and with a filled cache."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.report.result import Report, Row
+from dojo_opt.report.study import Progress
+
+# One new process: the import, the first plan, and the same plan again, which is the time of the solve alone.
+_PROGRAM = """
+import json, time
+wall, cpu = time.perf_counter(), time.process_time()
+import dojo_opt as dojo
+imported = time.perf_counter() - wall, time.process_time() - cpu
+plan = dojo.ilqr(dojo.problems.hop())
+first = time.perf_counter() - wall, time.process_time() - cpu
+wall, cpu = time.perf_counter(), time.process_time()
+again = dojo.ilqr(dojo.problems.hop())
+second = time.perf_counter() - wall, time.process_time() - cpu
+from solvers.compiler import compiled_signatures
+kernels = compiled_signatures()
+print(json.dumps({"import": imported, "first": first, "again": second, "success": bool(plan.success),
+                  "kernels": len(kernels), "signatures": sum(kernels.values()),
+                  "several": {k: n for k, n in kernels.items() if n > 1}}))
+"""
+
+
+@dataclass(frozen=True)
+class CompileTimeStudy:
+    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process."""
+
+    quick: bool = False
+
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        report = Report("Start of a new process, to the first planned hop")
+        starts = ["cold", *["warm"] * (1 if self.quick else 5)]
+        with tempfile.TemporaryDirectory() as folder:
+            cold, *warm = [_start(folder) for _ in progress([(name, None) for name in starts], "compile")]
+            size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
+        report.details = {"cold": cold, "warm": warm, "cache_bytes": size}
+
+        def median(what: str, clock: int) -> float:
+            return float(np.median([run[what][clock] for run in warm]))
+
+        beyond = float(np.median([run["first"][0] - run["again"][0] for run in warm]))
+        report.rows = [
+            Row("import dojo_opt", median("import", 0), "s", 0.7),
+            Row("cold start to first plan, CPU", cold["first"][1], "s", 40.0),
+            Row("cold start to first plan, wall", cold["first"][0], "s"),
+            Row("warm start to first plan, wall", median("first", 0), "s"),
+            Row("of which the solve", median("again", 0), "s", note="the same plan again"),
+            Row("of which the rest", beyond, "s", 1.5, note="imports, loading compiled code"),
+            Row("kernels", cold["kernels"], ""),
+            Row("signatures", cold["signatures"], ""),
+            Row("cache", size / 1e6, "MB"),
+        ]
+        if cold["several"]:
+            report.notes = ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
+        return report
+
+
+def _start(folder: str) -> dict[str, Any]:
+    """The program in a new process whose cache is below `folder`."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1"}
+    done = subprocess.run([sys.executable, "-c", _PROGRAM], env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"report compile: the measured process failed\n{done.stderr}")
+    return json.loads(done.stdout)

@@ -1,0 +1,95 @@
+"""The command line of studies: `dojo-opt report`, and `benchmarks/compare.py` with more of them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from dojo_opt.report.page import write_page
+from dojo_opt.report.study import STUDIES, Studies, run_reports
+from sim.io.urdf.load import load_urdf
+from sim.mechanism.parts import Contact
+
+CHECKOUT = "Reference scenes and other engines: python benchmarks/compare.py --help, from a checkout."
+MOVED = ("contact", "planning", "mechanics", "compile")  # studies that `dojo-opt report` had
+
+
+def add_arguments(parser: argparse.ArgumentParser, studies: Studies, moved: Sequence[str] = ()) -> None:
+    """Add the arguments of studies; the names in `moved` are refused with the command that has them."""
+    names = {"all": "every study", **{name: what for name, (what, *_) in studies.items()}}
+    listing = "; ".join(f"{name}: {what}" for name, what in names.items())
+    parser.add_argument("name", type=_named(names, moved), metavar="NAME", help=listing)
+    parser.add_argument("robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="the robot that is measured")
+    parser.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
+    parser.add_argument(
+        "--contacts",
+        nargs="+",
+        metavar="LINK[=RADIUS]",
+        help="links of ROBOT.urdf that touch the ground, with their shapes, or a ball about their origin [m]",
+    )
+    parser.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
+    parser.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
+
+
+def _named(names: dict[str, str], moved: Sequence[str]) -> Callable[[str], str]:
+    """The name of a study, checked."""
+
+    def checked(name: str) -> str:
+        if name in moved:
+            raise argparse.ArgumentTypeError(f"{name} is run from a checkout: python benchmarks/compare.py {name}")
+        if name not in names:
+            raise argparse.ArgumentTypeError(f"no study {name!r}; there are {', '.join(names)}")
+        return name
+
+    return checked
+
+
+def report(
+    args: argparse.Namespace, studies: Studies = STUDIES, program: Sequence[str] = ("dojo-opt", "report")
+) -> int:
+    """Run studies, print and write their reports.
+
+    Returns:
+        The exit status: 1 when a study ended with an error or, with --strict, a bar was missed.
+    """
+    mechanism = None
+    if args.robot is not None:
+        mechanism = load_urdf(args.robot, floating=not args.fixed, contacts=_contacts(args.contacts))
+    names = list(studies) if args.name == "all" else [args.name]
+    reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True, studies=studies)
+    for name, made in reports.items():
+        made.command = _command(args, name, program)
+    if args.json:
+        print(json.dumps({name: json.loads(made.as_json()) for name, made in reports.items()}, indent=1))
+    else:
+        print("\n\n".join(made.as_text() for made in reports.values()))
+    if args.out:
+        write_page(reports, args.out, _command(args, args.name, program))
+    missed = args.strict and not all(made.met() for made in reports.values())
+    return 1 if missed or any("error" in made.details for made in reports.values()) else 0
+
+
+def _contacts(words: Sequence[str] | None) -> list[str | Contact] | None:
+    """Links, and balls about their origins.  ValueError: a radius is no number."""
+    if words is None:
+        return None
+    found: list[str | Contact] = []
+    for word in words:
+        link, ball, radius = word.partition("=")
+        try:
+            found.append(Contact(link, (0.0, 0.0, 0.0), float(radius)) if ball else link)
+        except ValueError as error:
+            raise ValueError(f"--contacts {word}: expected LINK or LINK=RADIUS in metres: {error}") from None
+    return found
+
+
+def _command(args: argparse.Namespace, name: str, program: Sequence[str]) -> str:
+    """The command that measures a study again, with all that decides what is measured."""
+    robot, fixed = [str(args.robot)] if args.robot else [], ["--fixed"] * args.fixed
+    contacts = ["--contacts", *args.contacts] if args.contacts else []
+    return shlex.join([*program, name, *robot, *fixed, *contacts, *["--quick"] * args.quick])

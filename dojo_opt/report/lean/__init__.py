@@ -1,0 +1,7 @@
+"""The terms that a step of a robot omits, and what each of its features costs."""
+
+from __future__ import annotations
+
+from dojo_opt.report.lean.omitted_terms import OmittedTerms
+
+__all__ = ["OmittedTerms"]

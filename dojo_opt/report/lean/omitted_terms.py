@@ -1,0 +1,70 @@
+"""The terms that a step of a robot omits, and what each of its features costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dojo_opt.report.clock import ratio
+from dojo_opt.report.costs import COST_HEADER, Cost, CostScene, cost_row, costs, median_us, raw_cost
+from dojo_opt.report.lean.cost_figure import cost_figure
+from dojo_opt.report.lean.variants import robot_scene, without
+from dojo_opt.report.result import Report, Row, Table
+from dojo_opt.report.study import Progress
+from sim.mechanism.mechanism import Mechanism
+from solvers.compiler import threads
+
+
+@dataclass(frozen=True)
+class OmittedTerms:
+    """A robot as it is, and without each of its features; quick: fewer rounds."""
+
+    mechanism: Mechanism
+    quick: bool = False
+    time_step: float = 0.01  # [s]
+
+    def run(self, progress: Progress) -> Report:
+        """Measure."""
+        report = Report(f"What each feature of {self.mechanism.name} costs")
+        with threads(1):
+            _robot(report, self.mechanism, self.time_step, 15 if self.quick else 100, progress)
+        return report
+
+
+def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, progress: Progress) -> None:
+    """A robot as it is, and without each of its features."""
+    report.summary = (
+        f"{mechanism.name}, moving freely from its neutral state with {1e3 * time_step:g} ms steps; then without each "
+        "of its features. A feature costs what the robot takes less without it: processor time on one core, medians "
+        "over interleaved rounds."
+    )
+    scenes = [robot_scene(name, variant, time_step) for name, variant in without(mechanism)]
+    measured: list[Cost] = []
+    for batch in progress([(mechanism.name, scenes)], "lean"):
+        measured = costs(batch, rounds)
+    report.tables.append(
+        Table("The robot without its features", COST_HEADER, [cost_row(cost) for cost in measured], _messages(measured))
+    )
+    whole = measured[0]
+    for cost in measured[1:]:
+        saved = 1.0 - ratio(cost.total, whole.total)
+        note = f"{median_us(cost.total):.3g} of {median_us(whole.total):.3g} us"
+        report.rows.append(Row(f"{cost.name} saves of step and gradient", 100.0 * saved, "%", note=note))
+    report.details["robot"] = [raw_cost(cost) for cost in measured]
+    report.notes += [line.strip() for line in scenes[0].simulator.describe().partition("a step\n")[2].splitlines()]
+    report.notes += _far_notes(scenes[0], whole)
+    report.figure = cost_figure(mechanism.name, report.details["robot"])
+
+
+def _far_notes(scene: CostScene, cost: Cost) -> list[str]:
+    """What is far where the robot stands."""
+    if not np.isfinite(cost.iterations):
+        return ["the first step from the neutral state is not solved: " + cost.message]
+    far = scene.simulator.left_out(scene.state)
+    return [f"far in the neutral state: {', '.join(far) or 'nothing'}"]
+
+
+def _messages(measured: list[Cost]) -> str:
+    """Why motions ended early."""
+    return " ".join(f"{cost.name}: {cost.message}" for cost in measured if cost.message)

@@ -1,0 +1,1 @@
+"""Scenes, checks and doubles that tests share with one another, and with benchmarks/."""

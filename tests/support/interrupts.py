@@ -1,0 +1,53 @@
+"""Ctrl-C during a call, and how long it takes to be heard."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+HEARD = 0.2  # [s] of processor time of each thread within which a call has to answer
+_THREADS = os.cpu_count() or 1  # whose processor times are added
+
+
+class Heard(NamedTuple):
+    """What became of Ctrl-C."""
+
+    stop: KeyboardInterrupt | None  # None: the call had ended before
+    seconds: float  # of processor time, of all threads, from the signal to the exception
+
+
+def interrupt(call: Callable[[], Any], after: float) -> Heard:
+    """Send SIGINT to this process so many seconds after `call` has begun."""
+    sent: list[float] = []
+
+    def send() -> None:
+        sent.append(time.process_time())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(after, send)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    stop = None
+    try:
+        timer.start()
+        call()
+        timer.cancel()
+        timer.join()
+        time.sleep(0.01)  # a signal that came this late is heard here
+    except KeyboardInterrupt as error:
+        stop, end = error, time.process_time()
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, before)
+    return Heard(stop, end - sent[0] if stop else 0.0)
+
+
+def heard(call: Callable[[], Any], after: float = 0.3) -> Any:
+    """What the exception carries that Ctrl-C ends the call with, which has to come soon."""
+    found = interrupt(call, after)
+    assert found.stop is not None, f"the call took less than {after:g} s"
+    assert found.seconds < (1 + _THREADS) * HEARD, f"heard after {found.seconds:.2f} s"
+    return getattr(found.stop, "result", None)
