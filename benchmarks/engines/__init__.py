@@ -5,18 +5,18 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.util import find_spec
 
-from dojo_opt.report.engine import Engine, Run
+from dojo_opt.report.engine import PhysicsEngine, Run
 from dojo_opt.report.ours import Ours
 
-__all__ = ["Engine", "Ours", "Run", "installed"]
+__all__ = ["PhysicsEngine", "Ours", "Run", "installed"]
 
 # package that has to be there -> module of this folder with `engines()`
 _PEERS = {"mujoco": "mujoco", "pydrake": "drake", "pybullet": "bullet"}
 
 
-def installed() -> list[Engine]:
+def installed() -> list[PhysicsEngine]:
     """One engine per integrator of every peer that can be imported here."""
-    peers: list[Engine] = []
+    peers: list[PhysicsEngine] = []
     for package, module in _PEERS.items():
         if find_spec(package) is not None:
             peers += import_module(f"benchmarks.engines.{module}").engines()

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from benchmarks.engines.apart import ProcessEnded
-from dojo_opt.report.engine import Engine, Run, observe
+from dojo_opt.report.engine import PhysicsEngine, Run, observe
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 
@@ -25,7 +25,7 @@ def ended(simulate: Simulate) -> Simulate:
     """
 
     @wraps(simulate)
-    def run(engine: Engine, mechanism: Mechanism, **given: Any) -> Run:
+    def run(engine: PhysicsEngine, mechanism: Mechanism, **given: Any) -> Run:
         try:
             return simulate(engine, mechanism, **given)
         except ValueError:

@@ -35,7 +35,7 @@ class Run(NamedTuple):
     message: str = ""  # why it stopped early
 
 
-class Engine(Protocol):
+class PhysicsEngine(Protocol):
     """A simulator with its settings."""
 
     @property

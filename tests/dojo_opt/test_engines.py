@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from benchmarks.engines import Engine, Ours, Run, installed
+from benchmarks.engines import Ours, PhysicsEngine, Run, installed
 from benchmarks.engines.ended import ended
 from benchmarks.studies import stability
 from benchmarks.studies.stability import StabilityStudy
@@ -24,7 +24,9 @@ ENGINES = [Ours(rounds=1), *installed()]
 SECOND_ORDER = [e for e in ENGINES if e.name in ("dojo-opt", "MuJoCo RK4")]
 
 
-def swing(engine: Engine, time_step: float = 1e-3, duration: float = 0.5, samples: int = 5, **kwargs: object) -> Run:
+def swing(
+    engine: PhysicsEngine, time_step: float = 1e-3, duration: float = 0.5, samples: int = 5, **kwargs: object
+) -> Run:
     mech = dojo.models.npendulum(2, spring=3.0)
     return engine.simulate(
         mech, time_step=time_step, q=[0.6, -0.4], v=[1.0, 2.0], duration=duration, samples=samples, **kwargs
@@ -32,7 +34,7 @@ def swing(engine: Engine, time_step: float = 1e-3, duration: float = 0.5, sample
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda e: e.name)
-def test_a_run_has_the_shapes_it_promises(engine: Engine) -> None:
+def test_a_run_has_the_shapes_it_promises(engine: PhysicsEngine) -> None:
     run = swing(engine)
     np.testing.assert_allclose(run.time, np.linspace(0.0, 0.5, 6), atol=1e-12)
     shapes = [run.position.shape, run.quaternion.shape, run.velocity.shape, run.energy.shape, run.momentum.shape]
@@ -42,7 +44,7 @@ def test_a_run_has_the_shapes_it_promises(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda e: e.name)
-def test_the_start_is_the_same_for_all(engine: Engine) -> None:
+def test_the_start_is_the_same_for_all(engine: PhysicsEngine) -> None:
     """Poses, velocities, energy and momentum of the first sample, against the sums over the bodies by hand."""
     run, first = swing(engine), swing(ENGINES[0])
     for name in ("position", "quaternion", "velocity", "energy", "momentum"):
@@ -51,7 +53,7 @@ def test_the_start_is_the_same_for_all(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("engine", SECOND_ORDER, ids=lambda e: e.name)
-def test_velocity_is_the_derivative_of_position(engine: Engine) -> None:
+def test_velocity_is_the_derivative_of_position(engine: PhysicsEngine) -> None:
     run = swing(engine, duration=0.1, samples=100)
     rate = (run.position[2:] - run.position[:-2]) / 2e-3
     np.testing.assert_allclose(run.velocity[1:-1, :, :3], rate, atol=2e-4)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engines import Engine, installed
+from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.accuracy import accuracy_scenes as scenes
 from benchmarks.studies.accuracy import robot_settings as robots
 from dojo_opt.report.accuracy import RobotAccuracy
@@ -138,7 +138,7 @@ def _tabulate(report: Report, scene: SmoothScene, measured: Curves) -> None:
     report.tables.append(Table(f"{scene.name}, {scene.duration:g} s", header, rows))
 
 
-def _pieces(report: Report, everyone: list[Engine], quick: bool) -> None:
+def _pieces(report: Report, everyone: list[PhysicsEngine], quick: bool) -> None:
     """Short pieces restarted from the reference."""
     cut = curves.cut(scenes.tree(1.0), 3 if quick else 10, 0.1)
     steps = (0.05, 0.01) if quick else (0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
@@ -147,7 +147,7 @@ def _pieces(report: Report, everyone: list[Engine], quick: bool) -> None:
     report.tables.append(Table(title, ["engine", *(f"{1e3 * h:g} ms" for h in steps)], rows))
 
 
-def _long_runs(report: Report, everyone: list[Engine], quick: bool) -> None:
+def _long_runs(report: Report, everyone: list[PhysicsEngine], quick: bool) -> None:
     """Largest energy error of pendulums over 100 s, relative to M g L."""
     rows: list[list[Cell]] = []
     seconds = 10.0 if quick else 100.0
@@ -167,7 +167,7 @@ def _long_runs(report: Report, everyone: list[Engine], quick: bool) -> None:
     report.tables.append(Table(f"Energy over {seconds:g} s, in units of M g L", header, rows))
 
 
-def _once(engine: Engine) -> Engine:
+def _once(engine: PhysicsEngine) -> PhysicsEngine:
     """The same engine, clocked once: for long runs."""
     from dataclasses import fields, is_dataclass, replace
 

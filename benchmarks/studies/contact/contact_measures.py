@@ -7,7 +7,7 @@ from math import cos, nan, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.engines import Engine, Run
+from benchmarks.engines import PhysicsEngine, Run
 from benchmarks.studies.contact import contact_scenes as scenes
 from benchmarks.studies.contact.contact_scenes import Scene
 from dojo_opt.report.gauge import complete, gaps, penetration
@@ -18,7 +18,7 @@ Numbers = dict[str, float]
 DIRECTIONS = np.deg2rad([0.0, 11.3, 30.0, 45.0, 90.0, 135.0, 200.0, 300.0])
 
 
-def sliding(engine: Engine, time_step: float, directions: Floats = DIRECTIONS) -> Numbers:
+def sliding(engine: PhysicsEngine, time_step: float, directions: Floats = DIRECTIONS) -> Numbers:
     """Worst over the directions, relative to the distance v^2/(2 mu g):
 
     stop      error of the stopping distance         spread   longest minus shortest
@@ -42,7 +42,7 @@ def sliding(engine: Engine, time_step: float, directions: Floats = DIRECTIONS) -
     return {**numbers, "us_per_step": float(np.median(seconds))}
 
 
-def creep(engine: Engine, time_step: float, duration: float = 10.0) -> Numbers:
+def creep(engine: PhysicsEngine, time_step: float, duration: float = 10.0) -> Numbers:
     """drift [m] of the block on the slope, and the speed of its creep after the first tenth of the time [m/s]."""
     run = scenes.on_slope(duration).run(engine, time_step)
     if not complete(run):
@@ -59,43 +59,43 @@ def _fall(scene: Scene, run: Run) -> Numbers:
     return {"depth": penetration(scene.mechanism, run), "rest": rest, "rebound": float(run.velocity[:, 0, 2].max())}
 
 
-def ball_drop(engine: Engine, time_step: float) -> Numbers:
+def ball_drop(engine: PhysicsEngine, time_step: float) -> Numbers:
     """Deepest and last penetration [m] of the ball dropped from 1 m, and its fastest way up [m/s]."""
     scene = scenes.ball_drop()
     return _fall(scene, scene.run(engine, time_step))
 
 
-def box_drop(engine: Engine, time_step: float) -> Numbers:
+def box_drop(engine: PhysicsEngine, time_step: float) -> Numbers:
     """The same of the box on a corner; it may rise where the corners push it over."""
     scene = scenes.box_drop()
     return _fall(scene, scene.run(engine, time_step))
 
 
-def ball_impact(engine: Engine, time_step: float) -> Numbers:
+def ball_impact(engine: PhysicsEngine, time_step: float) -> Numbers:
     """The same of the ball at 100 m/s."""
     scene = scenes.ball_impact(time_step)
     return _fall(scene, scene.run(engine, time_step))
 
 
-def box_impact(engine: Engine, time_step: float) -> Numbers:
+def box_impact(engine: PhysicsEngine, time_step: float) -> Numbers:
     """The same of the box at 100 m/s, while it tumbles."""
     scene = scenes.box_impact(time_step)
     return _fall(scene, scene.run(engine, time_step))
 
 
-def pushed(engine: Engine, time_step: float) -> float:
+def pushed(engine: PhysicsEngine, time_step: float) -> float:
     """Error of the displacement of the cube under the ramp of force [m]; the answer is analytic."""
     run = scenes.ramp(time_step).run(engine, time_step)
     return float(run.position[-1, 0, 0] - scenes.ramp_displacement()) if complete(run) else nan
 
 
-def torso(engine: Engine, time_step: float) -> Floats:
+def torso(engine: PhysicsEngine, time_step: float) -> Floats:
     """Height of the trunk of the dropped quadruped, (21,) [m]."""
     run = scenes.robot_drop().run(engine, time_step)
     return run.position[:, 0, 2] if complete(run) else np.full(21, nan)
 
 
-def inconsistency(engine: Engine, time_steps: list[float], reference: float) -> list[float]:
+def inconsistency(engine: PhysicsEngine, time_steps: list[float], reference: float) -> list[float]:
     """Mean distance of the tossed cube from the same engine at the time step `reference` [m], per time step."""
     scene = scenes.toss()
     exact = scene.run(engine, reference)

@@ -11,7 +11,7 @@ from math import cos, radians, sin
 import numpy as np
 from numpy.typing import ArrayLike
 
-from benchmarks.engines import Engine, Run
+from benchmarks.engines import PhysicsEngine, Run
 from dojo_opt.models.block import block
 from dojo_opt.models.quadruped import quadruped
 from dojo_opt.models.sphere import sphere
@@ -36,7 +36,7 @@ class Scene:
     inputs: ArrayLike | None = None
     samples: int | None = None
 
-    def run(self, engine: Engine, time_step: float) -> Run:
+    def run(self, engine: PhysicsEngine, time_step: float) -> Run:
         """Its motion by one engine."""
         return engine.simulate(
             self.mechanism,

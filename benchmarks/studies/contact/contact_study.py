@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engines import Engine, Ours, installed
+from benchmarks.engines import Ours, PhysicsEngine, installed
 from benchmarks.studies.contact import contact_measures as measure
 from benchmarks.studies.contact import contact_scenes as scenes
 from benchmarks.studies.contact import simbenchmark
@@ -56,7 +56,7 @@ class ContactStudy:
         report = Report("Contact: sliding, rest and impact", summary=SUMMARY)
         report.notes += NOTES
         steps = (1e-2,) if self.quick else (1e-3, 1e-2)
-        engines: list[tuple[str, Engine]] = [
+        engines: list[tuple[str, PhysicsEngine]] = [
             (f"dojo-opt, kappa {kappa:g}", Ours(kappa=kappa, rounds=1)) for kappa in KAPPAS
         ]
         engines += [(peer.name, peer) for peer in _peers(self.quick)]
@@ -76,7 +76,7 @@ class ContactStudy:
         report.figure = picture(results, curve, f"{steps[-1]:g}")
         return report
 
-    def _at(self, engine: Engine, time_step: float) -> dict[str, Any]:
+    def _at(self, engine: PhysicsEngine, time_step: float) -> dict[str, Any]:
         """All scenes at one time step."""
         directions = measure.DIRECTIONS[[0, 1, 3, 6]] if self.quick else measure.DIRECTIONS
         return {
@@ -89,13 +89,13 @@ class ContactStudy:
             "box 100 m/s": measure.box_impact(engine, time_step),
         }
 
-    def _rates(self, engine: Engine) -> dict[str, float]:
+    def _rates(self, engine: PhysicsEngine) -> dict[str, float]:
         """Largest distance of the trunk's height from that at the reference step, per rate [m]."""
         rates = (20, 100) if self.quick else RATES
         exact = measure.torso(engine, RATE_REFERENCE)
         return {str(r): float(np.abs(measure.torso(engine, 1.0 / r) - exact).max()) for r in rates}
 
-    def _toss(self, engine: Engine) -> dict[str, float]:
+    def _toss(self, engine: PhysicsEngine) -> dict[str, float]:
         """Mean distance of the tossed cube from the same engine at the reference step, per time step [m]."""
         steps = list(TOSS_STEPS[:2] if self.quick else TOSS_STEPS)
         found = measure.inconsistency(engine, steps, 1e-3 if self.quick else TOSS_REFERENCE)
@@ -113,7 +113,7 @@ class ContactStudy:
         }
 
 
-def _peers(quick: bool) -> list[Engine]:
+def _peers(quick: bool) -> list[PhysicsEngine]:
     """Those installed, and MuJoCo with the hardest contacts that hold."""
     peers = [engine for engine in installed() if engine.name not in _LEFT_OUT]
     if find_spec("mujoco") is not None:

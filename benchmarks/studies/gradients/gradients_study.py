@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.engines import Engine, installed
+from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.gradients import drake_motion, drake_step, peer_steps, sliding, smoothing, touchdown
 from benchmarks.studies.gradients.gradients_figure import draw
 from benchmarks.studies.gradients.gradients_tables import motion_table, resting_table, smoothing_table
@@ -146,7 +146,7 @@ def _drakes(quick: bool) -> tuple[str, ...]:
     return drake_step.APPROXIMATIONS[: 1 if quick else None]
 
 
-def _able(report: Report, quick: bool) -> list[Engine]:
+def _able(report: Report, quick: bool) -> list[PhysicsEngine]:
     """Engines that can simulate the block; a note for those that cannot."""
     engines = []
     for engine in installed():

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import dojo_opt as dojo
-from benchmarks.engines import Engine, mujoco_scene
+from benchmarks.engines import PhysicsEngine, mujoco_scene
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
 
@@ -112,7 +112,7 @@ def ours_differenced(motion: SlidingMotion, time_step: float, eps: float, kappa:
     return derivative("dojo-opt", f"differences of {eps:g}", kappa, motion, time_step, _central(way, motion, eps))
 
 
-def differenced(engine: Engine, motion: SlidingMotion, time_step: float, eps: float) -> Derivative:
+def differenced(engine: PhysicsEngine, motion: SlidingMotion, time_step: float, eps: float) -> Derivative:
     """Any other engine, from its own state of rest."""
     sim = Simulator(motion.mechanism, time_step=time_step)
     still = np.zeros(sim.nv), np.zeros(sim.nu)
@@ -174,7 +174,9 @@ def _start_slope(sim: Simulator, motion: SlidingMotion) -> Vector:
     return S
 
 
-def _end(engine: Engine, motion: SlidingMotion, h: float, q: Vector, v: Vector, u: Vector, duration: float) -> Vector:
+def _end(
+    engine: PhysicsEngine, motion: SlidingMotion, h: float, q: Vector, v: Vector, u: Vector, duration: float
+) -> Vector:
     """Pose at the end, which is what the coordinates of a block are; NaN when the engine stopped before."""
     run = engine.simulate(motion.mechanism, time_step=h, q=q, v=v, duration=duration, samples=1, inputs=u)
     if run.message:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.engines import Engine, installed
+from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.stability import body_trials, chain_trials, ground_trials, joint_trials, stack_trials
 from dojo_opt.report.result import Report
 from dojo_opt.report.stability import RobotStability
@@ -54,6 +54,6 @@ class StabilityStudy:
         rooms = (ground_trials, stack_trials, joint_trials, body_trials, chain_trials)
         return [trial for room in rooms for trial in room.trials()]
 
-    def _peers(self) -> list[Engine]:
+    def _peers(self) -> list[PhysicsEngine]:
         peers = [engine for engine in installed() if engine.name not in _LEFT_OUT]
         return peers[1:2] if self.quick else peers

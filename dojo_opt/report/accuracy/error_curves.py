@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.report.accuracy.smooth_scene import SAMPLES, SmoothScene
-from dojo_opt.report.engine import Engine, Run, observe
+from dojo_opt.report.engine import PhysicsEngine, Run, observe
 from dojo_opt.report.ours import Ours
 from sim.simulator.simulator import Simulator
 
@@ -35,7 +35,7 @@ class Point(NamedTuple):
 Curves = dict[str, list[Point]]  # by the name of the engine
 
 
-def engines(rounds: int, peers: Sequence[Engine] = ()) -> list[Engine]:
+def engines(rounds: int, peers: Sequence[PhysicsEngine] = ()) -> list[PhysicsEngine]:
     """All orders of ours, solved to rounding, and the peers."""
     return [*(ours(order, rounds) for order in (2, 4, 6, 8)), *peers]
 
@@ -45,7 +45,7 @@ def ours(order: int, rounds: int) -> Ours:
     return Ours(order=order, tolerance=1e-14, rounds=rounds)
 
 
-def measure(scene: SmoothScene, engines: Sequence[Engine], steps: Sequence[float], limit: float) -> Curves:
+def measure(scene: SmoothScene, engines: Sequence[PhysicsEngine], steps: Sequence[float], limit: float) -> Curves:
     """Errors of the engines from the largest time step down to the first that would take longer than `limit` [s].
 
     Engines take turns at every step, so that a busy minute of the machine hits all of them alike. Ours of order 2,
@@ -65,7 +65,7 @@ def measure(scene: SmoothScene, engines: Sequence[Engine], steps: Sequence[float
     return curves
 
 
-def point(scene: SmoothScene, engine: Engine, h: float, exact: Run) -> Point:
+def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> Point:
     """One run against the reference; one that the engine refuses has infinite errors, and says why."""
     args: dict[str, Any] = {"time_step": h, "q": scene.q, "v": scene.v, "duration": scene.duration}
     try:
@@ -130,7 +130,7 @@ class Cut(NamedTuple):
     v: Floats  # (count + 1, nv)
     position: Floats  # (count + 1, nbody, 3) [m]
 
-    def error(self, engine: Engine, h: float) -> float:
+    def error(self, engine: PhysicsEngine, h: float) -> float:
         """Largest distance of a body from the reference at the end of a piece, mean over the pieces [m]."""
         errors = []
         for k in range(len(self.q) - 1):

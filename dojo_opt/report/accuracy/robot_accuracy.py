@@ -14,9 +14,9 @@ from dojo_opt.report.accuracy import error_curves as curves
 from dojo_opt.report.accuracy import error_figure as drawing
 from dojo_opt.report.accuracy import smooth_scene as scenes
 from dojo_opt.report.accuracy.advice import hints, recommendation
-from dojo_opt.report.accuracy.setting_trial import SettingTrial
+from dojo_opt.report.accuracy.setting_trial import DURATION, PIECE, PIECES, SettingTrial
 from dojo_opt.report.accuracy.starting_pose import start
-from dojo_opt.report.engine import Engine
+from dojo_opt.report.engine import PhysicsEngine
 from dojo_opt.report.ours import Ours
 from dojo_opt.report.result import Cell, Report, Row, Table
 from dojo_opt.report.study import Progress
@@ -26,8 +26,6 @@ from solvers.compiler import threads
 
 Floats = NDArray[np.float64]
 
-_PIECE, _PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
-_DURATION = _PIECE * _PIECES
 _TARGET = 1e-3  # [m] error that is asked for after a piece
 _CONVERGED = 1e-2  # [m] beyond which there is no motion to compare with
 _STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
@@ -45,7 +43,7 @@ class RobotAccuracy:
 
     mechanism: Mechanism
     quick: bool = False
-    peers: Sequence[Engine] = ()
+    peers: Sequence[PhysicsEngine] = ()
 
     def run(self, progress: Progress) -> Report:
         """Measure.
@@ -57,11 +55,11 @@ class RobotAccuracy:
             return _recommend(self.mechanism, self.quick, progress, self.peers)
 
 
-def _recommend(mechanism: Mechanism, quick: bool, progress: Progress, peers: Sequence[Engine]) -> Report:
+def _recommend(mechanism: Mechanism, quick: bool, progress: Progress, peers: Sequence[PhysicsEngine]) -> Report:
     report = Report(f"Accuracy of {mechanism.name}")
     report.summary = (
-        f"{_DURATION:g} s of motion from a random start that is always the same, joints without torques, with contacts "
-        f"and limits, cut into {_PIECES} pieces that each start on the converged motion (Erez, Tassa, Todorov, 2015). "
+        f"{DURATION:g} s of motion from a random start that is always the same, joints without torques, with contacts "
+        f"and limits, cut into {PIECES} pieces that each start on the converged motion (Erez, Tassa, Todorov, 2015). "
         "Errors are the largest distance of a body's centre of mass from it at the end of a piece, means over the "
         "pieces. The converged motion is the same simulator with a much smaller step and kappa; for the motion without "
         "contacts and limits, uncut, it is an independent ODE."
@@ -78,7 +76,7 @@ def _recommend(mechanism: Mechanism, quick: bool, progress: Progress, peers: Seq
     if unknown:
         report.notes.append(f"not compared with an independent ODE: that has no {unknown}")
     else:
-        scene = replace(scenes.smooth(mechanism, q, v, _DURATION), name="without contact")
+        scene = replace(scenes.smooth(mechanism, q, v, DURATION), name="without contact")
         parts.append(("smooth motion", lambda: _smooth(report, scene, peers, quick)))
     for part in progress(parts, "accuracy"):
         part()
@@ -88,9 +86,9 @@ def _recommend(mechanism: Mechanism, quick: bool, progress: Progress, peers: Seq
 class Converged(NamedTuple):
     """The motion with a very small step, where pieces start and end."""
 
-    q: Floats  # (_PIECES + 1, nq)
-    v: Floats  # (_PIECES + 1, nv) at the node
-    position: Floats  # (_PIECES + 1, nbody, 3) [m]
+    q: Floats  # (PIECES + 1, nq)
+    v: Floats  # (PIECES + 1, nv) at the node
+    position: Floats  # (PIECES + 1, nbody, 3) [m]
     time_step: float
     kappa: float
 
@@ -100,8 +98,8 @@ def _converged(mechanism: Mechanism, q: Floats, v: Floats, quick: bool) -> Conve
     message = ""
     for fine, kappa in _SHARP[1:] if quick else _SHARP:
         sim = Simulator(mechanism, time_step=fine, kappa=kappa)
-        every = round(_PIECE / fine)
-        motion = sim.rollout(sim.start(q, v), np.zeros((_PIECES * every, sim.nu)))
+        every = round(PIECE / fine)
+        motion = sim.rollout(sim.start(q, v), np.zeros((PIECES * every, sim.nu)))
         if motion.success:
             x = motion.x[::every]
             return Converged(x[:, : sim.nq], sim.velocity(x), sim.maximal(x)[..., :3], fine, kappa)
@@ -114,9 +112,9 @@ def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float,
     h, kappa, tolerance = settings
     engine = Ours(kappa=kappa, tolerance=tolerance, rounds=rounds)
     errors, seconds = [], 0.0
-    for k in range(_PIECES):
+    for k in range(PIECES):
         q, v = exact.q[k], exact.v[k]
-        run = engine.simulate(mechanism, time_step=h, q=q, v=v, duration=_PIECE, samples=1)
+        run = engine.simulate(mechanism, time_step=h, q=q, v=v, duration=PIECE, samples=1)
         if run.message:
             return SettingTrial(h, kappa, tolerance, np.inf, 0.0, run.message)
         errors.append(float(np.linalg.norm(run.position[-1] - exact.position[k + 1], axis=-1).max()))
@@ -156,7 +154,7 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
     report.rows += [
         Row("recommended time step", 1e3 * best.time_step, "ms", note=str(best)),
         Row("recommended kappa", best.kappa, "N s m"),
-        Row(f"its error after {_PIECE:g} s", 1e3 * best.error, "mm", 1e3 * target),
+        Row(f"its error after {PIECE:g} s", 1e3 * best.error, "mm", 1e3 * target),
         Row("its speed", best.realtime, "times real time"),
         Row(
             "the converged motion, against twice its step",
@@ -188,7 +186,7 @@ def choose(trials: Sequence[SettingTrial], target: float = _TARGET) -> SettingTr
     return min(trials, key=lambda t: t.error)
 
 
-def _smooth(report: Report, scene: scenes.SmoothScene, peers: Sequence[Engine], quick: bool) -> None:
+def _smooth(report: Report, scene: scenes.SmoothScene, peers: Sequence[PhysicsEngine], quick: bool) -> None:
     """The same start without contacts and limits, against the ODE, for all orders and peers."""
     everyone = curves.engines(1 if quick else 3, peers)
     steps = (0.05, 0.01, 0.002) if quick else (0.05, 0.025, 0.01, 0.005, 0.0025, 0.001)
@@ -198,7 +196,7 @@ def _smooth(report: Report, scene: scenes.SmoothScene, peers: Sequence[Engine], 
             name,
             1e3 * p.time_step,
             1e3 * p.errors["position"],
-            _DURATION / p.seconds if p.seconds else None,
+            DURATION / p.seconds if p.seconds else None,
             p.errors["energy"],
             p.message,
         ]
@@ -212,7 +210,7 @@ def _smooth(report: Report, scene: scenes.SmoothScene, peers: Sequence[Engine], 
     good = [(p, name) for p, name in ours if p.errors["position"] <= _TARGET]
     if good:
         p, name = min(good, key=lambda pair: pair[0].seconds)
-        note = f"{name}, h = {1e3 * p.time_step:g} ms, {_DURATION / p.seconds:.3g} times real time"
+        note = f"{name}, h = {1e3 * p.time_step:g} ms, {DURATION / p.seconds:.3g} times real time"
         report.rows.append(Row("smooth motion: cheapest to the target", 1e3 * p.errors["position"], "mm", note=note))
     if report.figure is None:
         panels = [("", "position", f"{scene.mechanism.name}: position [m]"), ("", "energy", "energy, relative")]
@@ -242,7 +240,7 @@ def _figure(name: str, best: SettingTrial, trials: Sequence[SettingTrial], own: 
     axis.axhline(1e3 * target, color="k", lw=0.8, ls=":", label="asked for")
     if np.isfinite(own) and own > 0.0:
         axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="the converged motion itself")
-    axis.set(xlabel=f"processor time of {_DURATION:g} s [ms]", ylabel="position error [mm]")
+    axis.set(xlabel=f"processor time of {DURATION:g} s [ms]", ylabel="position error [mm]")
     axis.set_title(f"{name}: error against run time (numbers: time step in ms)", fontsize=10)
     axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     axis.grid(alpha=0.3)

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+PIECE, PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
+DURATION = PIECE * PIECES
+
 
 @dataclass(frozen=True)
 class SettingTrial:
@@ -19,11 +24,11 @@ class SettingTrial:
     @property
     def realtime(self) -> float:
         """How many times faster than the motion itself."""
-        return _DURATION / self.seconds if self.seconds > 0.0 else 0.0
+        return DURATION / self.seconds if self.seconds > 0.0 else 0.0
 
     def __str__(self) -> str:
         size = f"{1e3 * self.error:.2g} mm" if np.isfinite(self.error) else "lost"
         return (
             f"h = {1e3 * self.time_step:g} ms, kappa {self.kappa:g}, tolerance {self.tolerance:g}: {size} after "
-            f"{_PIECE:g} s, {self.realtime:.3g} times real time"
+            f"{PIECE:g} s, {self.realtime:.3g} times real time"
         )

@@ -7,10 +7,10 @@ from itertools import compress
 from math import isnan
 from typing import Any
 
-from dojo_opt.report.engine import Engine
+from dojo_opt.report.engine import PhysicsEngine
 from dojo_opt.report.ours import Ours
 from dojo_opt.report.result import Cell, Report, Row, Table
-from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, TrialVerdict
 from dojo_opt.report.stability.verdict_figure import picture
 from dojo_opt.report.study import Progress
 
@@ -18,8 +18,8 @@ KAPPA = 1e-10  # [N s m] the default of 1 kg at 10 ms: hard, and solved as relia
 
 
 def judge(
-    report: Report, trials: Sequence[StabilityTrial], peers: Sequence[Engine], progress: Progress
-) -> list[Verdict]:
+    report: Report, trials: Sequence[StabilityTrial], peers: Sequence[PhysicsEngine], progress: Progress
+) -> list[TrialVerdict]:
     """Run every trial by every engine, and add the verdicts to the report.
 
     Args:
@@ -31,7 +31,7 @@ def judge(
     Returns:
         The verdict on ours for each trial.
     """
-    verdicts: dict[str, list[Verdict]] = {name: [] for name in ("dojo-opt", *(peer.name for peer in peers))}
+    verdicts: dict[str, list[TrialVerdict]] = {name: [] for name in ("dojo-opt", *(peer.name for peer in peers))}
     report.details["trials"] = []
     for trial in progress([(trial.name, trial) for trial in trials], "stability"):
         numbers = _measure(trial, peers, verdicts)
@@ -46,7 +46,9 @@ def judge(
     return verdicts["dojo-opt"]
 
 
-def _measure(trial: StabilityTrial, peers: Sequence[Engine], verdicts: dict[str, list[Verdict]]) -> dict[str, Any]:
+def _measure(
+    trial: StabilityTrial, peers: Sequence[PhysicsEngine], verdicts: dict[str, list[TrialVerdict]]
+) -> dict[str, Any]:
     """One trial by every engine; verdicts are appended, numbers returned."""
     ours = Ours(kappa=trial.kappa or KAPPA, tolerance=trial.tolerance, rounds=1)
     numbers: dict[str, Any] = {"group": trial.group, "name": trial.name, "rule": trial.rule, "bar": trial.bar}
@@ -55,7 +57,7 @@ def _measure(trial: StabilityTrial, peers: Sequence[Engine], verdicts: dict[str,
         try:
             run = trial.run(engine, 0.0 if own else trial.peer_duration)
         except ValueError as error:
-            verdict = Verdict(float("nan"), False, NOT_GIVEN)
+            verdict = TrialVerdict(float("nan"), False, NOT_GIVEN)
             found: dict[str, Any] = {"message": str(error)}
         else:
             verdict = trial.judge(run, ours=own)
@@ -68,7 +70,7 @@ def _measure(trial: StabilityTrial, peers: Sequence[Engine], verdicts: dict[str,
 
 
 def _tables(
-    trials: Sequence[StabilityTrial], verdicts: dict[str, list[Verdict]], numbers: Sequence[dict[str, Any]]
+    trials: Sequence[StabilityTrial], verdicts: dict[str, list[TrialVerdict]], numbers: Sequence[dict[str, Any]]
 ) -> list[Table]:
     """One table per group, the engines side by side."""
     tables = []
@@ -87,13 +89,13 @@ def _tables(
     return [*tables, Table("passed", ("", *verdicts), passed)]
 
 
-def _share(verdicts: Sequence[Verdict]) -> str:
+def _share(verdicts: Sequence[TrialVerdict]) -> str:
     """How many passed, of those that were given."""
     given = [verdict.passed for verdict in verdicts if verdict.text != NOT_GIVEN]
     return f"{sum(given)} of {len(given)}" if given else ""
 
 
-def _passed(verdicts: Sequence[Verdict]) -> Row:
+def _passed(verdicts: Sequence[TrialVerdict]) -> Row:
     """How many trials of ours passed; all have to."""
     count, refused = sum(verdict.passed for verdict in verdicts), sum(v.text == "refused" for v in verdicts)
     note = f"{refused} of them by a refusal, as their rules ask" if refused else ""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dojo_opt.report.engine import Engine
+from dojo_opt.report.engine import PhysicsEngine
 from dojo_opt.report.result import Report
 from dojo_opt.report.stability.judging import KAPPA, judge
 from dojo_opt.report.stability.robot_trials import robot_trials
-from dojo_opt.report.stability.trial import StabilityTrial, Verdict
+from dojo_opt.report.stability.trial import StabilityTrial, TrialVerdict
 from dojo_opt.report.study import Progress
 from sim.mechanism.mechanism import Mechanism
 
@@ -30,7 +30,7 @@ class RobotStability:
 
     mechanism: Mechanism
     quick: bool = False
-    peers: Sequence[Engine] = ()
+    peers: Sequence[PhysicsEngine] = ()
 
     def run(self, progress: Progress) -> Report:
         """Judge every trial."""
@@ -40,7 +40,7 @@ class RobotStability:
         return report
 
 
-def _advice(trials: Sequence[StabilityTrial], verdicts: Sequence[Verdict]) -> str:
+def _advice(trials: Sequence[StabilityTrial], verdicts: Sequence[TrialVerdict]) -> str:
     """The largest time step up to which everything passes."""
     good = 0.0
     for trial, verdict in zip(trials, verdicts, strict=True):

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
-from dojo_opt.report.engine import Engine, Run
+from dojo_opt.report.engine import PhysicsEngine, Run
 from dojo_opt.report.gauge import complete
 from sim.mechanism.mechanism import Mechanism
 
 Measure = Callable[[Mechanism, Run], float]
 
 
-class Verdict(NamedTuple):
+class TrialVerdict(NamedTuple):
     """What an engine made of a trial."""
 
     value: float  # not-a-number where it did not get through
@@ -55,7 +55,7 @@ class StabilityTrial:
     peer_duration: float = 0.0  # [s] of other engines, where the whole would take minutes; 0: the whole
     slow: bool = False  # left out of quick runs
 
-    def run(self, engine: Engine, duration: float = 0.0) -> Run:
+    def run(self, engine: PhysicsEngine, duration: float = 0.0) -> Run:
         """The motion by one engine, the whole or part of it."""
         seconds = duration or self.duration
         steps = round(seconds / self.time_step)
@@ -69,17 +69,17 @@ class StabilityTrial:
             inputs=self.inputs,
         )
 
-    def judge(self, run: Run, *, ours: bool) -> Verdict:
+    def judge(self, run: Run, *, ours: bool) -> TrialVerdict:
         """The rule applied.
 
         Only ours is asked to refuse what cannot be represented; an engine that goes on is measured.
         """
         if self.refusal and ours:
             refused = self.refusal in run.message
-            return Verdict(0.0 if refused else nan, refused, "refused" if refused else "not refused")
+            return TrialVerdict(0.0 if refused else nan, refused, "refused" if refused else "not refused")
         if not complete(run):
             ended = run.message.startswith("ended ")  # the process of the engine
-            return Verdict(nan, False, run.message if ended else f"failed at {run.time[-1]:.2g} s")
+            return TrialVerdict(nan, False, run.message if ended else f"failed at {run.time[-1]:.2g} s")
         value = self.measure(self.mechanism, run)
         passed = bool(value <= self.bar)
-        return Verdict(value, passed, f"{value:.2g}" + ("" if passed else " x"))
+        return TrialVerdict(value, passed, f"{value:.2g}" + ("" if passed else " x"))

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, Verdict
+from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, TrialVerdict
 
 _LEGEND = (
     "green: passed; red: not (x: above the bar of its rule); yellow: refused with a reason; grey: not represented.\n"
@@ -16,7 +16,7 @@ _LEGEND = (
 )
 
 
-def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[Verdict]]) -> Figure:
+def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[TrialVerdict]]) -> Figure:
     """Green where the rule is met, red where it is not, yellow where a scene is refused, grey where it is not given."""
     rows, columns = len(trials), len(verdicts)
     figure = Figure(figsize=(6.5 + 1.15 * columns, 1.6 + 0.26 * rows), layout="constrained")
@@ -39,7 +39,7 @@ def picture(trials: Sequence[StabilityTrial], verdicts: Mapping[str, Sequence[Ve
     return figure
 
 
-def _colour(verdict: Verdict) -> int:
+def _colour(verdict: TrialVerdict) -> int:
     if verdict.text == NOT_GIVEN:
         return 3
     return 1 if verdict.text == "refused" else 2 * verdict.passed

@@ -127,7 +127,7 @@ def turning(data: Data, h: float, i: int, r: Vec3) -> Vec3:
 
 @kernel
 def floor_change(data: Data, c: int, d1: float, d2: float) -> float:
-    """Change of the floor of an impact (contacts/restitution.py), of the gaps at 1 and 2; 0 where there is none."""
+    """Change of the floor of an impact (contact/restitution.py), of the gaps at 1 and 2; 0 where there is none."""
     e = data.bounce[c, Bounce.RESTITUTION]
     return (1.0 - e) * d2 + e * d1 if e > 0.0 else 0.0
 

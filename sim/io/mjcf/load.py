@@ -17,7 +17,7 @@ from sim.io.mjcf.equalities import find_gears, find_loops
 from sim.io.mjcf.groups import GeomGroup, drawn, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
-from sim.io.urdf.report import Frame, Notes
+from sim.io.urdf.report import LinkFrame, Notes
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Body, Joint
@@ -185,11 +185,11 @@ def _clear(mech: MjcfMechanism) -> MjcfMechanism:
     return replace(mech, neutral=lifted(mech, bases[0]))
 
 
-def _frames(model: Any, where: dict[int, tuple[GeomGroup | None, Pose]]) -> dict[str, Frame]:
+def _frames(model: Any, where: dict[int, tuple[GeomGroup | None, Pose]]) -> dict[str, LinkFrame]:
     """Where the bodies of the file are."""
     out = {}
     for b, (group, pose) in where.items():
         point = pose.point - (group.com if group else 0.0)
         name = model.body(b).name or f"body_{b}"
-        out[name] = Frame(group.name if group else None, tuple(float(x) for x in point), pose.quaternion)
+        out[name] = LinkFrame(group.name if group else None, tuple(float(x) for x in point), pose.quaternion)
     return out

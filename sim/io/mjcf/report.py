@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.urdf.report import Frame, Note
+from sim.io.urdf.report import LinkFrame, Note
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 
@@ -30,7 +30,7 @@ class MjcfReport:
 
     file: str
     notes: tuple[Note, ...]
-    bodies: dict[str, Frame]
+    bodies: dict[str, LinkFrame]
     joints: dict[str, tuple[str, int]]
     gear: Floats  # (nu,)
     low: Floats  # (nu,) [N, N m]

@@ -14,7 +14,7 @@ from sim.io.urdf.drawing import drawn
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import mimic_gears
-from sim.io.urdf.report import Frame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
+from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
@@ -222,7 +222,7 @@ def _report(
     for name, place in places.items():
         body = place.group.name if place.group.name in coms else None
         pose = Pose(place.pose.rotation, place.pose.point - (coms[body] if body else HERE.point))
-        links[name] = Frame(body, tuple(float(x) for x in pose.point), pose.quaternion)
+        links[name] = LinkFrame(body, tuple(float(x) for x in pose.point), pose.quaternion)
     driven = [joints[part.joint or ""] for part in mech.inputs or ()]
     return UrdfReport(
         file,

@@ -32,7 +32,7 @@ class Note:
 
 
 @dataclass(frozen=True)
-class Frame:
+class LinkFrame:
     """Where the frame of a link is: the body it is part of (None: the world), and its pose there."""
 
     body: str | None
@@ -52,7 +52,7 @@ class UrdfReport:
 
     file: str
     notes: tuple[Note, ...]
-    links: dict[str, Frame]
+    links: dict[str, LinkFrame]
     effort: Floats  # (nu,)
     velocity: Floats  # (nu,)
 
