@@ -81,8 +81,6 @@ def begin(work: Work) -> None:
     clear(work.external)
     for row in range(work.couple_force.shape[0]):
         work.couple_force[row] = 0.0
-    for k in range(work.couple_rank.shape[0]):
-        work.couple_rank[k] = 0.0
 
 
 @kernel
