@@ -13,10 +13,11 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import integrate_state, state_difference
 from sim.integrators.rollout import options_of
 from sim.model.layout import data_view, model_view
+from sim.model.model import Model
 from sim.model.options import Guess
 from sim.model.pace import is_due
 from sim.step import step
-from solvers.compiler import Table, kernel
+from solvers.compiler import Table, inlined, kernel
 from solvers.dense import copy, copy_vector, dot
 from solvers.status import Status
 from solvers.types import Cube, Matrix, Vector
@@ -65,6 +66,45 @@ def _expected_velocity(policy: FeedbackLaw, t: int, dx: Vector, u: Vector, out: 
             out[i] += row[j] * (u[j] - policy.us[t, j])
 
 
+@inlined
+def _begin_knot(
+    model: Model,
+    data: Data,
+    policy: FeedbackLaw,
+    alpha: float,
+    limits: tuple[Vector, Vector],
+    path: Path,
+    t: int,
+) -> bool:
+    """The input of knot t, and where its step looks first; returns whether the impulses of a step nearby are known."""
+    u, (low, high) = path.us[t], limits
+    dx = data.chain[0][: policy.gaps.shape[1]]
+    state_difference(model, policy.xs[t], path.xs[t], dx)
+    for j in range(u.shape[0]):
+        f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
+        u[j] = min(max(f, low[j]), high[j])
+    _expected_velocity(policy, t, dx, u, data.step_x[1, data.theta1.shape[0] :])
+    if policy.cones.shape[0] > 0:
+        copy(policy.cones[t], data.cone)
+        copy(policy.bounds[t], data.bound)
+    return t > 0 or policy.cones.shape[0] > 0
+
+
+@inlined
+def _end_knot(model: Model, data: Data, policy: FeedbackLaw, alpha: float, path: Path, t: int) -> None:
+    """Keep the cone variables where they are asked for, and close the gap of the plan in part."""
+    b = path.xs[t + 1]
+    if path.cones.shape[0] > 0:
+        copy(data.cone, path.cones[t])
+        copy(data.bound, path.bounds[t])
+    if alpha < 1.0:
+        dx = data.chain[0][: policy.gaps.shape[1]]
+        for k in range(dx.shape[0]):
+            dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
+        copy_vector(b, data.step_x[0])
+        integrate_state(model, data.step_x[0], dx, b)
+
+
 @kernel
 def closed_loop(
     model_at: Table,
@@ -86,30 +126,18 @@ def closed_loop(
     data = data_view(data_at)
     options = options_of(data, settings, first == 0)
     nq = data.theta1.shape[0]
-    low, high = limits
-    ndx = policy.gaps.shape[1]
-    dx = data.chain[0][:ndx]
     velocity = data.step_x[1, nq:]
-    for t in range(first // substeps, path.us.shape[0]):
-        u = path.us[t]
-        state_difference(model, policy.xs[t], path.xs[t], dx)
-        for j in range(u.shape[0]):
-            f = policy.us[t, j] + alpha * policy.ks[t, j] + dot(policy.Ks[t, j], dx)
-            u[j] = min(max(f, low[j]), high[j])
-        if substeps == 1:
-            _expected_velocity(policy, t, dx, u, velocity)
-        if policy.cones.shape[0] > 0:
-            copy(policy.cones[t], data.cone)
-            copy(policy.bounds[t], data.bound)
-        known = t > 0 or policy.cones.shape[0] > 0
-        b = path.xs[t + 1]
+    knots = path.us.shape[0]
+    for t in range(first // substeps, knots):
+        u, b = path.us[t], path.xs[t + 1]
         before = max(first - t * substeps, 0)
+        known = _begin_knot(model, data, policy, alpha, limits, path, t)
+        set_external(data, policy.wrenches, t)
         if before == 0:
             copy_vector(path.xs[t], b)
         due = False
         for s in range(before, substeps):
             copy_vector(b, data.step_x[0])
-            set_external(data, policy.wrenches, t)
             guess = Guess(velocity if substeps == 1 else data.step_x[0, nq:], s > 0 or known)
             if step(model, data, options, data.step_x[0], u, guess, b, path.report) != _SOLVED:
                 return t * substeps + s
@@ -117,15 +145,8 @@ def closed_loop(
             due = is_due(data, path.report[1])
             if due and s + 1 < substeps:
                 return t * substeps + s + 1
-        if path.cones.shape[0] > 0:
-            copy(data.cone, path.cones[t])
-            copy(data.bound, path.bounds[t])
-        if alpha < 1.0:
-            for k in range(ndx):
-                dx[k] = (alpha - 1.0) * policy.gaps[t + 1, k]
-            copy_vector(b, data.step_x[0])
-            integrate_state(model, data.step_x[0], dx, b)
+        _end_knot(model, data, policy, alpha, path, t)
         if due:
             return (t + 1) * substeps
     path.report[1] = path.report[6]
-    return path.us.shape[0] * substeps
+    return knots * substeps

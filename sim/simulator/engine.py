@@ -163,7 +163,7 @@ class Engine:
             A, B = np.empty((steps, self.ndx, self.ndx)), np.empty((steps, self.ndx, self.nu))
             model = self.linked(link_step, link_gradient)
         else:
-            contacts = np.empty((steps, self.sizes.ncontact, CONTACT))
+            contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
             model = self.linked(link_step)
         motion = MotionBuffers(xs, us, self.no_wrenches if wrenches is None else wrenches, reports, contacts, A, B)
         data = self._scratch.table()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from programs import python
 
 import dojo_opt as dojo
+from support.programs import python
 
 PROGRAM = """
 import numpy as np

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import python
+
+from support.programs import python
 
 SIMULATION = """
 import json, numpy as np, dojo_opt as dojo
