@@ -12,6 +12,7 @@ from typing import NamedTuple
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import integrate_state, state_difference
 from sim.integrators.rollout import options_of
+from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.options import Guess

@@ -17,7 +17,7 @@ from solvers.compiler.pipeline import FAST
 sim = dojo.Simulator(dojo.models.pendulum(), 0.02)
 x = sim.neutral() + 0.3
 A, B = sim.linearize(x, np.ones(sim.nu))
-print(json.dumps([FAST, *sim.rollout(x, np.ones((20, sim.nu))).x.ravel(), *A.ravel(), *B.ravel()]))
+print(json.dumps([FAST, *sim.integrators.rollout(x, np.ones((20, sim.nu))).x.ravel(), *A.ravel(), *B.ravel()]))
 """
 
 
@@ -86,7 +86,7 @@ product(np.zeros(3), 1, 2)
 """
 
 
-@pytest.mark.parametrize("first", ["import dojo_opt, sim.rollout", "import dojo_opt, sim.rollout" + COMPILE])
+@pytest.mark.parametrize("first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.rollout" + COMPILE])
 def test_numba_compiles_others_functions_as_it_does_without_us(first: str):
     """Lanes add cases of their own to `+`; nothing else is registered with an operator."""
     assert python(GUEST.format(first=first)) == python(GUEST.format(first=""))
