@@ -142,7 +142,7 @@ def _residual_gradient(model: Model, data: Data, w: Vector, y: Vector) -> None:
 
 @kernel
 def _add_parameters(model: Model, data: Data, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
-    """parameters += what this step adds."""
+    """parameters += the contribution of this step."""
     costate, w, y = line.costate[0], line.w, line.y
     nv = w.shape[0]
     _velocity_gradient(model, data, at.h, costate, w)

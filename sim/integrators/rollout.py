@@ -37,7 +37,7 @@ ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over i
 
 
 class Linearized(NamedTuple):
-    """Knots of a trajectory, and what their linearization fills in."""
+    """Knots of a trajectory, and buffers for their linearization."""
 
     xs: Matrix  # (T, nx) or (T + 1, nx) states, in
     us: Matrix  # (T, nu) inputs, in
@@ -49,7 +49,7 @@ class Linearized(NamedTuple):
 
 
 class MotionBuffers(NamedTuple):
-    """A motion and what a loop over time fills in; what is not asked for has no rows."""
+    """A motion and the buffers of a loop over time; unused buffers have no rows."""
 
     xs: Matrix  # (T + 1, nx), of which the first row is given
     us: Matrix  # (T, nu) inputs, in
@@ -107,7 +107,7 @@ def accept(model: Model, motion: MotionBuffers) -> bool:
 def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffers, first: int) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
-    A step is solved once, and differentiated where it ends. What nobody may begin with has the status REFUSED.
+    A step is solved once, and differentiated where it ends. An invalid state has the status REFUSED.
     """
     model = model_view(model_at)
     data = data_view(data_at)

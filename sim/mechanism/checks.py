@@ -1,4 +1,4 @@
-"""Checks of what a user passes in: every message names the call, what was expected, and what was got."""
+"""Checks of arguments: every message names the call, the expected and the given value."""
 
 from __future__ import annotations
 

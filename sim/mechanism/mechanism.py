@@ -31,9 +31,9 @@ Floats = NDArray[np.float64]
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+    inputs    the entries of u in order; by default every degree of freedom of every joint but the floating ones and
               those that close loops
-    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
+    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero by default,
               or all of q
     """
 
@@ -169,7 +169,7 @@ class Mechanism:
         pose     where the world of `other` is put: translation (3,) [m], or with a quaternion (7,). Its joints with the
                  world, its obstacles and its neutral state move there; its contacts touch the ground that they touched
                  before, and inputs along world axes keep them
-        prefix   put before every name of `other`; a ValueError says which name both have
+        prefix   put before every name of `other`; a ValueError names duplicates
         """
         return _added(self, other, pose, prefix, name or self.name)
 
@@ -178,7 +178,7 @@ class Mechanism:
     ) -> Mechanism:
         """The same on other ground, under all contacts or those named; it stands there as high as it touches.
 
-        Contacts keep their friction; what normal and height they had is replaced. The shapes of `bodies` touch it too,
+        Contacts keep their friction; their normal and height are replaced. The shapes of `bodies` touch it too,
         by balls and corners that are added as contacts (shape_contacts.py); options: of these (friction, law,
         restitution).
         """
@@ -193,7 +193,7 @@ class Mechanism:
     ) -> Mechanism:
         """The same with a fixed obstacle, placed in world axes by its centre and orientation.
 
-        What touches the ground touches it too: the balls of the contacts; or, when given, the shapes of `bodies`.
+        The balls of the contacts touch it, as they touch the ground; or, if given, the shapes of `bodies`.
         options: of Collision (friction, law, restitution).
         """
         return _with_obstacle(self, shape, bodies, name, **options)

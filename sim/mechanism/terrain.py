@@ -1,7 +1,7 @@
-"""Terrain: ground that is no level plane, as what a user writes; a slope, steps, or any smooth height z = f(x, y).
+"""Terrain: ground other than a level plane; a slope, steps, or any smooth height z = f(x, y).
 
-A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). What the centre
-of a ball cannot sink below, the surface at its radius, is a height field too,
+A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). The lower
+bound of the centre of a ball, the surface at its radius, is a height field too,
 
     F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2),
 
@@ -25,7 +25,7 @@ from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, s
 Floats = NDArray[np.float64]
 
 _EDGE = 16  # grid lines across an edge of a step
-_MARGIN = 8  # level grid lines around what is not smooth: the waves of a spline fade by .27 per line
+_MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 per line
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Terrain:
     plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
     name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
 
-    Derivatives by what the heights are made of follow from those by the heights. Of a loss L, by the rises of stairs:
+    Derivatives with respect to parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 
         by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
         by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]

@@ -2,7 +2,7 @@
 
 A signal waits until Python runs again. So a call of a long loop is made in pieces: a kernel stops at the first step
 after its deadline and says how far it came; Python lets it go on from there, with all that the step before left in its
-Data, so that what comes of it is the same to the last bit.
+Data, so that the result is the same to the last bit.
 
     for _ in pieces(settings, steps):
         done = roll(..., settings, ..., done)

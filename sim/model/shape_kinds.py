@@ -6,7 +6,7 @@ from enum import IntEnum
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
-OUT = 43  # length of what `collide` writes
+OUT = 43  # length of the result of `collide`
 EDGES = 8  # points of two polytopes beside their corners: pairs of edges that cross
 SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
 CROSSINGS = 9  # points of a cylinder and another shape that are no corners: places where edges, axes and rims cross

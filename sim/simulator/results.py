@@ -1,6 +1,6 @@
-"""What Simulator returns: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
+"""Results of Simulator: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
 
-No method raises because a step was not solved, unless it is asked to by throw=True: the result says so. Derivatives of
+No method raises for an unsolved step unless throw=True: the result has its status. Derivatives of
 an unsolved step are zero; taking them out of their result, by unpacking or by name, raises SimulationError.
 """
 
@@ -27,7 +27,7 @@ STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 
 
 class SimulationError(RuntimeError):
-    """A time step that did not reach its tolerance; `status` says why."""
+    """A time step that did not reach its tolerance; `status` is the reason."""
 
     def __init__(self, message: str, status: Status) -> None:
         super().__init__(message)
@@ -35,9 +35,9 @@ class SimulationError(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a long call, which is heard within a fifth of a second; `result` is what was done until then.
+    """Ctrl-C during a long call, which ends within a fifth of a second; `result` is the partial result.
 
-    result    as the call would have returned, as far as it came: the Trajectory, Shot or Batch of a rollout with the
+    result    the return value of the call so far: the Trajectory, Shot or Batch of a rollout with the
               steps that were solved, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
               `closed_loop`; None where nothing was done yet. Calls that only differentiate raise KeyboardInterrupt
     """
@@ -298,7 +298,7 @@ class Batch(Result):
 
 
 def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
-    """What is made of the result of a call; of what Interrupted carries instead, the same is made."""
+    """The converted result of a call; the result that Interrupted carries is converted likewise."""
     try:
         result = call()
     except Interrupted as stop:

@@ -84,11 +84,11 @@ class StateSpace:
         return bool(self.mechanism.loops or self.mechanism.gears)
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
-        """By loop joint, and "gear NAME", how far it is open: distances [m], then angles [rad]."""
+        """Gaps by loop joint and "gear NAME": distances [m], then angles [rad]."""
         return Closure(self.mechanism, self._engine).gaps(self._placed("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
-        """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
+        """The redundant loop constraints at x, by default the neutral state; `print` shows them."""
         if not self._closes:
             raise ValueError(
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"

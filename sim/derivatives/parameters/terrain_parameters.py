@@ -1,7 +1,7 @@
 """Heights of the terrains of a mechanism as parameters: which there are, and gradients by them.
 
 They stand in a row, terrain after terrain in the order of the contacts, each like heights.ravel(). Kernels know the
-coefficients of one surface per terrain and radius (pack.py); what those have of a gradient is brought back here, all
+coefficients of one surface per terrain and radius (pack.py); their gradient is mapped to the heights here, all
 heights at once, so there are no terms for them in the lists of columns.py.
 """
 
