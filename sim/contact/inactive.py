@@ -107,7 +107,7 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
 
 @kernel
 def _enlist(model: Model, data: Data, c: int) -> None:
-    """Append a cluster to inactive_first, or its contacts to `active`; what cannot move is in neither."""
+    """Append a cluster to inactive_first, or its contacts to `active`; contacts that cannot move are in neither."""
     if model.contact_hold[c] != 0:
         return
     if data.inactive[c, Inactive.ACTIVATION] > 0.0:

@@ -40,7 +40,7 @@ class Terrain:
     plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
     name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
 
-    Derivatives with respect to parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
+    Derivatives by parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 
         by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
         by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]

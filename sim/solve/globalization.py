@@ -1,6 +1,6 @@
 """Globalization: the strategies from which the interior point starts, in the order in which they are tried.
 
-The first strategy begins with what is known of the solution (`known_start`). The others are rescues: an attempt that
+The first strategy begins with a known approximation (`known_start`). The others are rescues: an attempt that
 ends in a fold of the central path is given up, and the next one starts elsewhere, at another kappa0. Some solutions lie
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
@@ -149,7 +149,7 @@ def known_start(
     """The first of these that is near the solution, with its iterate in `data`:
 
         warm        at the guess, with the impulses of the step before
-        predicted   at what the step linearised there predicts (prediction.py)
+        predicted   at the prediction of the linearised step (prediction.py)
         resumed     near these impulses, on the central path of a larger kappa
         at kappa    at the guess, with the impulses kappa / gap: a robot at rest
 

@@ -1,4 +1,4 @@
-"""The generalized residual of a step: body wrenches along the test directions, and what acts in the joints."""
+"""The generalized residual of a step: body wrenches along the test directions, and joint forces."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _add(P: Vector, r: float, s: Vector, x: float, y: float, z: float) -> None:
 
 @kernel
 def balance_to_wrench(data: Data) -> None:
-    """wrench = balance: what forces are then added to."""
+    """wrench = balance, to which forces are then added."""
     for i in range(data.balance.shape[0]):
         for k in range(6):
             data.wrench[i, k] = data.balance[i, k]

@@ -51,8 +51,8 @@ def load_mjcf(
                     them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
         gravity     [m/s^2]; None: that of the file
 
-    What of the file is represented, and what not: MjcfMechanism. What changes the motion in a way that a user would not
-    expect is also an MjcfWarning.
+    MjcfMechanism lists supported and unsupported elements. An unexpected change of the motion is also an
+    MjcfWarning.
 
     ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
     whose inertia no rigid body has; OSError for a file that is not there.
@@ -95,7 +95,7 @@ def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float 
 
 
 def _warn(report: MjcfReport) -> None:
-    """Warnings, at the line that called load_mjcf, of what changes the motion."""
+    """Warnings of changes of the motion, at the line that called load_mjcf."""
     for note in report.notes:
         if note.warn:
             warnings.warn(f"load_mjcf: {report.file}: {note}", MjcfWarning, stacklevel=3)

@@ -50,7 +50,7 @@ def load_urdf(
                       no contacts.
         merge_fixed   whether links on fixed joints become one body; a link without mass always does
         locked        joints that are held at their neutral coordinate, as if they were fixed
-        mimic         what becomes of joints that follow another one: "gear" couples them (see Gear), "free" and
+        mimic         treatment of joints that follow another one: "gear" couples them (see Gear), "free" and
                       "locked" leave that out
         repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
                       more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
@@ -60,8 +60,8 @@ def load_urdf(
         actuated      joints with an input, in the order of u; None: all that move, but for floating ones
         rim_points    points per rim of a cylinder
 
-    What is read, and what `mechanism.report` says of the rest: UrdfMechanism. What changes the motion in a way that a
-    user would not expect is also a UrdfWarning.
+    UrdfMechanism lists the supported elements, and `mechanism.report` the others. An unexpected change of the
+    motion is also a UrdfWarning.
 
     Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
     names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.

@@ -1,4 +1,4 @@
-"""Element: what an XML file says, with the line it says it on, so that every complaint can point at it."""
+"""Element: an element of an XML file with its line, so that every error can point at it."""
 
 from __future__ import annotations
 
