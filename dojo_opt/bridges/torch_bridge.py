@@ -19,7 +19,7 @@ def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSp
     theta     (..., n) the values of `parameters`; None: those of `sim`
     returns   the next states (..., nx); all states (..., T + 1, nx), x0 among them
 
-    Tensors are of doubles. Leading axes are broadcast, and what they hold is spread over the cores.
+    Tensors are of doubles. Leading axes are broadcast, and their rows run on all cores.
 
     kappa     of the derivatives [N s m], those of smoother contact than the simulator's own; that by default
 

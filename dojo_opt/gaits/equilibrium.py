@@ -105,7 +105,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
     """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows;
-    the joints carry what gravity and springs leave; inputs that act on bodies are zero. On the central path a contact
+    the joints balance gravity and springs; inputs that act on bodies are zero. On the central path a contact
     with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
     carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that shall carry have to be
     within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by

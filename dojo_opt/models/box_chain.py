@@ -1,4 +1,4 @@
-"""Boxes end to end along x, the first one free: what snake and twister have in common."""
+"""Boxes end to end along x, the first one free: the common part of snake and twister."""
 
 from __future__ import annotations
 

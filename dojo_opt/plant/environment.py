@@ -31,7 +31,7 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         terminated    the robot has fallen, or a step could not be solved: `info["message"]` says which
         truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
 
-    plant    what is acted on, by default the problem's own simulator from the problem's start; its time step divides a
+    plant    the plant, by default the problem's own simulator from the problem's start; its time step divides a
              knot. sampler: generator -> Perturbation, drawn at every reset from the environment's seed.
     """
 

@@ -100,7 +100,7 @@ def _plain(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    """A span of code, whose fence is longer than what is inside."""
+    """A span of code, whose fence is longer than any inside."""
     fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
     pad = " " if len(fence) > 1 else ""
     return f"{fence}{pad}{' '.join(text.split())}{pad}{fence}"

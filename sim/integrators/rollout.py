@@ -62,7 +62,7 @@ class MotionBuffers(NamedTuple):
 
 @kernel
 def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
-    """StepOptions of the steps of a motion that begins here, or goes on after a pause."""
+    """Options of the steps of a motion that begins here, or continues after a pause."""
     start_pace(data, settings)
     if begins:
         begin(data)

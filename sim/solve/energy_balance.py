@@ -69,7 +69,7 @@ def least_cosine(data: Data) -> float:
 
 @kernel
 def constraint_work(model: Model, data: Data, h: float, v: Vector) -> float:
-    """Data of joints, loops and contacts in the solved step [J]."""
+    """Work of joints, loops and contacts in the solved step [J]."""
     total = 0.0
     o = data.origin
     for i in range(model.body_parent.shape[0]):
@@ -124,7 +124,7 @@ def arriving_energy(model: Model, data: Data, h: float, v: Vector, third: bool) 
 
 @kernel
 def input_work(model: Model, data: Data, j: int, u: float) -> float:
-    """Data of the WORLD or BODY input j at configuration 2 [J]."""
+    """Work of the WORLD or BODY input j at configuration 2 [J]."""
     i, w = model.input_index[j], model.input_wrench[j]
     f, t = (w[0], w[1], w[2]), (w[3], w[4], w[5])
     if model.input_kind[j] == InputKind.BODY:
@@ -138,7 +138,7 @@ def input_work(model: Model, data: Data, j: int, u: float) -> float:
 
 @kernel
 def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tuple[float, float]:
-    """Data of gravity, springs, inputs and external wrenches at configuration 2, and its size without gravity [J].
+    """Work of gravity, springs, inputs and external wrenches at configuration 2, and its size without gravity [J].
 
     S2^T (subtree sums of w) is the rest of -I (v' - v) beside springs, inputs, dampers and limits of a coordinate.
     """

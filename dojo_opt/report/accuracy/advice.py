@@ -1,4 +1,4 @@
-"""What the trials of a robot mean for its user, in sentences."""
+"""Recommendations to the user from the trials of a robot, in sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ROUGH = 1e-2  # [m] good enough for a plan that feedback follows
 
 
 def recommendation(best: SettingTrial, target: float, own: float) -> str:
-    """The first sentences of the report; own: what the converged motion changes by when its step is doubled [m]."""
+    """The first sentences of the report; own: change of the converged motion when its step is doubled [m]."""
     asked = f"{1e3 * target:.2g} mm"
     if target == 2.0 * own:
         asked += ", twice what the converged motion itself changes by when its step is doubled"
@@ -31,7 +31,7 @@ def hints(
     trials: Sequence[SettingTrial],
     choose: Choose,
 ) -> list[str]:
-    """What else there is to know: contacts that are missing, planning, derivatives, kappa."""
+    """Further remarks: missing contacts, planning, derivatives, kappa."""
     contacts = bool(mechanism.contacts or mechanism.collisions)
     said = []
     if not contacts:

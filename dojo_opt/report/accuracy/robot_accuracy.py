@@ -123,7 +123,7 @@ def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float,
 
 
 class Advice(NamedTuple):
-    """What a mechanism needs, and the trials behind it."""
+    """The settings for a mechanism, and the trials behind them."""
 
     best: SettingTrial
     trials: list[SettingTrial]

@@ -87,7 +87,7 @@ def without_contact(mechanism: Mechanism) -> Mechanism:
 
 
 def not_in_reference(mechanism: Mechanism) -> str:
-    """What `TreeReference` does not represent of a mechanism without contacts; empty if it is all there."""
+    """The first element of a mechanism, contacts aside, that `TreeReference` does not support; empty if none."""
     model = model_of(replace(mechanism, contacts=(), collisions=()))
     swings = [mechanism.joint_names[i] for i in np.flatnonzero(model.joint_nrot == 2)]
     for what, names in (
