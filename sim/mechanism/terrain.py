@@ -80,10 +80,20 @@ class Terrain:
 
     @staticmethod
     def from_function(f: Callable[[Floats, Floats], ArrayLike], x: ArrayLike, y: ArrayLike) -> Terrain:
-        """The spline through f at the grid lines x (nx,) and y (ny,), equally spaced [m].
+        """The spline through f at equally spaced grid lines.
 
-        f takes and returns arrays: f(X, Y) with X and Y of shape (nx, ny). A spline is off by about
-        (spacing / wavelength)^4 of the height of a wave; `terrain.height(x, y)` tells.
+        Its error is about (spacing / wavelength)^4 of the height of a wave; check with `terrain.height(x, y)`.
+
+        Args:
+            f: heights f(X, Y) (nx, ny) [m] of places X, Y (nx, ny) [m].
+            x: grid lines (nx,) [m].
+            y: grid lines (ny,) [m].
+
+        Returns:
+            The terrain.
+
+        Raises:
+            ValueError: the grid lines are not equally spaced, or a height is not finite.
         """
         if not callable(f):
             raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
@@ -96,7 +106,16 @@ class Terrain:
 
     @staticmethod
     def slope(angle: float, direction: ArrayLike = (1.0, 0.0), height: float = 0.0) -> Terrain:
-        """A plane that rises by `angle` [rad] towards `direction` (x, y), and has this height at x = y = 0 [m]."""
+        """A plane that rises towards `direction`.
+
+        Args:
+            angle: slope [rad], below a right angle.
+            direction: (2,) along x, y.
+            height: at x = y = 0 [m].
+
+        Returns:
+            The terrain.
+        """
         angle = checks.number("Terrain.slope(angle)", angle)
         if not abs(angle) < 0.5 * np.pi:
             raise ValueError(f"Terrain.slope(angle): expected less than a right angle, got {angle:g} rad")
@@ -112,10 +131,21 @@ class Terrain:
         edge: float = 0.04,
         direction: ArrayLike = (1.0, 0.0),
     ) -> Terrain:
-        """Stairs across `direction`: the ground rises by rises[k] at start + k depth [m]; it is level before and after.
+        """Stairs across `direction`, level before and after.
 
-        Each rise is spread over `edge` [m] by the quintic 6 t^5 - 15 t^4 + 10 t^3, so that its edges are rounded with
-        the radius edge^2 / (5.77 |rise|) [m] and its face is 1.875 |rise| / edge steep.
+        The ground rises by rises[k] at start + k depth. Each rise is spread over `edge` by the quintic
+        6 t^5 - 15 t^4 + 10 t^3: the radius of its edges is edge^2 / (5.77 |rise|) [m], the slope of its face
+        1.875 |rise| / edge.
+
+        Args:
+            rises: heights of the steps (n,) [m].
+            depth: distance between rises [m].
+            start: place of the first rise along `direction` [m].
+            edge: width of a rise [m], at most `depth`.
+            direction: (2,) along x, y.
+
+        Returns:
+            The terrain.
         """
         call = "Terrain.steps"
         jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
@@ -133,7 +163,7 @@ class Terrain:
         return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Height of the ground at (x, y), any shape [m]."""
+        """Height (...,) of the ground [m] at x, y (...,) [m]."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if self.plane is not None:
             (a, b, c), d = self.plane
@@ -141,7 +171,7 @@ class Terrain:
         return self._spline(self.coefficients, x, y)[0]
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Outward normal of the ground at (x, y), (..., 3)."""
+        """Outward unit normal (..., 3) of the ground at x, y (...,) [m]."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         if self.plane is not None:
             return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
@@ -158,7 +188,7 @@ class Terrain:
         return f, C * fs - S * ft, S * fs + C * ft
 
     def offset(self, radius: float) -> Terrain:
-        """The surface that the centre of a ball of this radius cannot sink below, over a grid that is as much wider."""
+        """The lower bound of the centre of a ball of this radius [m], over a grid wider by as much."""
         return self._offset(radius)[0]
 
     def surface(self, radius: float) -> Terrain:
@@ -181,7 +211,7 @@ class Terrain:
         return spline_gradient(gradient)
 
     def radius_rate(self, radius: float) -> Floats:
-        """d(coefficients of `surface`)/d(radius), whose values are sqrt(1 + |grad|^2) of the ground that is touched."""
+        """d(coefficients of `surface`)/d(radius), with values sqrt(1 + |grad|^2) at the touched ground."""
         kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
         if radius not in kept:
             touched = self._kept(radius)[1]

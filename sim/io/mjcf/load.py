@@ -39,23 +39,28 @@ def load_mjcf(
 ) -> MjcfMechanism:
     """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
 
-        ground      whether geoms cannot enter the planes of the file
-        friction    coefficient of all contacts; None: that of the geoms
-        law         of contacts with friction, see Contact; geoms with condim 1 are without
-        merge       whether slides and a hinge in a row become one joint where there is a kind for it; the coordinates
-                    are the same. All other joints in a row are a chain with bodies without mass between them.
-        keyframe    number of the keyframe whose qpos is the neutral state; None: the default one, joints that it has
-                    outside their range in its middle, and a floating base so high that nothing is in the ground
-        rim_points  points per rim of a cylinder
-        collisions  whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
-                    them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
-        gravity     [m/s^2]; None: that of the file
+    Args:
+        source: path of the file, or its text
+        ground: whether geoms cannot enter the planes of the file
+        friction: coefficient of all contacts; None: that of the geoms
+        law: of contacts with friction, see Contact; geoms with condim 1 are without
+        merge: whether slides and a hinge in a row become one joint if there is a kind for it, with the same
+            coordinates. All other joints in a row are a chain with massless bodies between them.
+        keyframe: number of the keyframe whose qpos is the neutral state; None: the default one, with joints outside
+            their range in its middle, and a floating base high enough that nothing penetrates
+        rim_points: points per rim of a cylinder
+        collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
+            them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
+        gravity: [m/s^2]; None: that of the file
 
-    MjcfMechanism lists supported and unsupported elements. An unexpected change of the motion is also an
-    MjcfWarning.
+    Returns:
+        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also an
+        MjcfWarning.
 
-    ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
-    whose inertia no rigid body has; OSError for a file that is not there.
+    Raises:
+        ImportError: MuJoCo is not installed.
+        ValueError: MuJoCo cannot read the file, or no rigid body has the inertia of the named body.
+        OSError: the file does not exist.
     """
     model, file = _compile(source)
     touching = _touching(friction, law, rim_points)
