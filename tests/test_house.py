@@ -124,24 +124,15 @@ def test_the_python_for_jax_runs(tmp_path: Path) -> None:
 
 
 def test_files_stay_readable() -> None:
-    """Files of kernels have about 300 lines at most; one solver, or one class, may fill up to 700."""
+    """A file with kernels has about 300 lines, others up to 600; the planner is one file to read."""
     long = {}
     for package in PACKAGES:
         for file in (HOME / package).rglob("*.py"):
             text = file.read_text()
-            length, limit = len(text.splitlines()), 300 if "\n@kernel" in text else 700
-            if length > limit:
+            length = len(text.splitlines())
+            if length > (300 if "\n@kernel" in text else 700 if file.name == "ilqr.py" else 600):
                 long[file.name] = length
     assert not long
-
-
-def test_rooms_are_few() -> None:
-    assert len([p for p in (HOME / "dojo_opt").iterdir() if p.name != "__pycache__"]) <= 20
-
-
-def test_every_room_says_its_purpose() -> None:
-    for file in (HOME / "dojo_opt").glob("*/__init__.py"):
-        assert file.read_text().startswith('"""'), file
 
 
 def test_examples_are_short() -> None:

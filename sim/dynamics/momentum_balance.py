@@ -70,7 +70,8 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
     for i in range(model.body_parent.shape[0]):
         m = h * model.body_mass[i]
         for k in range(3):
-            data.momentum_in[i, k] += m * model.gravity[k] + h * data.external[i, k]
+            data.momentum_in[i, k] += m * model.gravity[k]
+            data.momentum_in[i, k] += h * data.external[i, k]
             data.momentum_in[i, 3 + k] += h * data.external[i, 3 + k]
             data.body_impulse[i, k] = 0.0
             data.body_impulse[i, 3 + k] = 0.0

@@ -79,8 +79,6 @@ def begin(data: Data) -> None:
     clear(data.external)
     for row in range(data.couple_force.shape[0]):
         data.couple_force[row] = 0.0
-    for k in range(data.couple_rank.shape[0]):
-        data.couple_rank[k] = 0.0
 
 
 @kernel

@@ -22,7 +22,6 @@ class Data(NamedTuple):
     cone_step: Matrix  # (ncontact, 12) last directions of the cone variables
     bound_step: Matrix  # (nlimit, 2) and of limits
     couple_force: Vector  # (nrow,) impulses of loops
-    couple_rank: Vector  # (4,) of the dense system of loops, gears and pairs: CoupleRank
     # scratch
     origin: Vector  # (3,) the reference point O
     # configurations 1, 2 and 3, and the motion between them
@@ -132,6 +131,7 @@ class Data(NamedTuple):
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
+    couple_rank: Vector  # (4,) CoupleRank; also read in the next step, and by the first step of the next motion
     couple_scale: Vector  # (nrow,)
     couple_x: Matrix  # (nrow, 1)
     couple_gap: Vector  # (nrow,) of loops

@@ -58,7 +58,7 @@ MODEL_FLOATS = _shapes(
 CARRY_INTS = _shapes("carried_steps 1")
 CARRY_FLOATS = _shapes(
     """
-    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, couple_force nrow, couple_rank 4
+    external nbody 6, inactive_kappa 1, cone_step ncontact 12, bound_step nlimit 2, couple_force nrow
     """
 )
 CARRY = (*CARRY_INTS, *CARRY_FLOATS)
@@ -93,7 +93,7 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     inactive_pose nbody 7, inactive_wrench nbody 6,
     pair_turn npair 18, pair_shift npair 18, pair_Ca npair 18, pair_Cb npair 18, pair_rows 2 6, pair_scratch 18,
     coupling_K 2ncoupling 36, coupling_K2 2ncoupling 36, couple_B nrow 6, couple_G nrow 6,
-    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2,
+    couple_R nrow 12, couple_E nrow, couple_Y nrow nv, couple_T nrow nrow, couple_pivots nrow 2, couple_rank 4,
     couple_scale nrow, couple_x nrow 1, couple_gap nrow, couple_step nrow, couple_trial nrow,
     couple_panel nrow 2nv+nu, couple_wrench 6, loop_frame nloop 12, loop_turn nloop 9,
     loop_velocity nv, loop_start nv, loop_kept nv, loop_pivot 1, bifurcation_direction nrow nv, loop_scale nrow,

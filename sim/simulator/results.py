@@ -188,9 +188,9 @@ class Shot(Result):
 
 @dataclass(frozen=True)
 class Jacobian(Result):
-    """Derivatives of one step: `A, B = jacobian`, and jacobian["mass"] by a name of wrt=...
+    """Derivatives of one step: `A, B = jacobian`; asked for by names (wrt=...), a table of blocks by these names.
 
-    Both raise SimulationError where the step was not solved.
+    Taking out A, B or a block raises SimulationError where the step was not solved.
     """
 
     blocks: Mapping[str, Floats]  # "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n)
@@ -198,6 +198,7 @@ class Jacobian(Result):
     status: Status
     accuracy: float = 0.0  # estimate of the error, relative to the largest entry
     detail: str = ""
+    by_name: bool = False  # asked for by names
 
     __repr__ = brief_repr
 
@@ -211,11 +212,12 @@ class Jacobian(Result):
         """(ndx, nu) d(next state)/d(input)."""
         return self["input"]
 
-    def __iter__(self) -> Iterator[Floats]:
-        return iter((self.A, self.B))
+    def __iter__(self) -> Iterator[Any]:
+        self.check()
+        return iter(self.blocks) if self.by_name else iter((self.A, self.B))
 
     def __len__(self) -> int:
-        return 2
+        return len(self.blocks)
 
     def __contains__(self, name: object) -> bool:
         return name in self.blocks

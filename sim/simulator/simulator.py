@@ -402,7 +402,8 @@ class Simulator(StateSpace):
                 report[0] = Status.NOT_FINITE
             blocks = {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
         detail = "" if report[0] == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
-        return ended(Jacobian(blocks, x_next, Status(int(report[0])), float(report[5]), detail), throw)
+        status, accuracy = Status(int(report[0])), float(report[5])
+        return ended(Jacobian(blocks, x_next, status, accuracy, detail, wrt is not None), throw)
 
     def linearize_rollout(
         self,

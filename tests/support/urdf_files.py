@@ -125,7 +125,7 @@ def compare_with_mujoco(path: Path, rng: np.random.Generator, states: int = 3) -
             a, d = model.jnt_qposadr[k], model.jnt_dofadr[k]
             data.qpos[a : a + j.nq], data.qvel[d : d + j.nv] = q[at], v[dof]
         mujoco.mj_forward(model, data)
-        ours = poses(mech, q)
+        ours = poses(mech.joints, q)
         for name, frame in mech.report.links.items():
             if name not in bodies or frame.body is None:
                 continue
