@@ -59,7 +59,7 @@ class Rollouts:
             return 0
         if self._space is None:
             raise ValueError(
-                f"{self.call}: rollout(theta): there are no parameters; give parameters=ParameterSpace(...)"
+                f"{self.call}: rollout(theta): no parameters are declared; give parameters=ParameterSpace(...)"
             )
         return len(self._space.values)
 

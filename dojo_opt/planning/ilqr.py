@@ -612,14 +612,14 @@ class Solver:
         now, mu = self.now, self._damping.mu
         if now.gaps is None:
             k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
-            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone may promise more
+            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a fixed start may promise more
                 self._k[:] = k
                 return promise._replace(d0=d0, d1=d1)
         start.step[:] = 0.0
         return promise
 
     def _fault(self, promise: Promise) -> Status:
-        """Why the backward pass at `now` failed with that promise; `_detail` says where."""
+        """Why the backward pass at `now` failed with that promise; `_detail` has the knot."""
         model, knot = self._model(), promise.knot
         if promise.status == Status.MAX_ITERATIONS:
             self._detail = f" That of the quadratic program of the control limits, at knot {knot}."

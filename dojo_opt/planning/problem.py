@@ -82,7 +82,7 @@ class Problem:
             `start` is then a guess. With the constraint `Periodic`, such a plan is a gait that repeats itself.
 
     Raises:
-        TypeError: for a `sim` that is no Simulator, or an entry of `cost` or `constraints` that is no term.
+        TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
         ValueError: for a wrong shape, a number that is not finite, or a horizon that exceeds the memory.
     """
 

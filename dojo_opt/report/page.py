@@ -135,7 +135,7 @@ def _html(reports: Mapping[str, Report], pictures: Mapping[str, bytes], command:
 
 
 def _html_section(table: Table) -> str:
-    """A table under its title; a long one is shown when asked for."""
+    """A table under its title; a long one is folded."""
     note = f'<p class="small">{escape(table.note)}</p>' if table.note else ""
     if table.title and len(table.rows) > _LONG:
         summary = f"<summary>{escape(table.title)} ({len(table.rows)} rows)</summary>"

@@ -79,7 +79,7 @@ def study(
         studies: Known studies; those of one robot by default.
 
     Raises:
-        ValueError: There is no such study, or it takes no mechanism.
+        ValueError: The study does not exist, or does not take a mechanism.
     """
     if name not in studies:
         raise ValueError(f"report: no report {name!r}; there are {', '.join(studies)}")

@@ -2,7 +2,7 @@
 
 On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
 large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity
-(inactive_impulses.py); it is no variable of the interior point and no part of its matrix. Contacts of one body against
+(inactive_impulses.py); it is not a variable of the interior point nor in its matrix. Contacts of one body against
 one direction are a cluster, tested as one ball.
 
 A cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the step:

@@ -49,7 +49,7 @@ class Sweep(NamedTuple):
     twists: Matrix  # (12, 6)
     below: Vector  # (nbody,)
     places: Matrix  # (1, 3 nground) scratch
-    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) when not asked for
+    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) if not requested
 
 
 @kernel

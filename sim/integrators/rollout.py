@@ -6,7 +6,7 @@
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Data (solvers/compiler); every loop stops at the first step that is
-not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py says how it goes on.
+not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py explains how it resumes.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def linearize(
 ) -> int:
     """Derivatives of the knots from knots[0] up to knots[2], products of the derivatives of their steps.
 
-    knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
+    knots[1]: the step to resume at, counted from that of knot 0; returns the next such step.
     """
     model = model_view(model_at)
     data = data_view(data_at)

@@ -145,7 +145,7 @@ class Contact:
     """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
 
     law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
-    terrain: ground that is no half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
+    terrain: ground, not a half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
     restitution: share of the normal velocity that an impact gives back, see sim/contact/restitution.py.
     """
 

@@ -33,7 +33,7 @@ class Terrain:
     """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
 
     heights    (nx, ny) above the lines of a grid, a C2 spline in between [m]; one column (nx, 1): the same for all y.
-               Beyond the grid the ground goes on level, at the height of its edge
+               Beyond the grid the ground is level, at the height of the edge
     origin     (x, y) of heights[0, 0] [m]
     spacing    (dx, dy) of the grid [m]
     direction  (x, y) of the first grid axis in the plane

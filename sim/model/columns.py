@@ -108,7 +108,7 @@ class Bounce(IntEnum):
     """bounce: impact of a contact (contact/restitution.py)."""
 
     FLOOR = 0
-    RESTITUTION = 1  # in this step; 0 where there is no impact
+    RESTITUTION = 1  # in this step; 0 without an impact
     ROW1 = 2  # (6,) d(gap at configuration 1)/d(twist of configuration 1)
     ROW2 = 8  # (6,) the same of 2
     GAP1 = 14

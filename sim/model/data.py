@@ -10,9 +10,9 @@ from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 class Data(NamedTuple):
     """Scratch of one step, allocated once per thread by `Simulator`; also holds intermediate results for derivatives.
 
-    The first block is no scratch: it is state between the steps of a motion (CARRY of layout.py), which a new motion
+    The first block is not scratch but the state between the steps of a motion (CARRY of layout.py), which a new motion
     clears. The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`; they are used again
-    only where a motion goes on, as `carried_steps` and `Guess.impulses` say.
+    only if a motion continues, as `carried_steps` and `Guess.impulses` say.
     """
 
     # state between steps
@@ -54,7 +54,7 @@ class Data(NamedTuple):
     turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
     turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
     balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O
-    node_inertia: Matrix  # (nbody, 9) inertia at the node whose energy is asked for, world axes
+    node_inertia: Matrix  # (nbody, 9) inertia at the node, for its energy, world axes
     node_momentum: Matrix  # (nbody, 6) momentum there, summed over the subtree, about O
     node_p: Vector  # (nv,) the same in joint coordinates
     node_share: Vector  # (nv,) scratch

@@ -315,7 +315,7 @@ class Engine:
         return int(status), x
 
     def started(self, q: Vector, v: Vector) -> Vector:
-        """`start`; SimulationError when there is no such state."""
+        """`start`; SimulationError if no such state exists."""
         status, x = self.start(q, v)
         if status != Status.SOLVED:
             reason = Status(status)

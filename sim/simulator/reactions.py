@@ -92,7 +92,7 @@ class _Row(NamedTuple):
     point: Floats  # (3,)
     wrench: Floats  # (2, 3) force, and torque about the point, world axes
     constraint: Floats  # (2, 3) likewise
-    axes: Floats  # (3, 3) of the frame asked for, as columns
+    axes: Floats  # (3, 3) of the requested frame, as columns
 
 
 def reactions(
@@ -159,7 +159,7 @@ def _loop_joint(mech: Mechanism, loop: Joint, m: int, model: Model, data: Data, 
 
 
 def _axes(joint: Joint, child: Floats, parent: int, data: Data, frame: str) -> Floats:
-    """Rotation to the world of the frame asked for."""
+    """Rotation from the requested frame to the world."""
     if frame == "world":
         return np.eye(3)
     if frame == "body":

@@ -130,7 +130,7 @@ class StepResult(Result):
 
     x: Floats  # (nx,)
     status: Status
-    iterations: int  # of Newton's method; where loops have the step solved again, of all its solves
+    iterations: int  # of Newton's method; of all solves, if loops solve the step again
     residual: float  # largest error of a balance or gap equation [N s, m]
     violation: float  # largest |product - kappa| of the complementary pairs
     scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
@@ -188,7 +188,7 @@ class Shot(Result):
 
 @dataclass(frozen=True)
 class Jacobian(Result):
-    """Derivatives of one step: `A, B = jacobian`; asked for by names (wrt=...), a table of blocks by these names.
+    """Derivatives of one step: `A, B = jacobian`; with names (wrt=...), a table of blocks by these names.
 
     Taking out A, B or a block raises SimulationError where the step was not solved.
     """
@@ -198,7 +198,7 @@ class Jacobian(Result):
     status: Status
     accuracy: float = 0.0  # estimate of the error, relative to the largest entry
     detail: str = ""
-    by_name: bool = False  # asked for by names
+    by_name: bool = False  # requested by names
 
     __repr__ = brief_repr
 
@@ -250,7 +250,7 @@ class Linearization(Result):
     B: Floats  # (T, ndx, nu)
     x_next: Floats  # (T, nx)
     status: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
-    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
+    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); the requested ones
     # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
     detail: str = ""

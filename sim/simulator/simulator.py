@@ -99,7 +99,7 @@ class Simulator(StateSpace):
         return Simulator, (self.mechanism, *self._given().values())
 
     def _given(self) -> dict[str, Any]:
-        """The settings as they were given: kappa None where it is the default."""
+        """The settings as given: kappa None for the default."""
         return {**self._engine.settings._asdict(), "kappa": self._kappa}
 
     def __repr__(self) -> str:

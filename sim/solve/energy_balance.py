@@ -1,4 +1,4 @@
-"""The energy balance of a solved step, which tells the solution that goes on with the motion from others.
+"""The energy balance of a solved step, which distinguishes the solution that continues the motion from others.
 
 The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
 and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
@@ -16,14 +16,14 @@ does that is set down, their work is known to its size only. Dampers and frictio
 that of those that remove the overlap at the beginning of the step; others have gap2 >= 0 and gamma gap3 = kappa. Loops
 may give the work that closes them if they were open.
 
-These energies cost a factorisation of the mass matrix each. They are asked for where constraints did work,
+Each of these energies costs a factorisation of the mass matrix. They are computed if constraints did work,
 
     work = sum over bodies of b.(V + V')/2  -  sum over dofs of S2^T (subtree sums of w) (v + v')/2  >  0.1 K12 + noise
 
 b, w the wrenches that the momenta of a body leave over without and with those of contacts: the rest, without springs,
 dampers, inputs and limits, is the work of joints, loops and contacts, and none of third order in a motion
-that time steps can follow. It is that of mean velocities, so they are asked for in every step, too, in which a body
-turns so far that its sine says little. Nothing is asked for where the ground is flat and no body turns by .15 rad, with
+that time steps can follow. It is that of mean velocities, so they are also computed in every step in which a body
+turns too far for its sine. They are skipped if the ground is flat and no body turns by .15 rad, with
 contacts by .05 rad: of the motions of benchmarks/attacks.py, none that is accepted in this way gains a tenth.
 """
 
@@ -53,7 +53,7 @@ from solvers.rotation import cross, rotate
 from solvers.types import Vector
 
 LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an accepted step
-# cosines of half the turns below which there is no such work, without contacts and with them, and above which it says
+# cosines of half the turns below which there is no such work, without contacts and with them, and above which it tells
 # nothing
 _NEAR, _NEAR_GROUND, _FAR = 0.99719, 0.99969, 0.825
 

@@ -94,7 +94,7 @@ _ROUNDS = 13
 
 
 def _numbered(k: int, strategy: Strategy) -> Strategy:
-    """Strategy k of the list: shares go on by the golden ratio, modulo 1, and kappa0 grows."""
+    """Strategy k of the list: shares advance by the golden ratio, modulo 1, and kappa0 grows."""
     share = _GOLDEN * (k - 2) % 1.0 if strategy.start == Start.SHARE else 1.0
     return strategy._replace(share=share, growth=_GROWTH ** ((k - 1) % _GROWTHS) if k > 0 else 1.0)
 

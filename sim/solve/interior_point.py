@@ -9,7 +9,7 @@ Algorithm 1 of Howell et al. 2022 (Dojo), a primal-dual method with the predicto
 
 It differs in these points (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
-* The friction cone is no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
+* The friction cone adds no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
   `smoothing` that follows down to kappa (contact_law.py); conic scalings jam on thin cones.
 * The boundary of the cones stops no step: pairs that would leave return to the central path.
 * No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.
@@ -140,7 +140,7 @@ def solve_from(
 def judge_solution(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], out: Outcome
 ) -> int:
-    """The Verdict on the outcome of an attempt; VALID where it is no solution.   inputs: (q, v, u)."""
+    """The Verdict on the outcome of an attempt; VALID if it is not a solution.   inputs: (q, v, u)."""
     if out.status != Status.SOLVED:
         return Verdict.VALID
     found = overlapping(model, data)

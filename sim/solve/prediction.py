@@ -1,4 +1,4 @@
-"""Where a motion goes on: the step linearised at its incoming velocity, with contacts and limits on the central path.
+"""Prediction of a step: the step linearised at its incoming velocity, with contacts and limits on the central path.
 
     H (v' - v25) = -R(v25, l) + B^T (l' - l),      w' = w(v25) + J (v' - v25) = w0 + G (l' - l)
 

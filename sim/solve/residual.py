@@ -47,7 +47,7 @@ def norm(x: Vector) -> float:
 
 @kernel
 def absorb_residual(model: Model, data: Data) -> None:
-    """momentum_out less the residual r of the joints: a motion hands on the momenta that its steps should have left, so
+    """momentum_out less the residual r of the joints: a motion carries over the momenta of exact steps, so
     that the tolerance of the solve does not add up.
 
     Each joint takes (f, m) = (sum r_k t_k, sum r_k a_k) at its point o from its body, and gives it to the parent: about

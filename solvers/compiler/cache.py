@@ -1,4 +1,4 @@
-"""Compiled code on disk: a folder that nobody else can write to, with one file per compiled signature.
+"""Compiled code on disk: a folder that no other user can write to, with one file per compiled signature.
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the folder is named by a digest of every source file that can reach a kernel, so any edit starts
@@ -105,7 +105,7 @@ def _opened(base: Path, forbidden: int) -> tuple[Path | None, str]:
     for part in (base, folder.parent, folder):
         part.mkdir(mode=0o700, exist_ok=True)
         about = part.stat()
-        # in a sticky folder, as /tmp is, nobody can put another one in the place of ours
+        # in a sticky folder such as /tmp, other users cannot replace ours
         bits = _OTHERS if part != base else 0 if about.st_mode & stat.S_ISVTX else forbidden
         if why := _foreign(part, about, bits):
             return None, why
@@ -123,7 +123,7 @@ def _prune(root: Path) -> None:
 
 
 def _found() -> tuple[Path | None, str]:
-    """(folder of the compiled code; why there is none, empty where nobody wants one)."""
+    """(folder of the compiled code; the reason if there is none, empty if it is turned off)."""
     if os.environ.get("DOJO_OPT_CACHE", "1") == "0":
         return None, ""
     try:
@@ -154,7 +154,7 @@ class Store:
         if self.folder is None:
             raise FileNotFoundError(name)
         path = self.folder / name
-        # a named pipe, which nobody writes to, would be waited for
+        # a named pipe without a writer would block
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | getattr(os, "O_NONBLOCK", 0))) as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode) or _foreign(path, about):
@@ -165,7 +165,7 @@ class Store:
         return data[_CHECK:]
 
     def write(self, name: str, body: bytes) -> None:
-        """Keep it, at once and as a whole; where that cannot be, say so once."""
+        """Store it atomically; warn once if that fails."""
         if self.folder is None or self._told:
             self.tell(self.why_not)
             return

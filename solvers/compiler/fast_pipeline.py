@@ -3,7 +3,7 @@
 Numba optimises every function together with all that it calls, translates it to machine code, and does both again
 for each of its callers. Here a kernel that kernels call is kept as it was written, and only entries are optimised and
 translated: functions called from Python or by their address. Inside an entry everything but itself is private, so that
-the optimiser may drop arguments nobody reads and copies nobody calls.
+the optimiser may drop unused arguments and uncalled copies.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _seldom_collected() -> Iterator[None]:
     try:
         yield
     finally:
-        if gc.get_threshold() == _SELDOM:  # nobody else has set another one meanwhile
+        if gc.get_threshold() == _SELDOM:  # unless it was changed meanwhile
             gc.set_threshold(*before)
 
 

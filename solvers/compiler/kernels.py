@@ -79,7 +79,7 @@ class _Form(CPUDispatcher):
 class Kernel:
     """A compiled function in two forms: an entry, which Python calls, and `inner`, for other kernels.
 
-    Each is made when it is first asked for: a dispatcher of Numba takes a third of a millisecond to make, and of the
+    Each is made on first use: a dispatcher of Numba takes a third of a millisecond to make, and of the
     hundreds of kernels that a plan imports Python calls a dozen.
     """
 

@@ -76,7 +76,7 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
     return types.BaseTuple.from_types(parts)
 
 
-_UNCOMPILED: list[OptionalKernel] = []  # asked for an address with NUMBA_DISABLE_JIT=1
+_UNCOMPILED: list[OptionalKernel] = []  # addresses requested with NUMBA_DISABLE_JIT=1
 
 
 class OptionalKernel:
@@ -102,7 +102,7 @@ class OptionalKernel:
 
     @property
     def compiled(self) -> bool:
-        """Whether its address was asked for."""
+        """Whether its address was requested."""
         return self._code is not None
 
     def signature(self) -> Any:

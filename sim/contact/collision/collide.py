@@ -29,7 +29,7 @@ def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: 
     hull     tables of polytopes (hull.py); one row will do where there are none
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
-             0       phi, signed distance [m], negative inside; 1e9 where there is no such point now
+             0       phi, signed distance [m], negative inside; 1e9 if the point does not exist now
              1:4     n, unit normal from b to a
              4:7     p, midpoint of the two nearest points [m]
              7:25    dn/d(v, w), 25:43 dp/d(v, w): (3, 6), row-major; (v, w) is the twist of a about the origin of b:

@@ -185,7 +185,7 @@ def _closing(
 
 
 def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list[Input]:
-    """One per degree of freedom of the actuated joints; those that close loops only when they are asked for."""
+    """One per degree of freedom of the actuated joints; joints that close loops only if requested."""
     by_name = {j.name: j for j in (*joints, *closing)}
     if choices.actuated is None:
         chosen = [j for j in joints if j.kind != "floating"]

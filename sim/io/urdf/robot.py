@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
 
 # URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
-# of Joint that nobody else has a word for. A kind's own name is read, too, except for "planar", which may turn in URDF.
+# of Joint without a standard word. A kind's own name is read, too, except for "planar", which may turn in URDF.
 KINDS = {
     "fixed": "fixed",
     "revolute": "revolute",

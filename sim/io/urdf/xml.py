@@ -74,7 +74,7 @@ class Element:
         if attribute not in self.attributes and default is not None:
             return default
         text = self.text(attribute)
-        # Python reads "1_000" and the digits of every script, too, which are no numbers of XML
+        # Python also reads "1_000" and the digits of every script, which are not numbers in XML
         plain = text.isascii() and "_" not in text
         try:
             values = [float(word) for word in text.split()] if plain else []
