@@ -1,4 +1,4 @@
-"""Footfall: which feet are on the ground when, where they stand, and how they swing from one foothold to the next."""
+"""Footfall: the contact schedule of feet, their footholds, and their swings from one foothold to the next."""
 
 from __future__ import annotations
 

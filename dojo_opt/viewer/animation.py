@@ -32,7 +32,16 @@ _FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
 
 
 def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
-    """Write the animation of a Trajectory or a plan; returns the path. simulator: for a result read from a file."""
+    """Write an animation that opens in a browser.
+
+    Args:
+        result: Trajectory, Plan or ClosedLoop.
+        path: of the HTML file.
+        simulator: for a result read from a file; that of the result by default.
+
+    Returns:
+        The path.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401

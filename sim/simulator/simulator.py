@@ -254,7 +254,13 @@ class Simulator(StateSpace):
         return text
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Batch:
-        """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
+        """Rollouts over all cores.
+
+        Args:
+            x0s: first states (n, nx).
+            us: inputs (n, T, nu).
+            throw: raise SimulationError if a step is not solved.
+        """
         call = "Simulator.rollout_batch"
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))

@@ -9,7 +9,7 @@ Algorithm 1 of Howell et al. 2022 (Dojo), a primal-dual method with the predicto
 
 It differs in these points (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
-* The friction cone adds no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
+* The friction cone has no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
   `smoothing` that follows down to kappa (contact_law.py); conic scalings jam on thin cones.
 * The boundary of the cones stops no step: pairs that would leave return to the central path.
 * No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.

@@ -22,7 +22,7 @@ SAMPLES = 10  # equal parts of a duration: whole steps for every time step of th
 
 @dataclass(frozen=True)
 class SmoothScene:
-    """One motion, and how its errors are told."""
+    """One motion, and the measure of its errors."""
 
     name: str
     mechanism: Mechanism
