@@ -127,7 +127,7 @@ def trot(
     """A quadruped of the A1's size trots at `speed` [m/s] for two periods of one second, 40 knots of 50 ms.
 
     With periodic=True a plan is one period long, unless `cycles` is given.
-    The defaults are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), its friction of
+    The defaults are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), friction of
     .8, and less damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of
     the base at the end is a constraint, torques are limited to 33.5 N m. speed=0 trots on the spot.
 
