@@ -33,7 +33,7 @@ class Cost(NamedTuple):
 
     name: str
     velocities: int  # unknowns of every step
-    variables: int  # of limits and near contacts
+    variables: int  # of limits and active contacts
     far: int  # inactive contacts
     bytes: int  # of the numbers of the mechanism, and of the scratch of one thread
     iterations: float  # per step

@@ -32,7 +32,7 @@ from solvers.rotation import cross, quat_matrix, quat_turn
 from solvers.status import Status
 from solvers.types import Cube, Matrix, Vector
 
-NEAR = -1  # in place of a Status: something is near
+NEAR = -1  # in place of a Status: a contact or limit is active
 
 _SOLVED = int(Status.SOLVED)
 

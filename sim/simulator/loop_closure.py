@@ -139,7 +139,7 @@ class Closure:
         return q
 
     def _with_shares(self, x: Floats) -> Floats:
-        """A copy of x where shares of bodies (closing.py) that are far from the rest of it are brought there."""
+        """A copy of x with distant shares of bodies (closing.py) moved to the rest of their body."""
         gaps = self.gaps(x)
         far = [j for j in self._mechanism.loops if is_weld(j) and np.abs(gaps[j.name]).max() > _APART]
         x = x.copy()

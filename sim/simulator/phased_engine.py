@@ -29,7 +29,7 @@ from sim.simulator.settings import Settings
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
-_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is far again are thrown away
+_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is inactive again are discarded
 
 
 class March(NamedTuple):
