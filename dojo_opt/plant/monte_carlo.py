@@ -1,4 +1,4 @@
-"""Monte Carlo: closed loops under disturbances drawn from a seed, and how many the robot survives."""
+"""Monte Carlo: closed loops under disturbances drawn from a seed, and the share that the robot survives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Microseconds per step and gradient of a robot, by time step, and how they compare with its motion.
+"""Microseconds per step and gradient of a robot, by time step, and in multiples of real time.
 
 The time of a gradient is the extra time of `Simulator.linearize_rollout` over `rollout`: it differentiates every step.
 """

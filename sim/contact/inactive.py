@@ -1,4 +1,4 @@
-"""The active set of contacts with the ground: which contacts the interior point solves for, and which it does not.
+"""The active set of contacts with the ground: the contacts that the interior point solves for.
 
 On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
 large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity

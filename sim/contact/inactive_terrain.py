@@ -1,4 +1,4 @@
-"""The impulse of an inactive contact on terrain, and how much it may change: inactive_impulses.py where frames turn."""
+"""The impulse of an inactive contact on terrain, and the bound of its change: inactive_impulses.py for rotating frames."""
 
 from __future__ import annotations
 

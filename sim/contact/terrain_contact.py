@@ -1,4 +1,4 @@
-"""Contacts on terrain, a height field F of their own radius (terrain.py): gap, frame, and how the frame turns.
+"""Contacts on terrain, a height field F of their own radius (terrain.py): gap, frame, and rotation of the frame.
 
     gap      phi = (z - F(x, y))/w of the centre (x, y, z) of the ball,    w = sqrt(1 + |grad F|^2)
     normal   n = (-F_x, -F_y, 1)/w

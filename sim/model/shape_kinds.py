@@ -1,4 +1,4 @@
-"""Shape, Pair: which pairs of shapes can touch, how their sizes are laid out, and how many contact points they have."""
+"""Shape, Pair: the supported pairs of shapes, the layout of their sizes, and the number of their contact points."""
 
 from __future__ import annotations
 

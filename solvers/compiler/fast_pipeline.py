@@ -1,4 +1,4 @@
-"""The fast pipeline: how kernels become machine code, each entry once, with all its callees, and nothing else.
+"""The fast pipeline from kernels to machine code: each entry once, with all its callees, and nothing else.
 
 Numba optimises every function together with all that it calls, translates it to machine code, and does both again
 for each of its callers. Here a kernel that kernels call is kept as it was written, and only entries are optimised and

@@ -1,4 +1,4 @@
-"""Parameters of the geometry of joints: where a joint sits, and how it is turned.
+"""Parameters of the geometry of joints: the place and orientation of a joint.
 
 Such a change moves the subtree of the joint like one more degree of freedom: by twists T1, T2, T3 at the three
 configurations, about O. So its column is that of `residual_derivatives` with T in the place of S:

@@ -1,4 +1,4 @@
-"""Heights of the terrains of a mechanism as parameters: which there are, and gradients by them.
+"""Heights of the terrains of a mechanism as parameters: their list, and gradients by them.
 
 They stand in a row, terrain after terrain in the order of the contacts, each like heights.ravel(). Kernels know the
 coefficients of one surface per terrain and radius (pack.py); their gradient is mapped to the heights here, all

@@ -1,4 +1,4 @@
-"""Rows of the dense system of the couplings (coupling_system.py): which there are, their forces and their responses."""
+"""Rows of the dense system of the couplings (coupling_system.py): their list, their forces and their responses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""LoopRank: how many constraints closed loops have, which of them are redundant, and whether the pose is singular."""
+"""LoopRank: the number of constraints of closed loops, the redundant ones, and whether the pose is singular."""
 
 from __future__ import annotations
 
