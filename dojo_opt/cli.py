@@ -1,7 +1,7 @@
-"""Command line: run a reference problem, make a report, list the models, compile ahead of time.
+"""Command line: run a reference problem, measure a robot, list or show the models, compile ahead of time.
 
-Every command returns its exit status: 0 on success, 1 when the work was done and did not succeed (a plan that did not
-converge, a bar that was missed with --strict), 2 for a command that cannot be understood.
+Every command returns its exit status: 0 on success, 1 on failure (a plan that did not converge, a missed bar with
+--strict), 2 for an invalid command.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dojo_opt.report.command import CHECKOUT, MOVED, add_arguments, report
 from dojo_opt.viewer.show import add_show, show
 from sim.mechanism.checks import nearest
 
-# what `run` knows; the gaits of the quadruped also go by the names of their examples, quadruped_trot and so on
+# names for `run`; the gaits of the quadruped also have the names of their examples, quadruped_trot and so on
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
@@ -36,22 +36,30 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"dojo-opt {dojo.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    what = "Plan a reference problem, or run a closed-loop task."
-    run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=what)
+    text = "Plan a reference problem, or run a closed-loop task."
+    run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=text)
     run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS]))
     run.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="argument of the problem or task: target=(1,0)"
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="argument of the problem or task, as target=(1,0)",
     )
     run.add_argument(
-        "--perturb", action="append", default=[], metavar="KEY=VALUE", help="of the plant of a task: payload=1.0"
+        "--perturb",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change of the plant of a task, as payload=1.0",
     )
-    run.add_argument("--seconds", type=float, metavar="S", help="length of a closed-loop task, 4 by default")
+    run.add_argument("--seconds", type=float, metavar="S", help="length of a closed-loop task [s], 4 by default")
     run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
-    run.add_argument("--json", action="store_true", help="print the result as JSON, and no table")
+    run.add_argument("--json", action="store_true", help="print the result as JSON instead of a table")
 
-    what = "Measure a robot: tables on the terminal; with --out a page with figures, and every number as JSON."
-    measure = commands.add_parser("report", help="measure a robot", description=what, epilog=CHECKOUT)
+    text = "Measure a robot. Print tables; with --out, write a page with figures and every number as JSON."
+    measure = commands.add_parser("report", help="measure a robot", description=text, epilog=CHECKOUT)
     add_arguments(measure, STUDIES, MOVED)
 
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
@@ -66,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
-    """`["goal=up", "target=(0.5, 0.5)"]` as keyword arguments; a value that is no Python literal stays a string."""
+    """`["goal=up", "target=(0.5, 0.5)"]` as keyword arguments; a value that is not a Python literal stays a string."""
     arguments: dict[str, Any] = {}
     for pair in pairs:
         key, equals, text = pair.partition("=")
@@ -125,7 +133,7 @@ def _run_loop(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
     else:
-        print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) over {loop.duration:.2f} s of all that is tracked:")
+        print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) in {loop.duration:.2f} s over all tracked coordinates:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
         if ms.size:
             times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back"
@@ -143,7 +151,7 @@ def _models(args: argparse.Namespace) -> int:
         rows = [asdict(entry) for entry in entries]
         print(json.dumps([{name: row[name] for name in row if name != "builder"} for row in rows]))
         return 0
-    print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  what")
+    print(f"{'name':<18}{'bodies':>7}{'nq':>4}{'nv':>4}{'nu':>4}{'contacts':>9}{'limits':>7}{'kg':>8}  description")
     for e in entries:
         sizes = f"{e.bodies:>7}{e.nq:>4}{e.nv:>4}{e.nu:>4}{e.contacts:>9}{e.limits:>7}{e.mass:>8.4g}"
         print(f"{e.name:<18}{sizes}  {e.what}")
@@ -161,7 +169,7 @@ def _warmup(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps({**numbers, "cache": str(folder) if folder else None}))
     else:
-        where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no folder can be used)"
+        where = f"cached in {folder}" if folder else "not cached (DOJO_OPT_CACHE=0, or no usable folder)"
         print("{signatures} signatures of {kernels} kernels in {seconds:.1f} s, ".format(**numbers) + where)
     return 0 if plan.success else 1
 
@@ -176,7 +184,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
 
 
 def _check_folders(args: argparse.Namespace) -> None:
-    """Refuse files that cannot be written before the work is done, not after."""
+    """Refuse output files that cannot be written, before the work begins."""
     for name in ("out", "html"):
         path = getattr(args, name, None)
         if path is not None and args.command != "report" and not path.parent.is_dir():

@@ -53,7 +53,7 @@ class Goal:
 
 
 def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: Integers) -> tuple[Any, Integers, Vector]:
-    """Reference, repeated components and signs of  lower - z <= 0  and  z - upper <= 0, infinite bounds left out."""
+    """Reference, repeated components and signs of  lower - z <= 0  and  z - upper <= 0, without infinite bounds."""
     columns = chosen.size
     with_inf = []
     for side, bound in (("lower", lower), ("upper", upper)):

@@ -36,8 +36,8 @@ class Tracking:
     """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, tangent to the manifold: rotation vectors.
 
     reference: (nx,), or one row per knot; weight: scalar, (ndx,), one row per knot, or a table by names as in
-    `Mechanism.components`, {"base": 10.0, "v": 0.1}, zero for what it does not name and later names before earlier
-    ones. knots: default all T + 1.
+    `Mechanism.components`, {"base": 10.0, "v": 0.1}, zero for components without a name in it; later names override
+    earlier ones. knots: default all T + 1.
     """
 
     reference: ArrayLike

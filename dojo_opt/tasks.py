@@ -101,7 +101,7 @@ def hopper_mpc(
     Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 4, the others .01, impulses
     .001 per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
 
-    What a push in flight costs grows until the foot is down: a light leg weight lets it reach down early. The weight on
+    A push in flight costs more until the foot is down: a light leg weight lets it reach down early. The weight on
     the velocity keeps the body from leaning further than friction holds on the way back. Impulses that weigh ten times
     as much, beside positions that weigh a tenth, are spared at the top of the hop: it is 40 mm too low then.
     """
@@ -141,7 +141,7 @@ def quadruped_mpc(
     5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
     terrain: that the model knows, whose height under the base is added to that of the reference; level ground without.
     settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it, and plans count on a
-    friction of .4 where the robot's feet have .8: what they ask for is there on slippery ground, too.
+    friction of .4 where the robot's feet have .8: the planned friction is available on slippery ground, too.
     """
     knot, horizon, limit = 0.04, 20, 33.5
     substeps = whole_number("tasks.quadruped_mpc(substeps=...)", substeps)

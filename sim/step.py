@@ -26,7 +26,7 @@ def step(
 
     guess: of the next velocity, x[nq:] when nothing better is known.
     report: (5,) Status, iterations, residual, violation, contact with the largest violation (-1: none). `out` holds the
-    last iterate when the status is not SOLVED; nobody must use it.
+    last iterate if the status is not SOLVED; do not use it.
     """
     nq = data.theta1.shape[0]
     q = x[:nq]
@@ -57,7 +57,7 @@ def _checked(
 ) -> Outcome:
     """The outcome of a step, refused where the forces of loops gave energy (loop_work.py), or it gained some.
 
-    inputs: (q, v, u). The interior point asks for the latter of every solution it finds.
+    inputs: (q, v, u). The interior point checks the latter for every solution.
     """
     if r.status == Status.SOLVED and loops_gained(model, data, options, inputs[1]):
         return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)

@@ -1,1 +1,1 @@
-"""Numerics that know nothing of robots: dense algebra, cones, the backward pass, box QP. Imports nothing of ours."""
+"""Numerics without robots: dense algebra, cones, the backward pass, box QP. Imports none of the other packages."""

@@ -6,7 +6,7 @@ from solvers.compiler import kernel
 from solvers.types import Vector
 
 _FAR = 1e30
-_LEAST = 1e-3  # a variable that fell below this share of what it was has left its cone
+_LEAST = 1e-3  # a variable that fell below this share of its former value has left its cone
 
 
 @kernel

@@ -14,7 +14,7 @@ from solvers.cones import onto_path
 from solvers.types import Matrix, Vector
 
 _SWEEPS, _SMALL = 20, 1e-2
-_STILL = 0.1  # of what ends the sweeps: a row that would move less stays, and moves no others
+_STILL = 0.1  # of the tolerance of the sweeps: a row that would move less stays, and moves no others
 
 
 @kernel
@@ -59,8 +59,8 @@ def relax_friction(columns: Matrix, j: int, bound: float, still: float, size: in
 def gauss_seidel(
     columns: Matrix, friction: Vector, h: float, kappa: float, points: int, size: int, w: Vector, l: Vector
 ) -> bool:
-    """Improve l, and w with it, until a sweep moves w by less than a hundredth of what the first one did; whether it
-    has come to that.
+    """Improve l, and w with it, until a sweep moves w by less than a hundredth of the first sweep; returns whether
+    it converged.
 
     columns: (n, n) G transposed, of which size x size are used;  friction: (n,), of contact i in 3 i;
     h: the time in which a slip becomes a gap, for w_n are lengths and w_t speeds;  points: contacts;  w: (n,) of l.

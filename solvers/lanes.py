@@ -4,7 +4,7 @@
     store(A, i, j, a * x + load(A, k, j))
 
 Numba's loops over two rows or more check on every run whether the rows overlap, and end in single numbers; both cost as
-much as what a row of twenty to eighty numbers asks for. Lanes say what is meant. A row that they fill has LANES more
+much as the work on a row of twenty to eighty numbers. Lanes are explicit. A row that they fill has LANES more
 numbers behind it than it needs, or a width that is a multiple of LANES (`whole`).
 """
 
@@ -165,7 +165,7 @@ def _compiled_spread(number: Any) -> Any:
 
 
 def _operator(function: Any, instruction: str) -> None:
-    """What an operator makes of lanes, and of a number and lanes."""
+    """Signatures of an operator on lanes, and on a number and lanes."""
     cases_ = [signature(_LANES, _LANES, _LANES), signature(_LANES, types.float64, _LANES)]
 
     class Cases(ConcreteTemplate):

@@ -1,7 +1,7 @@
 """LU factors with row pivoting of small matrices: the blocks of one joint, up to 6 x 6.
 
 An explicit inverse would not do: next to a stiff contact its rounding, times the square of the stiffness, swamps the
-derivative of the step. Triangular solves keep the residual small, which is what the elimination needs.
+derivative of the step. Triangular solves keep the residual small, as the elimination needs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Backward pass of iLQR on stacked arrays, with gaps, regularisation and control limits, and what it promises.
+"""Backward pass of iLQR on stacked arrays, with gaps, regularisation and control limits; its predicted cost change.
 
 With z = (dx, du), F = [A B] and n, m the sizes of dx and du:
 
@@ -40,7 +40,7 @@ class Quadratic(NamedTuple):
 
 
 class Regularization(NamedTuple):
-    """What is added to the model while the gains are computed; the value function stays exact."""
+    """Regularisation of the model for the gains; the value function stays exact."""
 
     control: float  # times diag(damping), added to Q_uu
     value: float  # times I, added to V_xx inside Q_uu and Q_ux
@@ -185,7 +185,7 @@ def _predict(quad: Quadratic, K: Stack, k: Matrix, z: Vector, y: Vector, dx: Vec
 
 
 def backward(quad: Quadratic, reg: Regularization, K: Stack, k: Matrix, free: Integers, buffer: Vector) -> Promise:
-    """Gains K (T, m, n), k (T, m) of the regularised model, and what the full step promises.
+    """Gains K (T, m, n), k (T, m) of the regularised model, and the change predicted for the full step.
 
     k on entry is the guess of the box QPs. free: (m,) integer scratch; buffer: (work_size(n, m),). The horizon is gone
     through in pieces, with Python between them, which hears Ctrl-C there.

@@ -1,4 +1,4 @@
-"""Status: why a computation ended, and one sentence for each reason."""
+"""Status: the reason for the end of a computation, and one sentence for each."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ class Status(IntEnum):
 MESSAGES: dict[Status, str] = {
     Status.SOLVED: "Solved to the requested tolerance.",
     Status.MAX_ITERATIONS: "The iteration limit was reached before the tolerance.",
-    Status.NO_PROGRESS: "The time step found no way to its tolerance; a smaller one may.",
-    Status.NOT_FINITE: "A number that is not finite appeared.",
-    Status.SINGULAR: "A matrix was singular, or not positive definite where it has to be.",
+    Status.NO_PROGRESS: "The time step did not converge to its tolerance; try a smaller one.",
+    Status.NOT_FINITE: "A number is not finite.",
+    Status.SINGULAR: "A matrix is singular, or not positive definite although it must be.",
     Status.ANGULAR_STEP: "A body turns by half a turn or more in one time step; use a smaller time step.",
-    Status.LOOP_STEP: "A loop passes a singular configuration faster than time steps can follow; use smaller ones.",
-    Status.COLLISION_STEP: "Shapes pass through one another, or gain energy, in what was found; use smaller steps.",
-    Status.ENERGY_STEP: "Every solution found gains energy, since bodies turn too far in one step; use smaller steps.",
-    Status.CONTACT_SUNK: "A contact is below the ground, and its joints let no motion lift it out.",
+    Status.LOOP_STEP: "A loop passes a singular configuration too fast for the time step; use a smaller one.",
+    Status.COLLISION_STEP: "Shapes pass through one another or gain energy in every solution found; use smaller steps.",
+    Status.ENERGY_STEP: "Every solution found gains energy: bodies turn too far in one step; use smaller steps.",
+    Status.CONTACT_SUNK: "A contact is below the ground, and no motion of its joints can lift it out.",
     Status.MAX_REGULARIZATION: "No positive definite control Hessian up to the largest regularisation.",
     Status.LINE_SEARCH: "No step size of the line search improves the plan.",
-    Status.TIME_LIMIT: "The time budget is used up.",
-    Status.SIMULATION_FAILED: "The simulator could not step along the trajectory.",
+    Status.TIME_LIMIT: "The time limit was reached.",
+    Status.SIMULATION_FAILED: "The simulator could not solve the steps of the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
-    Status.INTERRUPTED: "Ctrl-C ended it before it was done.",
+    Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
 }

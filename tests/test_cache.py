@@ -184,7 +184,7 @@ def test_a_full_disk_is_one_warning(filled: Filled) -> None:
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))\n"  # the system's own error for a write
     value, hits, told = filled.run(limit + COUNTED)
     assert (value, hits) == ("2.0", "0")
-    assert told.count("compiled code is not kept") == 1 and "NUMBA_CACHE_DIR" in told
+    assert told.count("compiled code cannot be stored") == 1 and "NUMBA_CACHE_DIR" in told
     assert list(filled.digest.iterdir()) == []
 
 
@@ -194,7 +194,7 @@ def test_a_disk_without_room_for_a_folder_is_one_warning(filled: Filled) -> None
         patch + "pathlib.Path.mkdir = full\n" + COUNTED, NUMBA_CACHE_DIR=str(filled.home / "new")
     )
     assert (value, hits) == ("2.0", "0")
-    assert told.count("compiled code is not kept") == 1 and "No space left on device" in told
+    assert told.count("compiled code cannot be stored") == 1 and "No space left on device" in told
 
 
 def test_a_filled_folder_that_is_read_only_is_read(filled: Filled) -> None:

@@ -29,20 +29,27 @@ def _jax() -> Any:
 def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpace | None = None) -> Functions:
     """step(x, u, theta=None) and rollout(x0, us, theta=None) of a simulator, for `jax.grad`, `jax.jit` and `jax.vmap`.
 
-    x, x0     (nx,) states, their quaternions of length one
-    u, us     (nu,), (T, nu) inputs [N, N m]
-    theta     (n,) the values of `parameters`; None: those of `sim`
-    returns   the next state (nx,); all states (T + 1, nx), x0 among them
+        x, x0    (nx,) states with unit quaternions
+        u, us    (nu,), (T, nu) inputs [N, N m]
+        theta    (n,) values of `parameters`; None: those of `sim`
 
-    kappa     of the derivatives [N s m], those of smoother contact than the simulator's own; that by default
+    Gradients with respect to a state have its shape; their quaternion part is tangent to the quaternion, the gradient
+    of the function that first normalises it. Under vmap, rollouts run on all cores. A gradient solves the steps once
+    more, and stores only the states. There is no forward mode (`jax.jvp`, `jax.jacfwd`): `Simulator.linearize` has
+    Jacobians. Callbacks run on the processor, whatever the device.
 
-    Gradients by a state have its shape: of a rotation they are tangent to the quaternion, the gradient of the function
-    that makes its length one first. Under vmap, rollouts are spread over the cores. A gradient solves the steps once
-    more, and keeps no more than the states. There is no forward mode (`jax.jvp`, `jax.jacfwd`): `Simulator.linearize`
-    has Jacobians. Callbacks run on the processor, whatever the device.
+    Args:
+        sim: the simulator.
+        kappa: of the derivatives [N s m], larger for smoother contact; that of the simulator by default.
+        parameters: the parameters in theta; none by default.
 
-    Errors of the simulator (SimulationError: an unsolved step; ValueError: numbers that are not finite, quaternions of
-    another length) end the computation, with their text in JAX's own error. ValueError here: JAX computes with 32 bits.
+    Returns:
+        (step, rollout): step gives the next state (nx,), rollout all states (T + 1, nx), including x0.
+
+    Raises:
+        ImportError: JAX is not installed.
+        ValueError: JAX computes with 32 bits. Errors of the simulator in a call (SimulationError: an unsolved step;
+            ValueError: numbers that are not finite, quaternions of another length) appear in JAX's own error.
     """
     jax = _jax()
     core = Rollouts(_CALL, sim, kappa, parameters)

@@ -40,7 +40,7 @@ class Rollouts:
     """Rollouts from x0 (..., nx) under us (..., T, nu) with the parameters theta (..., n), n = 0 for those of `sim`.
 
     kappa       of the derivatives [N s m]; the simulator's by default. Steps are solved at that of the simulator
-    parameters  what theta stands for
+    parameters  the parameters in theta
     """
 
     def __init__(self, call: str, sim: Simulator, kappa: float | None, parameters: ParameterSpace | None) -> None:
@@ -59,7 +59,7 @@ class Rollouts:
             return 0
         if self._space is None:
             raise ValueError(
-                f"{self.call}: rollout(theta): there are no parameters; give parameters=ParameterSpace(...)"
+                f"{self.call}: rollout(theta): no parameters are declared; give parameters=ParameterSpace(...)"
             )
         return len(self._space.values)
 

@@ -14,21 +14,29 @@ _CALL = "bridges.to_torch"
 def to_torch(sim: Simulator, kappa: float | None = None, parameters: ParameterSpace | None = None) -> Functions:
     """step(x, u, theta=None) and rollout(x0, us, theta=None) of a simulator, for PyTorch's autograd.
 
-    x, x0     (..., nx) states, their quaternions of length one
-    u, us     (..., nu), (..., T, nu) inputs [N, N m]
-    theta     (..., n) the values of `parameters`; None: those of `sim`
-    returns   the next states (..., nx); all states (..., T + 1, nx), x0 among them
+        x, x0    (..., nx) states with unit quaternions
+        u, us    (..., nu), (..., T, nu) inputs [N, N m]
+        theta    (..., n) values of `parameters`; None: those of `sim`
 
-    Tensors are of doubles. Leading axes are broadcast, and what they hold is spread over the cores.
+    Tensors hold doubles. Leading axes are broadcast, and their rows run on all cores.
 
-    kappa     of the derivatives [N s m], those of smoother contact than the simulator's own; that by default
+    Gradients with respect to a state have its shape; their quaternion part is tangent to the quaternion, the gradient
+    of the function that first normalises it. A gradient solves the steps once more, and stores only the states; it has
+    no gradient of its own.
 
-    Gradients by a state have its shape: of a rotation they are tangent to the quaternion, the gradient of the function
-    that makes its length one first. A gradient solves the steps once more, and keeps no more than the states; it has no
-    gradient of its own.
+    Args:
+        sim: the simulator.
+        kappa: of the derivatives [N s m], larger for smoother contact; that of the simulator by default.
+        parameters: the parameters in theta; none by default.
 
-    Raises SimulationError: a step that is not solved; ValueError: shapes, numbers that are not finite, quaternions of
-    another length; TypeError: tensors of floats.
+    Returns:
+        (step, rollout): step gives the next states (..., nx), rollout all states (..., T + 1, nx), including x0.
+
+    Raises:
+        ImportError: PyTorch is not installed.
+        SimulationError: in a call, a step is not solved.
+        ValueError: in a call, a shape is wrong, a number not finite, or a quaternion not of unit length.
+        TypeError: in a call, a tensor does not hold doubles.
     """
     try:
         import torch

@@ -1,4 +1,4 @@
-"""Steps of a biped: the weight goes onto one foot, the other swings forward, the weight goes between the two."""
+"""Steps of a biped: the weight moves onto one foot, the other swings forward, the weight moves between the two."""
 
 from __future__ import annotations
 

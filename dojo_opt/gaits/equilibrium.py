@@ -102,20 +102,29 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
 
 
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
-    """(state, input): a state near x, by default the neutral one, that a step under the input leaves where it is.
+    """A state of rest near x, and the input that holds it.
 
     The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows;
-    the joints carry what gravity and springs leave; inputs that act on bodies are zero. On the central path a contact
+    the joints balance gravity and springs; inputs that act on bodies are zero. On the central path a contact
     with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
-    carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that shall carry have to be
+    carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry load have to be
     within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by
     `dojo_opt.gaits.feet.Feet.place`.
 
-    ValueError when no such forces exist: the centre of mass is not above the feet, a joint without input would have to
-    carry something, the ground is steeper than friction holds, or the smoothing is so large that contacts far above the
-    ground carry the weight.
-
     Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
+
+    Args:
+        sim: the simulator.
+        x: state (nx,); the neutral state by default.
+        iterations: the largest number of Newton iterations.
+
+    Returns:
+        (state (nx,), input (nu,)).
+
+    Raises:
+        ValueError: no such forces exist: the centre of mass is not above the feet, a joint without input would have
+            to carry load, the ground is steeper than friction holds, or the smoothing is so large that inactive
+            contacts carry the weight.
     """
     if not isinstance(sim, Simulator):
         raise TypeError(f"equilibrium(sim): expected a Simulator, got {sim!r}")

@@ -1,4 +1,4 @@
-"""Feet: the balls by which a robot stands on the ground, where they are, and the joint angles that put them there."""
+"""Feet: the balls by which a robot stands on the ground, their places, and the joint angles for given places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Footfall: which feet are on the ground when, where they stand, and how they swing from one foothold to the next."""
+"""Footfall: the contact schedule of feet, their footholds, and their swings from one foothold to the next."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Footfall:
         return now + 0.5 * (1.0 - np.cos(angle)) * (later - now), self.step_height * np.sin(angle)
 
     def _foothold(self, number: Any) -> Any:
-        """Where foot i stands in its step `number`: where the base asks for it in the middle of the stance."""
+        """Where foot i stands in its step `number`: below the base in the middle of the stance."""
         place, heading = self.base((number + self.offset + 0.5 * self.duty) * self.period)
         return place + np.exp(1j * heading) * self.foothold
 

@@ -33,43 +33,47 @@ _KEYWORDS = "speed period duty lateral heading_rate cycles step_height height fo
 
 
 def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
-    """Diagonal feet together. Keywords of all periodic gaits:
+    """A trot: diagonal feet together. Keywords of all periodic gaits:
 
     speed, lateral [m/s]   of the base, forward and to the left
     heading_rate [rad/s]   positive turns left
     period [s]             a whole number of time steps
     duty                   share of the period that a foot is on the ground
     cycles                 number of periods
-    step_height [m]        by which a swinging foot is lifted
+    step_height [m]        lift of a swinging foot
     height [m]             of the base, on average; default: that of the neutral state
     footholds (k, 2) [m]   from the base in the middle of a stance, forward and to the left; default: as in the neutral
                            state
-    tilt [rad]             largest roll and pitch that the base may take from the change of its feet
+    tilt [rad]             largest roll and pitch of the base due to the change of its feet
 
-    ValueError when a foot cannot reach, or a joint would go beyond its limits.
+    Returns:
+        Gait with states and contact schedule.
+
+    Raises:
+        ValueError: a foot cannot reach its place, or a joint would exceed its limits.
     """
     return _periodic(sim, "trot", _TROT, speed=speed, period=period, duty=duty, **gait)
 
 
 def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float = 0.5, **gait: Any) -> Gait:
-    """Feet of the same side together; keywords as for `trot`."""
+    """A pace: feet of the same side together; keywords as for `trot`."""
     return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
 
 
 def bound(
     sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
 ) -> Gait:
-    """Hind feet together, then front feet, with a flight in between for duty < 0.5; keywords as for `trot`."""
+    """A bound: hind feet, flight (for duty < 0.5), front feet, flight; keywords as for `trot`."""
     return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
 
 
 def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
-    """One foot after the other: left hind, left front, right hind, right front; keywords as for `trot`."""
+    """A walk: left hind, left front, right hind, right front foot; keywords as for `trot`."""
     return _periodic(sim, "walk", _WALK, speed=speed, period=period, duty=duty, **gait)
 
 
 def hop(sim: Simulator, *, speed: float = 0.0, period: float = 0.5, duty: float = 0.5, **gait: Any) -> Gait:
-    """All feet together, again and again; keywords as for `trot`."""
+    """A hop: all feet together; keywords as for `trot`."""
     return _periodic(sim, "hop", _HOP, speed=speed, period=period, duty=duty, **gait)
 
 
@@ -79,7 +83,7 @@ def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **ga
 
 
 def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None) -> Gait:
-    """All feet on the ground below the neutral state's, for `duration` [s], the base at rest at `height` [m]."""
+    """Stand for `duration` [s] with the feet below those of the neutral state and the base at `height` [m]."""
     _check_legs("gaits.stand", sim)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
     feet, ground = Feet(sim), _ground(sim)
@@ -100,7 +104,7 @@ def jump(
     before: float = 0.3,
     after: float = 0.4,
 ) -> Gait:
-    """From standing to standing `distance` [m] ahead, with the base rising by `height` [m] above standing.
+    """A jump from standing to standing `distance` [m] ahead; the base rises by `height` [m].
 
     The base sinks by `crouch` [m] within `before` [s], is pushed at constant acceleration back to where it stood, flies
     with its feet drawn in by `clearance` [m], and comes to rest in the same way, within `after` [s].

@@ -40,8 +40,8 @@ class ParameterSpace:
 
     names    parameters, as in `Simulator.parameters`; they are their own coordinates
     bodies   whose mass, centre of mass and inertia are fitted together, in ten coordinates of which every value is a
-             body (inertia_coordinates.py); `inertia` among the names instead may leave what bodies can have, and then
-             `simulator` raises a ValueError
+             body (inertia_coordinates.py); `inertia` among the names instead may leave the set of physical bodies, and
+             then `simulator` raises a ValueError
     bounds   {name or body coordinate: (low, high)}, within those that mechanisms have: masses, sizes, friction > 0,
              springs, dampers, armatures, radii >= 0, restitution from 0 to 1
 
@@ -131,7 +131,7 @@ class ParameterSpace:
         self._append([name], chart, rows)
 
     def _limits(self, name: str, kind: str, value: float) -> tuple[float, float]:
-        """What mechanisms can have; of `kind:*`, which moves all parts by as much, what the last of them can have."""
+        """Admissible range; for `kind:*`, which shifts all parts equally, the intersection of their ranges."""
         if ":*" not in name:
             return _limits(kind, value)
         found = self._sim.parameters((kind,))
@@ -163,12 +163,12 @@ def _kind(name: str) -> str:
 
 
 def _unit(name: str) -> str:
-    """What is one coordinate, or one group of them: a vector whole, other parameters by themselves."""
+    """The group of a coordinate: a whole vector, or a single parameter."""
     return name.partition("[")[0] if name.startswith(_VECTORS) else name
 
 
 def _limits(kind: str, value: float) -> tuple[float, float]:
-    """What mechanisms can have."""
+    """Admissible range of a kind of parameter."""
     if kind in _POSITIVE:
         return _LEAST * abs(value), np.inf
     if kind == "restitution":

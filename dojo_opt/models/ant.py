@@ -37,7 +37,7 @@ def ant(
 
     spring [N m/rad] and damper [N m s/rad] of the hinges; limits: whether they have stops; friction of the nine
     contacts (feet, knees, torso); law: see Contact. Masses, lengths and stops are those of gym's ant, as Dojo has
-    them; what is welded to the torso is part of it. It stands with its ankles bent by one radian.
+    them; parts welded to the torso belong to it. It stands with its ankles bent by one radian.
     """
     torso = Link(0.3272, (0.0, 0.0, 0.0), np.full(3, 0.4 * 0.3272 * 0.25**2), Sphere(0.25))
     out = {leg: np.array([x, y, 0.0]) for leg, (x, y, _) in LEGS.items()}

@@ -1,4 +1,4 @@
-"""Boxes end to end along x, the first one free: what snake and twister have in common."""
+"""Boxes end to end along x, the first one free: the common part of snake and twister."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def box_chain(
     """(bodies link_0, link_1, ..., joints base, joint_1, ..., front end, rear end of a box).
 
     joint: kind of all joints; axes: theirs, in turn; size: length, width, height [m]; spring and damper of
-    each joint. ValueError: n is no whole number of boxes; the message names `call`.
+    each joint. ValueError: n is not a whole number of boxes; the message names `call`.
     """
     n = whole_number(f"{call}(n)", n)
     links = [Body(f"link_{i}", mass, shape=Box(*size)) for i in range(n)]

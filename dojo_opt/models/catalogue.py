@@ -11,7 +11,7 @@ from sim.mechanism.pack import mechanism_sizes
 
 @dataclass(frozen=True)
 class Entry:
-    """One model: its sizes as built with default parameters, and what it is."""
+    """One model: its sizes as built with default parameters, and a description."""
 
     name: str
     bodies: int
@@ -30,7 +30,7 @@ class Entry:
 
 
 def entry(builder: Callable[..., Mechanism]) -> Entry:
-    """The entry of a builder: what it builds with default parameters."""
+    """The entry of a builder: its model with default parameters."""
     mech, what = builder(), (builder.__doc__ or "").split("\n")[0]
     size, mass = mechanism_sizes(mech), sum(body.mass for body in mech.bodies)
     sizes = (size.nbody, size.nq, size.nv, size.nu, size.ncontact, size.nlimit)

@@ -111,7 +111,7 @@ class MPC:
         """Input (nu,) [N, N m] for the measured state x (nx,) at `time` [s]; with a `delay`, that for time + delay."""
         now = checks.number("MPC(time)", time)
         if self.log and now < self.log[-1].time:
-            raise ValueError(f"MPC(time): time goes on, {now:g} s is before {self.log[-1].time:g} s; see reset()")
+            raise ValueError(f"MPC(time): expected a time after {self.log[-1].time:g} s, got {now:g} s; see reset()")
         measured = checks.array("MPC(x)", x, (self.sim.nx,))
         self._measured.add(now, measured)
         if self.policy is None:

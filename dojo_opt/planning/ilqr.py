@@ -69,7 +69,7 @@ def ilqr(
 
     A guess of states begins at the stage that it fits best, so that smooth contact does not lead a good one away. A
     guess in which a joint rests that has to move begins at the smoothest stage. When an attempt fails, the planner
-    begins again at another stage, within `max_iterations`; the table of iterations says so.
+    restarts at another stage, within `max_iterations`; the table of iterations shows it.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones. The plan
     is then one of the finer problem, and its history is that of both.
@@ -84,7 +84,7 @@ def ilqr(
         **settings: fields of `dojo.Options` by name; they take precedence over `options`.
 
     Returns:
-        The plan; `success`, `status` and `message` say how the solve ended.
+        The plan; `success`, `status` and `message` describe the end of the solve.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
@@ -102,7 +102,7 @@ def ilqr(
     plan = solver.solve(controls, states, warm_start)
     if finer is None or not plan.success:
         return plan
-    options.say(f"Once more, every time step cut into {problem.refinement}:")
+    options.say(f"Refinement: every time step divided by {problem.refinement}:")
     last = Solver(finer, options).solve(warm_start=plan)
     history, seconds = plan.history + last.history, plan.seconds + last.seconds
     both = replace(last, nit=plan.nit + last.nit, history=history, seconds=seconds)
@@ -113,7 +113,7 @@ def ilqr(
 class Iteration(NamedTuple):
     """Result of `Solver.iterate`."""
 
-    status: Status  # SOLVED: as good as the stage asks for, or all its iterations are used; LINE_SEARCH: stuck
+    status: Status  # SOLVED: the stage converged or used all its iterations; LINE_SEARCH: stuck
     message: str
     now: Iterate  # the trajectory that was reached
     K: Stack  # (T, nu, ndx) gains of the last backward pass
@@ -243,7 +243,7 @@ class Solver:
         return self._search.iterate(shot, None, kappa) if shot.status == Status.SOLVED else None
 
     def iterate(self, now: Iterate, K: Stack | None = None, *, began: float | None = None) -> Iteration:
-        """Iterate from a trajectory as often as the first stage of the options says.
+        """Iterate from a trajectory, as often as the first stage of the options allows.
 
         Args:
             now: the trajectory, from `guess`, `rollout`, or the iteration before.
@@ -500,7 +500,7 @@ class Solver:
         return Status.SOLVED
 
     def _step(self, promise: Promise, stage: Stage, kappa_grad: float) -> float:
-        """Search along the gains, and regularise as the step size asks for; the step size, 0 when none is accepted."""
+        """Search along the gains, and adapt the regularisation to the step size, which is 0 if none is accepted."""
         before, damping, kappa = self.now, self._damping, stage.kappa_eval
         start = None if self._start is None else self._start.step
         direction = Direction(self._k, self._K, start, self._linear, promise)
@@ -612,14 +612,14 @@ class Solver:
         now, mu = self.now, self._damping.mu
         if now.gaps is None:
             k, d0, d1 = start.solve(model, self._K, self._k, mu, self._unit, now.x, now.u)
-            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a start that is left alone may promise more
+            if d0 + 0.5 * d1 < promise.d0 + 0.5 * promise.d1:  # rounding: a fixed start may promise more
                 self._k[:] = k
                 return promise._replace(d0=d0, d1=d1)
         start.step[:] = 0.0
         return promise
 
     def _fault(self, promise: Promise) -> Status:
-        """Why the backward pass at `now` failed with that promise; `_detail` says where."""
+        """Why the backward pass at `now` failed with that promise; `_detail` has the knot."""
         model, knot = self._model(), promise.knot
         if promise.status == Status.MAX_ITERATIONS:
             self._detail = f" That of the quadratic program of the control limits, at knot {knot}."

@@ -1,4 +1,4 @@
-"""Search: how far to go along the gains of a backward pass, by rollouts or by a step of all states at once."""
+"""Search: the step size along the gains of a backward pass, by rollouts or by a step of all states at once."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def fitting_stage(horizon: Horizon, now: Iterate, stages: tuple[Stage, ...]) -> 
 def at_rest(sim: Any, objective: Objective, now: Iterate) -> bool:
     """Whether a joint rests in the states from the second on, though it starts elsewhere or has to move.
 
-    Such a guess fits a hard contact because nothing happens there. It says nothing of how contact moves that joint:
+    Such a guess fits a hard contact because nothing happens there. It does not show how contact moves that joint:
     smooth stages find that out.
     """
     start, *_ = steps = np.abs(sim.difference(now.x[1:], now.x[:-1]))[:, : sim.nv]

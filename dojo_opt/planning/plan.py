@@ -86,10 +86,16 @@ class Plan:
         return np.arange(float(len(self.x))) * (self.time_step * self.substeps)
 
     def repeated(self, count: int) -> Plan:
-        """The motion of a periodic plan `count` times in a row, with the gains that go with it.
+        """The motion of a periodic plan `count` times in a row, with its gains.
 
-        fun is that of all cycles; multipliers, penalties and history stay behind. ValueError for a plan that does not
-        repeat itself, or that was loaded from a file and knows no simulator.
+        Args:
+            count: number of cycles.
+
+        Returns:
+            A plan; `fun` is that of all cycles, and it has neither multipliers nor penalties.
+
+        Raises:
+            ValueError: the plan is not periodic, or was loaded from a file and has no simulator.
         """
         n = whole_number("Plan.repeated(count)", count)
         if self.stride is None or self.problem is None:

@@ -82,7 +82,7 @@ class Problem:
             `start` is then a guess. With the constraint `Periodic`, such a plan is a gait that repeats itself.
 
     Raises:
-        TypeError: for a `sim` that is no Simulator, or an entry of `cost` or `constraints` that is no term.
+        TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
         ValueError: for a wrong shape, a number that is not finite, or a horizon that exceeds the memory.
     """
 
@@ -142,10 +142,16 @@ class Problem:
             )
 
     def refined(self, count: int = 5) -> Problem:
-        """The same problem with every time step cut into `count`: same knots, inputs, terms; `refined_constraints` too.
+        """The same problem with shorter time steps: same knots, inputs and terms, and `refined_constraints`.
 
-        A plan with long steps may live on the few instants at which they let a foot touch the ground, and stumble in
-        shorter ones. `ilqr(problem.refined(5), warm_start=plan)` makes one of it that holds there, too.
+        A plan with long steps may exploit the few instants at which a foot touches the ground, and stumble with shorter
+        steps. `ilqr(problem.refined(5), warm_start=plan)` adapts it to them.
+
+        Args:
+            count: number by which every time step is divided.
+
+        Returns:
+            The new problem.
         """
         count = whole_number("Problem.refined(count)", count)
         finer = copy.copy(self)

@@ -39,12 +39,18 @@ def kernel(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) 
         def keep_away(x, u, out):
             out[0] = 0.3 - np.hypot(x[0] - 1.0, x[1])
 
-    Costs and constraints take plain functions as well, and compile them; other functions that those call have to be
-    kernels. All that Numba supports of Python and NumPy is allowed, except writing into x and u. Compiled once per
-    process, for all functions with the same text and the same values around it. An index beyond the end of an array is
-    an error that names function and knot; `@dojo.kernel(boundscheck=False)` saves the look at it, between a twentieth
-    and a quarter of the time of a residual, and reads or writes elsewhere in memory instead. Numba never frees code: a
-    residual with a text or a value that was not there before keeps about 2 MiB, until the process ends.
+    Costs and constraints also take plain functions, and compile them; other functions that those call have to be
+    kernels. Everything that Numba supports of Python and NumPy is allowed, except writing into x and u. Functions with
+    the same text and the same captured values are compiled once per process. Numba never frees code: each new text or
+    captured value keeps about 2 MiB until the process ends.
+
+    Args:
+        func: function of (x (nx,), u (nu,), out (dimension,)).
+        boundscheck: raise an error that names function and knot for an index beyond the end of an array. Without the
+            check, a twentieth to a quarter of the time of a residual, such an index reads or writes other memory.
+
+    Returns:
+        The compiled function.
     """
     if func is None:
         return partial(users_kernel, boundscheck=boundscheck)

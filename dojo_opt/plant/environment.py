@@ -28,10 +28,10 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         observation   state x (nx,), measured
         action        (nu,) in [-1, 1] between the problem's control limits; inputs [N, N m] where it has none
         reward        minus the problem's costs at the knot, and with the last step those at the end
-        terminated    the robot has fallen, or a step could not be solved: `info["message"]` says which
+        terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
         truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
 
-    plant    what is acted on, by default the problem's own simulator from the problem's start; its time step divides a
+    plant    the plant, by default the problem's own simulator from the problem's start; its time step divides a
              knot. sampler: generator -> Perturbation, drawn at every reset from the environment's seed.
     """
 

@@ -60,7 +60,7 @@ class ClosedLoop:
     def error(self) -> Matrix:
         """(N + 1, nv) true (-) reference coordinates over time [m, rad]."""
         if self.reference is None:
-            raise ValueError("ClosedLoop.error: there is no reference; give closed_loop(reference=...)")
+            raise ValueError("ClosedLoop.error: no reference was given; use closed_loop(reference=...)")
         sim = self.simulator
         return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
 

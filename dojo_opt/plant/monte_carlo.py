@@ -1,4 +1,4 @@
-"""Monte Carlo: closed loops under disturbances drawn from a seed, and how many the robot survives."""
+"""Monte Carlo: closed loops under disturbances drawn from a seed, and the share that the robot survives."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MonteCarloRun:
     survived: bool
     message: str
     duration: float  # [s]
-    rms: float  # `ClosedLoop.rms` of all that is tracked [m, rad]; NaN without a reference
+    rms: float  # `ClosedLoop.rms` of all tracked coordinates [m, rad]; NaN without a reference
     x: Vector  # (nx,) last state
     log: Sequence[Tick]
     perturbation: Perturbation
@@ -120,7 +120,7 @@ def monte_carlo(
             context: forked processes inherit no threads), Dask's `client.get_executor()`, Ray's or MPI's pools
             (default None: one run after the other).
         control_step: time between calls of the controller [s] (default None: every time step of the plant).
-        components: coordinates of the `rms` of each run, as in `ClosedLoop.rms` (default None: all that is tracked).
+        components: coordinates of the `rms` of each run, as in `ClosedLoop.rms` (default None: all tracked ones).
 
     Returns:
         All runs, in the order of their numbers.

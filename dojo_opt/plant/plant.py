@@ -43,7 +43,7 @@ class Plant:
 
     Raises:
         TypeError: for an argument of the wrong kind, or an unknown field.
-        ValueError: for a value out of range, or a delay that is no multiple of the time step.
+        ValueError: a value is out of range, or a delay is not a multiple of the time step.
     """
 
     def __init__(

@@ -46,7 +46,7 @@ def finish(ax: Axes, ylabel: str, xlabel: str) -> Axes:
         ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, borderaxespad=0.2)
     legend = ax.get_legend()
     for label in legend.get_texts() if legend else ():
-        label.set_parse_math(False)  # names of a user, in which a dollar sign is no formula
+        label.set_parse_math(False)  # names of a user, in which a dollar sign is not a formula
     return ax
 
 

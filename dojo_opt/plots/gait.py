@@ -1,4 +1,4 @@
-"""Figures of walking: which foot is on the ground, how hard it presses, how near it is to sliding, where it goes."""
+"""Figures of walking: contact schedule, normal forces, use of friction, and paths of the feet."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def friction_use(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def foot_paths(m: Motion, ax: Axes) -> Axes:
-    """Height of the underside of every foot over the way it goes; drawn larger where the foot is on the ground."""
+    """Height of the underside of every foot over its path; larger while the foot is on the ground."""
     loaded = _loaded(m)
     substeps = max(1, len(loaded) // max(1, len(m.u)))
     for row, k in enumerate(_feet(m)):

@@ -23,7 +23,7 @@ _FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c844
 def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float = 2.0) -> Any:
     """Figure of `size` inches: bodies as hulls of their shapes, joints as lines between them, contacts as red balls.
 
-    q: coordinates (nq,), those of the neutral state when left out. Bodies without a shape are drawn as lines from
+    q: coordinates (nq,), by default those of the neutral state. Bodies without a shape are drawn as lines from
     their joint to those that they carry.
     """
     from matplotlib.figure import Figure

@@ -20,12 +20,12 @@ __all__ = ["block", "hop", "swingup"]
 
 
 def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:
-    """Raibert's hopper jumps from rest to `target` [m] (x, y from where it stands) in one second, 20 knots of 50 ms.
+    """Raibert's hopper jumps from rest to `target` [m] (x, y from its start) in one second, 20 knots of 50 ms.
 
     A knot is one step of 50 ms, or `substeps` shorter ones. Knots 0 to 9 track the target `height` above the ground it
     stands on, the others the target itself; squares of position weigh 1, attitude .1, leg 1, velocity and angular
     velocity .01, leg rate .01, and impulses .01 per (N s)^2. At the end the pose is a constraint. The guess is the leg
-    force that carries the body.   Howell et al. 2022, Dojo, hopper example.
+    force that balances the weight.   Howell et al. 2022, Dojo, hopper example.
     """
     knot, horizon = 0.05, 20
     place = np.array(checks.vector("problems.hop(target=...)", target, 2))

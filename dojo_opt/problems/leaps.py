@@ -40,13 +40,13 @@ def leap(
     for two fifths that half-way to the goal, `height` up, then that at the goal. Squares of place weigh 1, 1, 20,
     attitude 2, angles .05 per second, the rest as in `follow`, and the pose of the base at the end is a constraint. The
     guess is a robot that stands still, at the smoothing of the planner's first stage: states and torques. Its torques
-    alone are no guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
+    alone are not a guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
 
     Legs that push from where they stand reach their torque limits below .27 m: hence the crouch, which no planner finds
     from a goal that is up. `ilqr` ends with every step cut into `refinement`, since most leaps planned with steps of
     20 ms stumble at their landing in shorter ones, and there the height is a constraint, too: half-way between the
-    crouch and the landing the base is that much higher than at first, or the plan is no success. With refinement=1, the
-    height is asked for and missed by up to some centimetres.
+    crouch and the landing the base is that much higher than at first, or the plan fails. With refinement=1, the
+    plan may miss the height by some centimetres.
     """
     call = "problems.leap"
     distance = checks.number(f"{call}(distance=...)", distance)

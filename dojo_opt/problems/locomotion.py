@@ -1,4 +1,4 @@
-"""Problems of a quadruped: follow a reference gait, and arrive where it arrives."""
+"""Problems of a quadruped: follow a reference gait to its final pose."""
 
 from __future__ import annotations
 
@@ -43,23 +43,25 @@ def follow(
     effort: float = EFFORT,
     periodic: bool = False,
 ) -> Problem:
-    """Follow a gait, and have the base where the gait has it at the end: place and attitude are constraints.
+    """Follow a gait; place and attitude of the base at its end are constraints.
 
     A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
-    torques by inverse dynamics, whose gaps are closed on the way; "standing" from nothing but a robot that stands
-    still all the time, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
+    torques by inverse dynamics, whose gaps the solve closes; "standing" from a robot that stands
+    still, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
     squares: place [1/m^2] along x, y, z, attitude [1/rad^2] and effort [1/(N m)^2]; angles weigh .2, velocities of the
     base .01, joint rates .001.
 
-    periodic: instead of a start at the first state of the gait and a goal, the start is free, but for its place along x
-    and y and its heading, and the end has to be the start, moved on as the gait moves on. The plan's gains are periodic
-    then, and `plan.repeated(5)` walks on with them.
+    periodic: instead of a start at the first state of the gait and a goal, the start is free except its place along x
+    and y and its heading, and the end must equal the start plus the displacement of the gait over one period. The
+    gains of the plan are periodic, and `plan.repeated(5)` continues the walk.
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
     substeps = whole_number("problems.follow(substeps=...)", substeps)
     if (len(gait.x) - 1) % substeps:
-        raise ValueError(f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are no multiple of {substeps}")
+        raise ValueError(
+            f"problems.follow(substeps=...): {len(gait.x) - 1} time steps are not a multiple of {substeps}"
+        )
     reference = gait.x[::substeps]
     horizon = len(reference) - 1
     knot = sim.time_step * substeps
@@ -95,7 +97,7 @@ def weights(sim: Simulator, place: ArrayLike, attitude: float, angle: float) -> 
 
 
 def standing(sim: Simulator, feet: tuple[str, ...] | None = None) -> tuple[Array, Array]:
-    """State and torques of a robot that stands on its feet at the smoothing a planner begins with."""
+    """State and torques of a standing robot at the first smoothing of the planner."""
     on_feet = replace(sim.mechanism, contacts=Feet(sim, feet).contacts)
     return equilibrium(sim.replace(mechanism=on_feet, kappa=CONTINUATION[0].kappa_eval))
 
@@ -124,9 +126,9 @@ def trot(
 ) -> Problem:
     """A quadruped of the A1's size trots at `speed` [m/s] for two periods of one second, 40 knots of 50 ms.
 
-    A plan with periodic=True is one period long, unless it is given `cycles`.
-    By default the reference of Dojo's quadruped example, with its weights (impulses .01 per (N m s)^2), its friction of
-    .8 and less damping in the joints (5 N m s/rad there, .5 here, where the robot falls over by itself). The pose of
+    With periodic=True a plan is one period long, unless `cycles` is given.
+    The defaults are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), friction of
+    .8, and less damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of
     the base at the end is a constraint, torques are limited to 33.5 N m. speed=0 trots on the spot.
 
     settings: of `gaits.trot` (period, duty, cycles, heading_rate, ...), of `follow` (guess, ...), friction.
@@ -181,8 +183,8 @@ def jump(
     """The quadruped jumps `distance` [m] forward, its base rising by `height` [m]: standing, flight, standing.
 
     settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction. Jumps planned with steps of
-    20 ms land up to 72 mm off at 1 ms, those up and backwards worst. As for `leap`, `ilqr` therefore ends with every
-    step cut into `refinement`, and they land within 4 mm. There the height is a constraint, at the top of the gait.
+    20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for `leap`, `ilqr` therefore ends
+    with every step divided by `refinement`, and jumps land within 4 mm. There the height at the top is a constraint.
     """
     problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
     tracking = problem.specs[0][0]

@@ -13,25 +13,27 @@ from dojo_opt.report.study import STUDIES, Studies, run_reports
 from sim.io.urdf.load import load_urdf
 from sim.mechanism.parts import Contact
 
-CHECKOUT = "Reference scenes and other engines: python benchmarks/compare.py --help, from a checkout."
+CHECKOUT = "For reference scenes and other engines, run python benchmarks/compare.py --help from a checkout."
 MOVED = ("contact", "planning", "mechanics", "compile")  # studies that `dojo-opt report` had
 
 
 def add_arguments(parser: argparse.ArgumentParser, studies: Studies, moved: Sequence[str] = ()) -> None:
-    """Add the arguments of studies; the names in `moved` are refused with the command that has them."""
-    names = {"all": "every study", **{name: what for name, (what, *_) in studies.items()}}
-    listing = "; ".join(f"{name}: {what}" for name, what in names.items())
+    """Add the arguments of studies; refuse the names in `moved` with the command that runs them."""
+    names = {"all": "every study", **{name: text for name, (text, *_) in studies.items()}}
+    listing = "; ".join(f"{name}: {text}" for name, text in names.items())
     parser.add_argument("name", type=_named(names, moved), metavar="NAME", help=listing)
-    parser.add_argument("robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="the robot that is measured")
-    parser.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
+    parser.add_argument(
+        "robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="robot to measure; a quadruped by default"
+    )
+    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, as for an arm")
     parser.add_argument(
         "--contacts",
         nargs="+",
         metavar="LINK[=RADIUS]",
-        help="links of ROBOT.urdf that touch the ground, with their shapes, or a ball about their origin [m]",
+        help="links of ROBOT.urdf that touch the ground, by their shapes or by a ball of RADIUS [m] about their origin",
     )
     parser.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
-    parser.add_argument("--quick", action="store_true", help="fewer and shorter rounds: a check that it runs")
+    parser.add_argument("--quick", action="store_true", help="run fewer and shorter rounds, as a check")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
     parser.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
 
@@ -75,7 +77,7 @@ def report(
 
 
 def _contacts(words: Sequence[str] | None) -> list[str | Contact] | None:
-    """Links, and balls about their origins.  ValueError: a radius is no number."""
+    """Links, and balls about their origins.  ValueError: a radius is not a number."""
     if words is None:
         return None
     found: list[str | Contact] = []
@@ -89,7 +91,7 @@ def _contacts(words: Sequence[str] | None) -> list[str | Contact] | None:
 
 
 def _command(args: argparse.Namespace, name: str, program: Sequence[str]) -> str:
-    """The command that measures a study again, with all that decides what is measured."""
+    """The command that reproduces a study, with all arguments that affect it."""
     robot, fixed = [str(args.robot)] if args.robot else [], ["--fixed"] * args.fixed
     contacts = ["--contacts", *args.contacts] if args.contacts else []
     return shlex.join([*program, name, *robot, *fixed, *contacts, *["--quick"] * args.quick])

@@ -33,8 +33,8 @@ class Cost(NamedTuple):
 
     name: str
     velocities: int  # unknowns of every step
-    variables: int  # of limits and near contacts
-    far: int  # contacts left out
+    variables: int  # of limits and active contacts
+    far: int  # inactive contacts
     bytes: int  # of the numbers of the mechanism, and of the scratch of one thread
     iterations: float  # per step
     step: NDArray[np.float64]  # (rounds,) [s] of a motion, each step looking from where the one before ended
@@ -79,7 +79,7 @@ def costs(scenes: Sequence[CostScene], rounds: int) -> list[Cost]:
 
 
 def _sizes(scene: CostScene, solved: bool) -> tuple[int, int, int, int]:
-    """(velocities, variables, far, bytes) of the first step; nothing is far when it is not solved."""
+    """(velocities, variables, far, bytes) of the first step; none are inactive if it is not solved."""
     sim = scene.simulator
     far = sim.left_out(scene.state) if solved else ()
     laws = {name: Law(int(law)) for name, law in zip(sim.mechanism.contact_names, sim.model.contact_law, strict=True)}

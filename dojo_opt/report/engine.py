@@ -1,4 +1,4 @@
-"""The motion that a simulation returns, the interface of an engine, and how its processor time is measured."""
+"""The motion that a simulation returns, the interface of an engine, and the measurement of its processor time."""
 
 from __future__ import annotations
 

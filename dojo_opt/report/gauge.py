@@ -1,4 +1,4 @@
-"""Gauge: what studies read off a run, by one formula for every engine."""
+"""Gauge: measures of a run for studies, by one formula for every engine."""
 
 from __future__ import annotations
 

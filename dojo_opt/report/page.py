@@ -81,7 +81,7 @@ def _overview(reports: Mapping[str, Report]) -> Table:
 
 
 def _markdown(reports: Mapping[str, Report], command: str) -> str:
-    lines = ["# dojo-opt: what it measures here", "", _code(command), "", *_markdown_table(_overview(reports))]
+    lines = ["# dojo-opt: measurements", "", _code(command), "", *_markdown_table(_overview(reports))]
     for name, report in reports.items():
         lines += ["", f"## {_plain(report.title)}", "", *([_plain(report.summary), ""] if report.summary else [])]
         if report.figure is not None:
@@ -100,7 +100,7 @@ def _plain(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    """A span of code, whose fence is longer than what is inside."""
+    """A span of code, whose fence is longer than any inside."""
     fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
     pad = " " if len(fence) > 1 else ""
     return f"{fence}{pad}{' '.join(text.split())}{pad}{fence}"
@@ -116,7 +116,7 @@ def _markdown_table(table: Table) -> list[str]:
 
 def _html(reports: Mapping[str, Report], pictures: Mapping[str, bytes], command: str) -> str:
     first = next(iter(reports.values()))
-    parts = ["<h1>dojo-opt: what it measures here</h1>", f"<p><code>{escape(command)}</code></p>"]
+    parts = ["<h1>dojo-opt: measurements</h1>", f"<p><code>{escape(command)}</code></p>"]
     parts.append(f'<p class="small">{escape(_facts(first))}</p>')
     overview = _html_table(_overview(reports))
     for name in map(escape, reports):
@@ -135,7 +135,7 @@ def _html(reports: Mapping[str, Report], pictures: Mapping[str, bytes], command:
 
 
 def _html_section(table: Table) -> str:
-    """A table under its title; a long one is shown when asked for."""
+    """A table under its title; a long one is folded."""
     note = f'<p class="small">{escape(table.note)}</p>' if table.note else ""
     if table.title and len(table.rows) > _LONG:
         summary = f"<summary>{escape(table.title)} ({len(table.rows)} rows)</summary>"

@@ -1,4 +1,4 @@
-"""Report: what one study measured, as rows with their bars, tables, a figure, and every raw number."""
+"""Report: the results of one study, as rows with their bars, tables, a figure, and every raw number."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Table:
 
 @dataclass
 class Report:
-    """What one study measured, on which machine, by which command."""
+    """The results of one study, with its machine and command."""
 
     title: str
     command: str = ""  # run_report writes it
@@ -67,7 +67,7 @@ class Report:
     details: dict[str, Any] = field(default_factory=dict)  # every raw number
     notes: list[str] = field(default_factory=list)
     machine: dict[str, Any] = field(default_factory=lambda: machine())
-    summary: str = ""  # what was measured, and against which reference
+    summary: str = ""  # the subject, and its reference
     figure: Any = None  # a matplotlib Figure
 
     def met(self) -> bool:

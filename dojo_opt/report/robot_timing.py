@@ -1,6 +1,6 @@
-"""Microseconds per step and gradient of a robot, by time step, and how they compare with its motion.
+"""Microseconds per step and gradient of a robot, by time step, and in multiples of real time.
 
-The time of a gradient is what `Simulator.linearize_rollout` takes beyond `rollout`: it differentiates every step.
+The time of a gradient is the extra time of `Simulator.linearize_rollout` over `rollout`: it differentiates every step.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from sim.mechanism.mechanism import Mechanism
 
 Item = TypeVar("Item")
 
-Studies = Mapping[str, tuple[str, str, str]]  # name -> (what it measures, module, class)
+Studies = Mapping[str, tuple[str, str, str]]  # name -> (subject, module, class)
 
 # the studies of one robot, in the order of `report all`
 STUDIES: Studies = {
@@ -25,7 +25,7 @@ STUDIES: Studies = {
     ),
     "stability": ("the time steps at which it is stable", "dojo_opt.report.stability", "RobotStability"),
     "gradients": ("error and cost of its derivatives", "dojo_opt.report.gradients", "RobotGradients"),
-    "lean": ("omitted terms, and what each feature costs", "dojo_opt.report.lean", "OmittedTerms"),
+    "lean": ("omitted terms, and the cost of each feature", "dojo_opt.report.lean", "OmittedTerms"),
     "timing": ("microseconds per step and gradient, by time step", "dojo_opt.report.robot_timing", "RobotTiming"),
 }
 
@@ -76,10 +76,10 @@ def study(
         name: A key of `studies`.
         quick: Fewer and shorter scenes.
         mechanism: The robot to measure; None for the scenes of the study, or, in a study of one robot, the quadruped.
-        studies: What there is; those of one robot by default.
+        studies: Known studies; those of one robot by default.
 
     Raises:
-        ValueError: There is no such study, or it takes no mechanism.
+        ValueError: The study does not exist, or does not take a mechanism.
     """
     if name not in studies:
         raise ValueError(f"report: no report {name!r}; there are {', '.join(studies)}")
@@ -106,7 +106,7 @@ def run_report(
     """Run the study of that name; verbose shows a progress bar on stderr. Arguments as in `study`."""
     made = study(name, quick=quick, mechanism=mechanism, studies=studies)
     report = made.run(Progress(sys.stderr if verbose else None))
-    report.command = f"dojo-opt report {name}{' --quick' if quick else ''}"  # the command line knows it better
+    report.command = f"dojo-opt report {name}{' --quick' if quick else ''}"  # the command line replaces it
     return report
 
 
@@ -121,7 +121,7 @@ def run_reports(
     """Run several studies; arguments as in `study`.
 
     Returns:
-        The reports by name. Of several studies, one that ends with an error is a report that says so: its only bar is
+        The reports by name. Of several studies, one that fails gives a report of its error: its only bar is
         missed, and its details have the "error".
 
     Raises:

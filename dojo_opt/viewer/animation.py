@@ -32,7 +32,16 @@ _FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
 
 
 def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
-    """Write the animation of a Trajectory or a plan; returns the path. simulator: for a result read from a file."""
+    """Write an animation that opens in a browser.
+
+    Args:
+        result: Trajectory, Plan or ClosedLoop.
+        path: of the HTML file.
+        simulator: for a result read from a file; that of the result by default.
+
+    Returns:
+        The path.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401
@@ -78,7 +87,7 @@ def _floor() -> list[Any]:
 
     plane, lines = Node(("meshcat", "floor", "plane")), Node(("meshcat", "floor", "lines"))
     half, places = 0.5 * _GRID, np.arange(-0.5 * _GRID, 0.5 * _GRID + 0.5 * _SQUARE, _SQUARE)
-    # in pieces: software renderers leave out lines that begin behind the camera
+    # in pieces: software renderers drop lines that begin behind the camera
     starts = np.arange(-half, half, _PIECE)
     ends = [(along, side) for along in places for start in starts for side in (start, start + _PIECE)]
     points = np.array([(a, b, 0.0) for a, b in ends] + [(b, a, 0.0) for a, b in ends]).T
@@ -138,7 +147,7 @@ def _node(kind: str, number: int, name: str) -> Any:
 
 
 def _label(before: str, name: str) -> str:
-    """What MeshCat calls a part with a name of the user's: in its paths a slash separates, and in its table of parts
+    """The MeshCat name of a part named by the user: in its paths a slash separates, and in its table of parts
     JavaScript has words of its own, such as "constructor", which the number before keeps apart.
     """
     return escape(f"{before} {name.replace('/', '|')}")

@@ -18,17 +18,23 @@ __all__ = ["add_show", "show"]
 
 def add_show(commands: Any) -> None:
     """The arguments of the command."""
-    what = "Load a model, a URDF or an MJCF file; print what it consists of, let it go, and show the motion."
-    parser = commands.add_parser("show", help="look at a robot: a model, a URDF or an MJCF file", description=what)
-    parser.add_argument("robot", metavar="ROBOT", help="a model that `dojo-opt models` lists, ROBOT.urdf, or ROBOT.xml")
-    parser.add_argument("--fixed", action="store_true", help="the root of ROBOT.urdf does not move: an arm")
-    parser.add_argument("--repair", action="store_true", help="replace inertias of ROBOT.urdf that no body can have")
-    parser.add_argument("--seconds", type=float, default=2.0, metavar="S", help="length of the motion, 2 by default")
-    parser.add_argument("--time-step", type=float, default=0.005, metavar="H", help="[s], .005 by default")
-    parser.add_argument("--drop", type=float, default=0.0, metavar="M", help="height that it falls from [m]")
+    text = "Load a model, a URDF or an MJCF file; print its parts, drop it, and show the motion."
+    parser = commands.add_parser("show", help="show a robot: a model, a URDF or an MJCF file", description=text)
+    parser.add_argument(
+        "robot", metavar="ROBOT", help="name of a model (see `dojo-opt models`), ROBOT.urdf, or ROBOT.xml"
+    )
+    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, as for an arm")
+    parser.add_argument(
+        "--repair", action="store_true", help="replace inertias of ROBOT.urdf that no rigid body can have"
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=2.0, metavar="S", help="length of the motion [s], 2 by default"
+    )
+    parser.add_argument("--time-step", type=float, default=0.005, metavar="H", help="time step [s], .005 by default")
+    parser.add_argument("--drop", type=float, default=0.0, metavar="M", help="height of the drop [m], 0 by default")
     parser.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the motion")
     parser.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
-    parser.add_argument("--json", action="store_true", help="print sizes and motion as JSON, and no text")
+    parser.add_argument("--json", action="store_true", help="print sizes and motion as JSON instead of text")
 
 
 def load(args: argparse.Namespace) -> dojo.Mechanism:

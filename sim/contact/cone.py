@@ -2,8 +2,8 @@
 
     mu gamma v_t + psi beta = 0,      psi = a + sqrt(a^2 + |v_t|^2),   a = kappa / (2 mu gamma)
 
-is what (mu gamma, beta) o (psi, v_t) = kappa e says once psi is eliminated: |beta| < mu gamma follows from it, so the
-cone is no constraint of the iteration and cannot jam it. beta is solved for by Newton's method.
+is (mu gamma, beta) o (psi, v_t) = kappa e after elimination of psi. It implies |beta| < mu gamma, so the
+cone is not a constraint of the iteration and cannot jam it. beta is solved for by Newton's method.
 
 With b = mu gamma the same path is also
 
@@ -108,8 +108,8 @@ def condense_sliding(z: Vector, k: Vector, b0: float, kappa: float, share: float
 def condense_sticking(z: Vector, k: Vector, b0: float, kappa: float, share: float, W: Vector, q: Vector) -> None:
     """(kappa I - 2 s beta^T) dbeta = -c dv_t - share 2 b s db - (c v_t + kappa beta),   c = b^2 - |beta|^2
 
-    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t where that is near what the
-    law says, against beta and at most twice as fast, and otherwise what it says, -kappa beta/c: the matrix is definite.
+    by the inverse  (I + e s beta^T)/kappa,   e = 2/(kappa - 2 s.beta).   s is the slip v_t if that is near the
+    law, against beta and at most twice as fast, and otherwise that of the law, -kappa beta/c: the matrix is definite.
     """
     x, y, b1, b2 = k[Kin.SLIP1], k[Kin.SLIP2], z[Cone.FRICTION1], z[Cone.FRICTION2]
     n = b1 * b1 + b2 * b2

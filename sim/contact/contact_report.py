@@ -1,4 +1,4 @@
-"""What a step has to say about its contacts, near and far."""
+"""The report of a step about its contacts, active and inactive."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def contact_jacobian(model: Model, data: Data, h: float, c: int) -> None:
     gap     n        (d3 + R3 p) x n
     slip    t/h      (d3 x t + c y + s x y)/h - R3 p x (omega x t),   y = r x t
 
-    and what a terrain adds because its frame changes from place to place.
+    and the terms of a terrain whose frame changes from place to place.
     """
     i = model.contact_body[c]
     k = data.contact_kin[c]

@@ -5,7 +5,7 @@ Between the grid lines i and i + 1, at the fraction t, F is the sum of four coef
     (1 - t)^3/6,   (3 t^3 - 6 t^2 + 4)/6,   (-3 t^3 + 3 t^2 + 3 t + 1)/6,   t^3/6
 
 along either direction; one row of coefficients lies outside of the grid on every side. Beyond it all coefficients are
-those of the edge: the ground goes on level within three cells.
+those of the edge: the ground becomes level within three cells.
 
 Columns of terrain_place: Grid of sim/model/columns.py.
 """

@@ -1,8 +1,8 @@
-"""The active set of contacts with the ground: which contacts the interior point solves for, and which it does not.
+"""The active set of contacts with the ground: the contacts that the interior point solves for.
 
 On the central path a contact is an explicit force law of its gap and slip, gamma = kappa/gap and friction with it. At a
 large gap that force hardly changes within a step. Such a contact is inactive: its impulse is given, like gravity
-(inactive_impulses.py); it is no variable of the interior point and no part of its matrix. Contacts of one body against
+(inactive_impulses.py); it is not a variable of the interior point nor in its matrix. Contacts of one body against
 one direction are a cluster, tested as one ball.
 
 A cluster is inactive when its stiffness, relative to the inertia behind it, is below the tolerance of the step:
@@ -107,7 +107,7 @@ def choose_active(model: Model, data: Data, options: StepOptions) -> None:
 
 @kernel
 def _enlist(model: Model, data: Data, c: int) -> None:
-    """Append a cluster to inactive_first, or its contacts to `active`; what cannot move is in neither."""
+    """Append a cluster to inactive_first, or its contacts to `active`; contacts that cannot move are in neither."""
     if model.contact_hold[c] != 0:
         return
     if data.inactive[c, Inactive.ACTIVATION] > 0.0:

@@ -1,6 +1,6 @@
 """Impulses of inactive contacts (inactive.py): the law of the central path, evaluated again when motion has changed it.
 
-Most of what changes is the moment, for arms turn with the body. That is known exactly: of a cluster whose law still
+Most of the change is in the moment: arms turn with the body. That is known exactly: of a cluster whose law still
 holds only the arms are turned, at a cost that does not depend on the number of its contacts.
 """
 

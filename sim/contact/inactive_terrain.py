@@ -1,4 +1,4 @@
-"""The impulse of an inactive contact on terrain, and how much it may change: inactive_impulses.py where frames turn."""
+"""The impulse of an inactive contact on terrain, and the bound of its change (see inactive_impulses.py)."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def return_pyramid(model: Model, data: Data, c: int, weight: float, kappa: float
 def condense_pyramid(model: Model, data: Data, c: int) -> None:
     """d(beta)/d(gap, slip):  W_tt = -(K - psi g e e^T),  W_tn = -mu (gamma/s) psi g e,  K = diag(k1 + k2, k3 + k4).
 
-    On the diagonal K and psi g e^2 nearly cancel where the contact slides, but not as sums of what is positive:
+    On the diagonal K and psi g e^2 nearly cancel where the contact slides, but not as sums of positive terms:
 
         (k1 + k2) (s_psi + psi (k3 + k4)) g + 4 psi k1 k2 g
     """

@@ -9,8 +9,8 @@ the way of one step above the ground. It is the usual law, with a floor that imp
 
     s = phi3 - floor,   s gamma = kappa,      floor = (1 - e) phi2 + e phi1 of an impact, 0 otherwise
 
-so everything else stays what it is, friction too, and so does a body at rest: it does not come nearer. What comes
-slower than max(2 g h, sqrt(kappa / (m h))) is no impact: it would be back within a few steps, or the forces of the
+so everything else is unchanged, including friction and bodies at rest: they do not approach. An approach
+slower than max(2 g h, sqrt(kappa / (m h))) is not an impact: it would be back within a few steps, or the forces of the
 central path would keep it off the ground. With friction and several contacts Newton's law may feed energy in (Kane's
 example); so does the turning of bodies, of first order in the time step: the impulse acts along the normal at the end
 of the step, the gap changes along those on the way. Where the impulses f of a step did work in all,
@@ -20,7 +20,7 @@ of the step, the gap changes along those on the way. Where the impulses f of a s
 its restitutions are lowered, all of them by the same part, and it is solved again, until they do none: without
 restitution they do not.
 
-What the impulses do not do, the energy at the nodes may, by a part of first order in the time step: an impact is
+The impulses do no work, but the energy at the nodes may change by a part of first order in the time step: an impact is
 somewhere within one. A frictionless chain of three bodies with e = 1 gained up to 1.0e-3 of its energy in two impacts
 at 2 ms, 1.5e-4 at .25 ms, and lost .3 % and .05 % (median of eight falls); between impacts, 1.7e-5 and 3e-7.
 
@@ -44,7 +44,7 @@ from sim.model.slots import Slot
 from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, transposed_times
 
-_NOISE = 1e-6  # of the work of all impulses: what counts as none
+_NOISE = 1e-6  # of the work of all impulses: threshold for zero
 _FINEST = 2.0**-12  # part by which restitutions are lowered at least, where they are
 _NEVER = 1e9  # [m]
 
@@ -62,7 +62,7 @@ def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
             data.rot3[i, k] = rot[i, k]
     for m in range(data.active_ground_count[0]):
         contact_kinematics(model, data, h, data.active[m])
-    data.feature_choice[0] = FeatureChoice.EVERY_POSE  # what touched there, whatever it is now
+    data.feature_choice[0] = FeatureChoice.EVERY_POSE  # features that touched there, active now or not
     pair_kinematics(model, data, h)
     data.feature_choice[0] = FeatureChoice.ONCE
     for m in range(data.active_count[0]):
@@ -85,7 +85,7 @@ def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
         )
         for r in range(3):
             b[16 + r if first else 19 + r] = F[Frame.POINT + r]
-        if is_absent(data, c - model.contact_height.shape[0]):  # no impact of what was not there
+        if is_absent(data, c - model.contact_height.shape[0]):  # absent contacts have no impact
             b[14 if first else 15] = -_NEVER if first else _NEVER
 
 

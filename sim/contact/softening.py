@@ -1,15 +1,15 @@
 """How hard the contacts of a derivative are: no harder than digits allow.
 
-The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: what is
-left of the inertia in the directions that the contact leaves free would be its last two digits. A contact that gives a
+The condensed law df = W d(gap, slip) is added to the inertia of a body, and a hard impact has W/m up to 1e14: only
+two digits of the inertia in the free directions of the contact would remain. A contact that gives a
 little, E = W^-1 - D, has nearly the same derivative: it differs by D/G, G the velocity per impulse that the bodies
 answer with there, and rounding adds 1e-16 M/D, M the same of a body that is free. So
 
     W' = (W^-1 - D)^-1 = (I - W D)^-1 W,      D = diag(h d, d, d),      d = 3e-8 sqrt(M G)
 
-balances the two; a contact that gives more than D is left alone. 3e-14 M W' is an estimate of what is lost
-(Linearization.accuracy), 1e-6 where M = G. M is 1/m of the bodies that touch, with what is fixed to them. G is known
-from what the impulse gamma has done: it has stopped the speed v of the contact point, or carried weight for h, so
+balances the two; a contact that gives more than D is not changed. 3e-14 M W' is an estimate of the loss
+(Linearization.accuracy), 1e-6 where M = G. M is 1/m of the bodies that touch, with all parts fixed to them. G follows
+from the effect of the impulse gamma: it has stopped the speed v of the contact point, or carried weight for h, so
 G = (v + |g| h)/gamma. A foot of 1 kg under a load of 1000 kg has G = M/1000, and its impulses are not taken for those
 of a foot alone.
 """
@@ -76,7 +76,7 @@ def responses(model: Model, data: Data, h: float, c: int) -> tuple[float, float]
 
 @kernel
 def soften(model: Model, data: Data, h: float, c: int) -> None:
-    """W of contact c becomes W', its derivative by friction (contact_scale) what it is then; contact_hard: M W'."""
+    """W of contact c becomes W'; its derivative by friction (contact_scale) changes with it; contact_hard: M W'."""
     W = data.contact_W[c]
     q = (
         data.contact_scale[c, ConeScale.RESIDUAL + 2 : ConeScale.RESIDUAL + 4]

@@ -1,11 +1,11 @@
-"""Contacts on terrain, a height field F of their own radius (terrain.py): gap, frame, and how the frame turns.
+"""Contacts on terrain, a height field F of their own radius (terrain.py): gap, frame, and rotation of the frame.
 
     gap      phi = (z - F(x, y))/w of the centre (x, y, z) of the ball,    w = sqrt(1 + |grad F|^2)
     normal   n = (-F_x, -F_y, 1)/w
     frame    t1, t2: the x and y axes turned with z into n the shortest way, so that no normal is special
 
-F is what the centre of a ball of this radius cannot sink below, the surface at that distance: n is normal to the ground
-where the ball touches it. On an inclined plane all is what it is on a half-space. Per displacement dc of the centre:
+F is the lower bound of the centre of a ball of this radius, the surface at that distance: n is normal to the ground
+where the ball touches it. On an inclined plane all terms are those of a half-space. Per displacement dc of the centre:
 
     dphi = m.dc,   m = n - (phi/w^2) (H grad F, 0),   dn = -(I - n n^T) H dc/w,   H the second derivatives of F
     the frame turns by  n x dn + n (n_y dn_x - n_x dn_y)/(1 + n_z)

@@ -1,4 +1,4 @@
-"""What couplings add to the derivatives of a step: their wrenches F on a and -F on b depend on both bodies' poses.
+"""Terms of couplings in the derivatives of a step: their wrenches F on a and -F on b depend on both bodies' poses.
 
     dF = K_a zeta_a + K_b zeta_b  at configuration 3,   K2_a, K2_b at configuration 2
 

@@ -1,4 +1,4 @@
-"""Stiffness of closed loops: how the wrench of their forces turns with the bodies at configuration 2."""
+"""Stiffness of closed loops: the rotation of their wrenches with the bodies at configuration 2."""
 
 from __future__ import annotations
 

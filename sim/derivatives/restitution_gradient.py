@@ -138,7 +138,7 @@ def _rates(model: Model, data: Data, h: float, c: int, twists: tuple[Vector, Vec
 
 @kernel
 def _impulse_wrench(model: Model, data: Data, c: int, g: Vec3) -> None:
-    """couple_wrench = what W (gap, slip) does about O."""
+    """couple_wrench = the wrench of W (gap, slip) about O."""
     W, k, o = data.contact_W[c], data.contact_kin[c], data.origin
     p = data.pos2[model.contact_body[c]]
     fn = W[0] * g[0] + W[1] * g[1] + W[2] * g[2]

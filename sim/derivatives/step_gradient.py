@@ -64,7 +64,7 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
 def _joint_columns(model: Model, data: Data, h: float, v: Vector) -> None:
     """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T).
 
-    What the lanes of dR_dq and dR_dv write behind their columns are the places of dR_dv, and of the inputs.
+    Lanes of dR_dq and dR_dv write beyond their columns, into the places of dR_dv and of the inputs.
     """
     nv = v.shape[0]
     add_limit_derivatives(model, data, h)

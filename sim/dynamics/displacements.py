@@ -1,4 +1,4 @@
-"""How far the bodies move over an interval: the poses at configurations 3 and 1 from those at 2, down the tree.
+"""Displacements of the bodies over an interval: the poses at configurations 3 and 1 from those at 2, down the tree.
 
 A velocity is a displacement over h. As a difference of two poses it would carry their rounding, eps |x|/h; here every
 displacement is that of the parent plus that of the joint, rounded to eps |h v|:
@@ -188,7 +188,7 @@ def move_back(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
 
 @kernel
 def other_quaternions(data: Data) -> None:
-    """quat1 and quat3, from the turns: what only derivatives by parameters ask for."""
+    """quat1 and quat3, from the rotation increments; only derivatives by parameters need them."""
     for i in range(data.quat2.shape[0]):
         b = data.quat2[i]
         t = data.turn_in[i]

@@ -39,7 +39,7 @@ def subtree_sums(model: Model, wrench: Matrix, out: Matrix) -> None:
 
 @kernel
 def numbers(s: Vector) -> Twist:
-    """Six numbers that are read once: the processor cannot know that what is written meanwhile leaves them alone."""
+    """Six numbers, read once: the compiler cannot tell that intermediate writes do not alias them."""
     return s[0], s[1], s[2], s[3], s[4], s[5]
 
 

@@ -105,7 +105,7 @@ def _twists(model: Model, data: Data, count: int) -> None:
 
 @kernel
 def column_count(model: Model, data: Data) -> int:
-    """Columns in use, 2 nv + nu; the rows of `columns` go on with zeros."""
+    """Columns in use, 2 nv + nu; the rest of the rows of `columns` is zero."""
     return 2 * data.columns.shape[0] + model.input_kind.shape[0]
 
 
@@ -113,7 +113,7 @@ def column_count(model: Model, data: Data) -> int:
 def solve_panel(model: Model, data: Data) -> None:
     """columns := H^-1 columns, as `solve` for one right-hand side.
 
-    Leaves the twists of the bodies in `panel` where there are couplings, which ask for them.
+    Leaves the twists of the bodies in `panel` if there are couplings, which need them.
     """
     count = column_count(model, data)
     if solve_deep_panel(model, data, count) == 0:

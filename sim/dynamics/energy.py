@@ -41,8 +41,8 @@ def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, fall: 
         linear     p = m (x2 - x1)/h + fall m g
         angular    x2 x p + P-(1, 2)
 
-    fall: h/2 at the node, 0 before what acts there.   out: (nbody, 6).
-    Springs and joints are left out: between bodies they cancel.
+    fall: h/2 at the node, 0 before the forces there act.   out: (nbody, 6).
+    Springs and joints are omitted: between bodies they cancel.
     """
     for i in range(model.body_parent.shape[0]):
         P, t, m = out[i], end.turn[i], model.body_mass[i]

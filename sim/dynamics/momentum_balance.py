@@ -52,9 +52,9 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
 
     momentum_in = (m (x2 - x1)/h + h m g + h f,  -P(c', -s') + h tau)      at the centre of mass
 
-    -P(c', -s') is, in world axes, the P(c', s') with which the body left configuration 1: what a step hands on.
+    -P(c', -s') is, in world axes, the P(c', s') with which the body left configuration 1: steps carry it over.
 
-    False when a body turned by half a turn or more from 1 to 2: the state is not what it seems.
+    False when a body turned by half a turn or more from 1 to 2: the state is invalid.
     """
     before = (data.origin[0], data.origin[1], data.origin[2])
     place_origin(model, data, q)

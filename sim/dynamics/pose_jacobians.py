@@ -1,7 +1,7 @@
 """Derivatives of the momentum balance of each body by its poses at configurations 1, 2 and 3, about O.
 
 A3   d/d(pose 3): Newton matrix of the step, contacts condensed
-A2   d/d(pose 2): what is left of a rotation of all three configurations, which only turns the balance
+A2   d/d(pose 2): the rest of a rotation of all three configurations, which only rotates the balance
 A1   d/d(pose 1): the incoming momentum
 """
 

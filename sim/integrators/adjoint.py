@@ -49,7 +49,7 @@ class Sweep(NamedTuple):
     twists: Matrix  # (12, 6)
     below: Vector  # (nbody,)
     places: Matrix  # (1, 3 nground) scratch
-    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) when not asked for
+    heights: Matrix  # (1, ncoefficient of the terrains) out; (1, 0) if not requested
 
 
 @kernel
@@ -142,7 +142,7 @@ def _residual_gradient(model: Model, data: Data, w: Vector, y: Vector) -> None:
 
 @kernel
 def _add_parameters(model: Model, data: Data, at: At, line: Sweep, terms: IntegerMatrix, weights: Vector) -> None:
-    """parameters += what this step adds."""
+    """parameters += the contribution of this step."""
     costate, w, y = line.costate[0], line.w, line.y
     nv = w.shape[0]
     _velocity_gradient(model, data, at.h, costate, w)

@@ -1,6 +1,6 @@
 """FeedbackLaw: a trajectory with gains, and the rollout that follows it.
 
-What a planner knows about the trajectory makes the steps of a rollout nearby cheap: derivatives predict its velocities,
+The data of a plan make the steps of a rollout nearby cheap: derivatives predict its velocities,
 and the cone variables of its steps are nearly those of the steps beside them. An iteration of the trot goes from 5 to 2
 or 3 Newton iterations per step that way.
 """
@@ -27,7 +27,7 @@ _SOLVED = int(Status.SOLVED)
 
 
 class FeedbackLaw(NamedTuple):
-    """What a rollout follows: a trajectory, its gains, and what is known of its steps; the last four may be empty."""
+    """The target of a rollout: a trajectory, its gains, and warm starts of its steps; the last four may be empty."""
 
     xs: Matrix  # (T + 1, nx)
     us: Matrix  # (T, nu)
@@ -42,7 +42,7 @@ class FeedbackLaw(NamedTuple):
 
 
 class Path(NamedTuple):
-    """What a rollout fills in."""
+    """Buffers of a rollout."""
 
     xs: Matrix  # (T + 1, nx)
     us: Matrix  # (T, nu)

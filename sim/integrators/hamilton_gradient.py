@@ -85,7 +85,7 @@ def _columns(model: Model, data: Data, out: Matrix) -> None:
             _add_mul(N, S, 1.0, True, c[24:30])
             _add_mul(J, c[0:6], -1.0, False, c[30:36])
             _add_mul(N, S, 1.0, False, c[36:42])
-            if d < model.body_vadr[i] + model.joint_ntrans[i]:  # what lies before the rotations of a joint
+            if d < model.body_vadr[i] + model.joint_ntrans[i]:  # columns before the rotations of a joint
                 for k in range(6):
                     V[k] += S[k] * data.nu[d]
 

@@ -2,7 +2,7 @@
 
     M(q2) v = p(q2, v15),    p = S2^T W,   W = momenta of the bodies at the end of the interval 1-2 (energy.py)
 
-The momentum balance of a step is -W and what comes after it, so its composites give dp (residual_gradient.py).
+The momentum balance of a step is -W plus terms of the next interval, so its composites give dp (residual_gradient.py).
 """
 
 from __future__ import annotations

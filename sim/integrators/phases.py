@@ -1,6 +1,6 @@
-"""Steps of higher order of a motion with contacts and limits, where it is far from all of them.
+"""Steps of higher order of a motion with contacts and limits, while all of them are inactive.
 
-A step may leave out the impulses kappa/gap of all contacts and limits where together they are within its tolerance:
+A step may omit the impulses kappa/gap of all contacts and limits if their sum is within its tolerance:
 
     sum of kappa/g <= tolerance (1 + largest momentum),    g = (g0 + g1 - d)/2
 
@@ -32,7 +32,7 @@ from solvers.rotation import cross, quat_matrix, quat_turn
 from solvers.status import Status
 from solvers.types import Cube, Matrix, Vector
 
-NEAR = -1  # in place of a Status: something is near
+NEAR = -1  # in place of a Status: a contact or limit is active
 
 _SOLVED = int(Status.SOLVED)
 
@@ -103,7 +103,7 @@ def _allowed(scheme: Scheme, tolerance: float) -> float:
 
 @kernel
 def first_far(model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, xs: Matrix) -> int:
-    """The first of the states xs (n, nx) at which all is far; n where there is none."""
+    """The first of the states xs (n, nx) at which all is inactive; n if there is none."""
     model = model_view(model_at)
     data = data_view(data_at)
     nq = data.theta1.shape[0]
@@ -149,7 +149,7 @@ def _report(model: Model, data: Data, h: float, out: Matrix) -> None:
 
 
 class Flight(NamedTuple):
-    """Steps while all is far."""
+    """Steps while all is inactive."""
 
     us: Matrix  # (T, nu) in
     wrenches: Cube  # (T, nbody, 6) in, or (0, nbody, 6)
@@ -162,7 +162,7 @@ class Flight(NamedTuple):
 def roll_far(
     model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, flight: Flight, first: int
 ) -> tuple[int, int]:
-    """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is far.
+    """xs[t + 1] = step(xs[t], us[t]) from t = first on while all is inactive.
 
     Returns how many steps were taken, and why no more: SOLVED at the end of us or after the deadline, NEAR, or the
     Status of the next.

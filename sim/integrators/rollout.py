@@ -6,7 +6,7 @@
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
 
 Every function takes the tables of a Model and a Data (solvers/compiler); every loop stops at the first step that is
-not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py says how it goes on.
+not SOLVED, and after the first one that ends behind the deadline: sim/model/pace.py explains how it resumes.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ACCURACY = 3e-14  # of derivatives, times the stiffness of their contacts over i
 
 
 class Linearized(NamedTuple):
-    """Knots of a trajectory, and what their linearization fills in."""
+    """Knots of a trajectory, and buffers for their linearization."""
 
     xs: Matrix  # (T, nx) or (T + 1, nx) states, in
     us: Matrix  # (T, nu) inputs, in
@@ -49,7 +49,7 @@ class Linearized(NamedTuple):
 
 
 class MotionBuffers(NamedTuple):
-    """A motion and what a loop over time fills in; what is not asked for has no rows."""
+    """A motion and the buffers of a loop over time; unused buffers have no rows."""
 
     xs: Matrix  # (T + 1, nx), of which the first row is given
     us: Matrix  # (T, nu) inputs, in
@@ -62,7 +62,7 @@ class MotionBuffers(NamedTuple):
 
 @kernel
 def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
-    """Options of the steps of a motion that begins here, or goes on after a pause."""
+    """Options of the steps of a motion that begins here, or continues after a pause."""
     start_pace(data, settings)
     if begins:
         begin(data)
@@ -105,7 +105,7 @@ def accept(model: Model, motion: MotionBuffers) -> bool:
 def roll(model_at: Table, data_at: Table, settings: Vector, motion: MotionBuffers, first: int) -> int:
     """xs[t + 1] = step(xs[t], us[t]) from t = first on; returns the number of solved steps, those before included.
 
-    A step is solved once, and differentiated where it ends. What nobody may begin with has the status REFUSED.
+    A step is solved once, and differentiated where it ends. An invalid state has the status REFUSED.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -178,7 +178,7 @@ def linearize(
 ) -> int:
     """Derivatives of the knots from knots[0] up to knots[2], products of the derivatives of their steps.
 
-    knots[1]: the step to go on with, counted from that of knot 0; returns the next such step.
+    knots[1]: the step to resume at, counted from that of knot 0; returns the next such step.
     """
     model = model_view(model_at)
     data = data_view(data_at)
@@ -235,7 +235,7 @@ def linearize_knots(
 
 
 class BatchBuffers(NamedTuple):
-    """Motions from several states, kept as their states only."""
+    """BatchBuffers from several states, kept as their states only."""
 
     xs: Cube  # (n, T + 1, nx), of which the first rows are given
     us: Cube  # (n, T, nu)
@@ -249,7 +249,7 @@ class BatchBuffers(NamedTuple):
 
 @kernel
 def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[int, int], motions: BatchBuffers) -> None:
-    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
+    """BatchBuffers rows[0] up to rows[1], as far as they are not done, until the deadline."""
     steps = motions.us.shape[1]
     for i in range(rows[0], rows[1]):
         report = motions.reports[i]

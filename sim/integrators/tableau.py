@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods of order 4, 6 and 8: coefficients, and how far they are stable."""
+"""Explicit Runge-Kutta methods of order 4, 6 and 8: coefficients, and stability limits."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _filled(*rows: tuple[float, ...]) -> Floats:
 
 @cache
 def stable(order: int) -> float:
-    """How far along the negative real and the imaginary axis |h lambda| may go: |1 + z b (I - z a)^-1 1| <= 1."""
+    """Stability limits of |h lambda| along the negative real and the imaginary axis: |1 + z b (I - z a)^-1 1| <= 1."""
     a, b = tableau(order)
     one, far = np.ones(len(b)), np.inf
     for direction in (-1.0, 1j):

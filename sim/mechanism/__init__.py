@@ -1,1 +1,1 @@
-"""What a user puts together: bodies, joints, contacts, shapes, terrain; and its packing into the arrays of a Model."""
+"""The parts of a mechanism: bodies, joints, contacts, shapes, terrain; and their packing into the arrays of a Model."""

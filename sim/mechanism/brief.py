@@ -1,4 +1,4 @@
-"""Short texts of results for the screen: what an object is, and how large, instead of all its numbers."""
+"""Short texts of results for the screen: kind and sizes of an object instead of all its numbers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _plain(values: Iterable[Any]) -> bool:
 
 
 def brief_table(title: str, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """HTML for a notebook: a table of at most 50 rows, the last of which says how many more there are."""
+    """HTML for a notebook: a table of at most 50 rows, the last with the number of omitted rows."""
 
     def line(cells: Iterable[Any], tag: str) -> str:
         texts = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)

@@ -1,4 +1,4 @@
-"""Checks of what a user passes in: every message names the call, what was expected, and what was got."""
+"""Checks of arguments: every message names the call, the expected and the given value."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def floats(call: str, value: Any) -> Floats:
 
 def finite(values: Floats) -> bool:
     """Whether all entries are finite numbers."""
-    # the sum of their squares says so at a third of the price, without a warning, where it does not overflow itself
+    # the sum of squares shows it at a third of the cost, without a warning, unless it overflows itself
     return isfinite(np.vdot(values, values)) or bool(np.isfinite(values).all())
 
 

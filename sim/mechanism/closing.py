@@ -1,5 +1,5 @@
 """Joints that close a loop and do more than constrain: with springs, dampers, armature, limits or inputs; and those
-with two rotations, whose twist-free swing is no equation between two poses.
+with two rotations, whose twist-free swing is not an equation between two poses.
 
 Such a joint becomes one of the tree. It carries a share of the mass and inertia of its child, as a body of its own,
 "child.joint", which is welded to the rest of the child. The discrete Lagrangian of a body is linear in its mass and

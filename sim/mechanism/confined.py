@@ -1,10 +1,10 @@
 """Contacts that no motion can move, or lift out of the ground: found from the joints, before any step.
 
-Along the normal n of its ground, the height of a contact point stays what it is while the joints above it slide across
+Along the normal n of its ground, the height of a contact point stays constant while the joints above it slide across
 n or turn about it. The first joint that turns otherwise keeps its own height; from there on the point is within reach:
 on a circle about one axis, in a ball about several.
 
-    IDLE    the gap never changes: the point carries no impulse that could be told, and is no part of a step
+    IDLE    the gap never changes: the impulse of the point is undetermined, and the step omits it
     SUNK    the largest gap is below zero, or of all the contacts on one hinge the least is, however it turns: no step
             has a solution
 """

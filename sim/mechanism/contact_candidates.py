@@ -42,7 +42,7 @@ class Touch:
 def touches(call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisions: Sequence[Collision]) -> list[Touch]:
     """All contact points that collisions may have; those of the same two bodies follow one another.
 
-    What is fixed to one another cannot touch: no motion changes the gap, and no impulse could be told.
+    Parts fixed to one another cannot collide: no motion changes the gap, and the impulse is undetermined.
     """
     index = {body.name: i for i, body in enumerate(bodies)} | {WORLD: -1}
     holder = _holders(index, joints)
@@ -53,7 +53,7 @@ def touches(call: str, bodies: Sequence[Body], joints: Sequence[Joint], collisio
 
 
 def _holders(index: dict[str, int], joints: Sequence[Joint]) -> dict[int, int]:
-    """The first body of those that are fixed to one another, of each body; -1 for what is fixed to the world."""
+    """For each body the first of those fixed to it; -1 for bodies fixed to the world."""
     holder = {-1: -1}
     for i, joint in enumerate(joints):
         holder[i] = holder[index[joint.parent or WORLD]] if joint.nv == 0 else i

@@ -19,7 +19,7 @@ def dof_names(joints: Sequence[Joint]) -> tuple[str, ...]:
 
 
 def _parts(joint: Joint) -> list[str]:
-    """What the degrees of freedom of one joint are called: directions of its frame, then rotations about them."""
+    """Names of the degrees of freedom of one joint: directions of its frame, then rotations about them."""
     if joint.nv == 1:
         return [""]
     along = "xyz"

@@ -31,9 +31,9 @@ Floats = NDArray[np.float64]
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; left out, every degree of freedom of every joint but the floating ones and
+    inputs    the entries of u in order; by default every degree of freedom of every joint but the floating ones and
               those that close loops
-    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero where left out,
+    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero by default,
               or all of q
     """
 
@@ -140,61 +140,95 @@ class Mechanism:
         return dof_names(self.joints)
 
     def components(self, *names: str) -> NDArray[np.int64]:
-        """Numbers in a perturbation dx = [dq; dv] of joints and degrees of freedom.
+        """Indices into a perturbation dx = [dq; dv] of joints and degrees of freedom.
 
-        "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their velocities, "q" and
-        "v" all coordinates and all velocities.
+        Args:
+            names: "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their
+                velocities, "q" and "v" all coordinates and all velocities.
+
+        Returns:
+            Indices (n,), in the order of the names.
+
+        Raises:
+            ValueError: a name is unknown; the message suggests a known one.
         """
         return components("Mechanism.components(...)", self.joints, names)
 
     def q_slice(self, joint: str) -> slice:
-        """Where the coordinates of a joint are in q."""
+        """The slice of q with the coordinates of a joint."""
         return self._slices[checks.one_of("Mechanism.q_slice(joint)", joint, self._slices)][0]
 
     def v_slice(self, joint: str) -> slice:
-        """Where the velocities of a joint are in v."""
+        """The slice of v with the velocities of a joint."""
         return self._slices[checks.one_of("Mechanism.v_slice(joint)", joint, self._slices)][1]
 
     @cached_property
     def _slices(self) -> dict[str, tuple[slice, slice]]:
-        """By joint, where it is in q and in v."""
+        """By joint, its slices of q and v."""
         out, q, v = {}, 0, 0
         for joint in self.joints:
             out[joint.name] = slice(q, q := q + joint.nq), slice(v, v := v + joint.nv)
         return out
 
     def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
-        """This mechanism and another one, in one: its bodies, joints, contacts, inputs and collisions after ours.
+        """One mechanism from this one and another one, whose bodies, joints, contacts, inputs and collisions follow.
 
-        pose     where the world of `other` is put: translation (3,) [m], or with a quaternion (7,). Its joints with the
-                 world, its obstacles and its neutral state move there; its contacts touch the ground that they touched
-                 before, and inputs along world axes keep them
-        prefix   put before every name of `other`; a ValueError says which name both have
+        Args:
+            other: the mechanism to add.
+            pose: place of the world of `other`: translation (3,) [m], or with a quaternion (7,). Its joints with the
+                world, its obstacles and its neutral state move there; its contacts keep their ground, and inputs along
+                world axes keep their axes.
+            prefix: put before every name of `other`.
+            name: of the new mechanism; that of this one by default.
+
+        Returns:
+            The new mechanism.
+
+        Raises:
+            ValueError: both have a part of the same name, or their gravity differs.
         """
         return _added(self, other, pose, prefix, name or self.name)
 
     def on(
         self, terrain: Terrain, contacts: Sequence[str] | None = None, bodies: Sequence[str] = (), **options: Any
     ) -> Mechanism:
-        """The same on other ground, under all contacts or those named; it stands there as high as it touches.
+        """The same mechanism on other ground; its neutral state stands on it with the lowest contact.
 
-        Contacts keep their friction; what normal and height they had is replaced. The shapes of `bodies` touch it too,
-        by balls and corners that are added as contacts (shape_contacts.py); options: of these (friction, law,
-        restitution).
+        Args:
+            terrain: the ground. Contacts keep their friction; their normal and height are replaced.
+            contacts: names of the contacts above it; all by default.
+            bodies: names of bodies whose shapes touch it too, by balls and corners that are added as contacts
+                (shape_contacts.py).
+            options: friction, law, restitution of the added contacts.
+
+        Returns:
+            The new mechanism.
+
+        Raises:
+            ValueError: a name is unknown, or a body has a shape without balls and corners.
         """
         return _on_terrain(self, terrain, contacts, bodies, **options)
 
     def with_collisions(self, *collisions: Collision) -> Mechanism:
-        """The same with more collisions."""
+        """The same mechanism with more collisions."""
         return replace(self, collisions=[*self.collisions, *collisions])
 
     def with_obstacle(
         self, shape: Solid, bodies: Sequence[str] | None = None, name: str = "obstacle", **options: Any
     ) -> Mechanism:
-        """The same with a fixed obstacle, placed in world axes by its centre and orientation.
+        """The same mechanism with a fixed obstacle.
 
-        What touches the ground touches it too: the balls of the contacts; or, when given, the shapes of `bodies`.
-        options: of Collision (friction, law, restitution).
+        Args:
+            shape: the obstacle, placed in world axes by its centre and orientation.
+            bodies: names of bodies whose shapes touch it; by default the balls of the contacts do.
+            name: prefix of the names of the collisions.
+            options: friction, law, restitution of Collision.
+
+        Returns:
+            The new mechanism.
+
+        Raises:
+            ValueError: a name is unknown, or no contact has a radius.
         """
         return _with_obstacle(self, shape, bodies, name, **options)
 

@@ -1,4 +1,4 @@
-"""Names of contacts and inputs: those given, or taken from what they act on, with numbers where they repeat."""
+"""Names of contacts and inputs: those given, or taken from their targets, with numbers if they repeat."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def name_contacts(call: str, contacts: Sequence[Contact], bodies: Sequence[str])
 def name_inputs(
     call: str, inputs: Sequence[Input], joints: Sequence[Joint], bodies: Sequence[str]
 ) -> tuple[Input, ...]:
-    """The inputs with names, after a look at what they act on."""
+    """The inputs with names, after a check of their targets."""
     by_name, known = {j.name: j for j in joints}, dict.fromkeys(bodies)
     out = []
     for part in inputs:

@@ -144,7 +144,7 @@ def _law(contact: Contact) -> Law:
 
 
 def height_fields(mech: Mechanism) -> dict[tuple[int, float], Terrain]:
-    """What the centres of the balls cannot sink below: one surface per terrain and radius."""
+    """Lower bounds of the centres of balls: one surface per terrain and radius."""
     keys = {(id(c.terrain), float(c.radius)): c for c in mech.contacts if c.terrain is not None}
     return {key: c.terrain.surface(c.radius) for key, c in keys.items() if c.terrain is not None}
 

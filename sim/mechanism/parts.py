@@ -41,7 +41,7 @@ LAWS = ("impact", "linear", "nonlinear")
 class Body:
     """A rigid body. Its frame has its origin at the centre of mass.
 
-    inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; left out, that of `shape`.
+    inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; by default that of `shape`.
     A body of mass 0, without inertia and shape, is the middle of a joint put together from several, as hinges one after
     the other; something with a mass has to hang on it.
     """
@@ -64,7 +64,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """What lets `child` move relative to `parent`.
+    """A joint: the relative motion of `child` and `parent`.
 
         joint frame   at `parent_point` in the parent, turned by `orientation` (quaternion, joint to parent)
         coordinates   translations first, then rotations; at zero the child's axes are those of the joint frame
@@ -145,7 +145,7 @@ class Contact:
     """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
 
     law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
-    terrain: ground that is no half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
+    terrain: ground, not a half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
     restitution: share of the normal velocity that an impact gives back, see sim/contact/restitution.py.
     """
 
@@ -234,7 +234,7 @@ class Input:
             raise ValueError(f"{call}): force and torque are for an input on a body")
 
 
-# -- checks of what a user gives, per part -----------------------------------------------------------------------------
+# -- checks of arguments, per part -------------------------------------------------------------------------------------
 
 
 def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:

@@ -97,7 +97,7 @@ class Polytope(Solid):
 
 
 def hull_table(shape: Solid) -> tuple[Floats, float]:
-    """The table of hull.py, (n, 4), of a shape without what is around it, and the radius of that [m]."""
+    """The table of hull.py, (n, 4), of a shape without its rounding, and the radius of that rounding [m]."""
     if isinstance(shape, Sphere):
         return np.array([[1.0, 0.0, 0.0, 0.0], np.zeros(4)]), shape.radius
     if isinstance(shape, Capsule):

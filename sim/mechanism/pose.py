@@ -1,4 +1,4 @@
-"""Pose: where a frame is in another one; and quaternions from what URDF files write."""
+"""Pose of a frame in another one; and quaternions from the angles of URDF files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Pose(NamedTuple):
     point: Floats
 
     def then(self, inner: Pose) -> Pose:
-        """The pose in the outer frame of what has the pose `inner` in this one."""
+        """The pose in the outer frame that corresponds to the pose `inner` in this one."""
         return Pose(self.rotation @ inner.rotation, self.at(inner.point))
 
     def at(self, point: ArrayLike) -> Floats:

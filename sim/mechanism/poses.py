@@ -1,4 +1,4 @@
-"""Forward kinematics of a tree of joints, for what is looked at before there is a Model."""
+"""Forward kinematics of a tree of joints, for checks before there is a Model."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from sim.mechanism.shapes import rotation_matrix
 
 Floats = NDArray[np.float64]
 
-_CLEAR = 1e-9  # [m] above the ground: what is closed exactly, or by rounding deeper, has no inside to start a solver in
+_CLEAR = 1e-9  # [m] above the ground: a gap of zero, or below by rounding, has no interior to start the solver in
 
 
 def resting(limits: tuple[float, float] | None) -> float:

@@ -1,7 +1,7 @@
-"""Terrain: ground that is no level plane, as what a user writes; a slope, steps, or any smooth height z = f(x, y).
+"""Terrain: ground other than a level plane; a slope, steps, or any smooth height z = f(x, y).
 
-A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). What the centre
-of a ball cannot sink below, the surface at its radius, is a height field too,
+A height field is kept as heights on a grid and is the C2 cubic spline through them (height_field.py). The lower
+bound of the centre of a ball, the surface at its radius, is a height field too,
 
     F(x) = max over s of  f(s) + sqrt(radius^2 - |s - x|^2),
 
@@ -25,7 +25,7 @@ from sim.mechanism.spline import spline, spline_coefficients, spline_gradient, s
 Floats = NDArray[np.float64]
 
 _EDGE = 16  # grid lines across an edge of a step
-_MARGIN = 8  # level grid lines around what is not smooth: the waves of a spline fade by .27 per line
+_MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 per line
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,14 @@ class Terrain:
     """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
 
     heights    (nx, ny) above the lines of a grid, a C2 spline in between [m]; one column (nx, 1): the same for all y.
-               Beyond the grid the ground goes on level, at the height of its edge
+               Beyond the grid the ground is level, at the height of the edge
     origin     (x, y) of heights[0, 0] [m]
     spacing    (dx, dy) of the grid [m]
     direction  (x, y) of the first grid axis in the plane
     plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
     name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
 
-    Derivatives by what the heights are made of follow from those by the heights. Of a loss L, by the rises of stairs:
+    Derivatives by parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 
         by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
         by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]
@@ -80,10 +80,20 @@ class Terrain:
 
     @staticmethod
     def from_function(f: Callable[[Floats, Floats], ArrayLike], x: ArrayLike, y: ArrayLike) -> Terrain:
-        """The spline through f at the grid lines x (nx,) and y (ny,), equally spaced [m].
+        """The spline through f at equally spaced grid lines.
 
-        f takes and returns arrays: f(X, Y) with X and Y of shape (nx, ny). A spline is off by about
-        (spacing / wavelength)^4 of the height of a wave; `terrain.height(x, y)` tells.
+        Its error is about (spacing / wavelength)^4 of the height of a wave; check with `terrain.height(x, y)`.
+
+        Args:
+            f: heights f(X, Y) (nx, ny) [m] of places X, Y (nx, ny) [m].
+            x: grid lines (nx,) [m].
+            y: grid lines (ny,) [m].
+
+        Returns:
+            The terrain.
+
+        Raises:
+            ValueError: the grid lines are not equally spaced, or a height is not finite.
         """
         if not callable(f):
             raise TypeError(f"Terrain.from_function(f): expected a function of (X, Y), got {f!r}")
@@ -96,7 +106,16 @@ class Terrain:
 
     @staticmethod
     def slope(angle: float, direction: ArrayLike = (1.0, 0.0), height: float = 0.0) -> Terrain:
-        """A plane that rises by `angle` [rad] towards `direction` (x, y), and has this height at x = y = 0 [m]."""
+        """A plane that rises towards `direction`.
+
+        Args:
+            angle: slope [rad], below a right angle.
+            direction: (2,) along x, y.
+            height: at x = y = 0 [m].
+
+        Returns:
+            The terrain.
+        """
         angle = checks.number("Terrain.slope(angle)", angle)
         if not abs(angle) < 0.5 * np.pi:
             raise ValueError(f"Terrain.slope(angle): expected less than a right angle, got {angle:g} rad")
@@ -112,10 +131,21 @@ class Terrain:
         edge: float = 0.04,
         direction: ArrayLike = (1.0, 0.0),
     ) -> Terrain:
-        """Stairs across `direction`: the ground rises by rises[k] at start + k depth [m]; it is level before and after.
+        """Stairs across `direction`, level before and after.
 
-        Each rise is spread over `edge` [m] by the quintic 6 t^5 - 15 t^4 + 10 t^3, so that its edges are rounded with
-        the radius edge^2 / (5.77 |rise|) [m] and its face is 1.875 |rise| / edge steep.
+        The ground rises by rises[k] at start + k depth. Each rise is spread over `edge` by the quintic
+        6 t^5 - 15 t^4 + 10 t^3: the radius of its edges is edge^2 / (5.77 |rise|) [m], the slope of its face
+        1.875 |rise| / edge.
+
+        Args:
+            rises: heights of the steps (n,) [m].
+            depth: distance between rises [m].
+            start: place of the first rise along `direction` [m].
+            edge: width of a rise [m], at most `depth`.
+            direction: (2,) along x, y.
+
+        Returns:
+            The terrain.
         """
         call = "Terrain.steps"
         jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
@@ -133,7 +163,7 @@ class Terrain:
         return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Height of the ground at (x, y), any shape [m]."""
+        """Height (...,) of the ground [m] at x, y (...,) [m]."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if self.plane is not None:
             (a, b, c), d = self.plane
@@ -141,7 +171,7 @@ class Terrain:
         return self._spline(self.coefficients, x, y)[0]
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Outward normal of the ground at (x, y), (..., 3)."""
+        """Outward unit normal (..., 3) of the ground at x, y (...,) [m]."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         if self.plane is not None:
             return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
@@ -158,7 +188,7 @@ class Terrain:
         return f, C * fs - S * ft, S * fs + C * ft
 
     def offset(self, radius: float) -> Terrain:
-        """The surface that the centre of a ball of this radius cannot sink below, over a grid that is as much wider."""
+        """The lower bound of the centre of a ball of this radius [m], over a grid wider by as much."""
         return self._offset(radius)[0]
 
     def surface(self, radius: float) -> Terrain:
@@ -181,7 +211,7 @@ class Terrain:
         return spline_gradient(gradient)
 
     def radius_rate(self, radius: float) -> Floats:
-        """d(coefficients of `surface`)/d(radius), whose values are sqrt(1 + |grad|^2) of the ground that is touched."""
+        """d(coefficients of `surface`)/d(radius), with values sqrt(1 + |grad|^2) at the touched ground."""
         kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
         if radius not in kept:
             touched = self._kept(radius)[1]

@@ -1,1 +1,1 @@
-"""What kernels read and write: Model, Data, options, slots of optional kernels."""
+"""Arrays that kernels read and write: Model, Data; options, slots of optional kernels."""

@@ -44,7 +44,7 @@ class Pyramid(IntEnum):
     SLACK = 0
     IMPULSE = 1
     SPEED = 2  # psi
-    CAP = 3  # s_psi, what is left of the friction bound
+    CAP = 3  # s_psi, the remainder of the friction bound
     FRICTION = 4  # (4,) beta, along t1, -t1, t2, -t2
     SLIP = 8  # (4,) s, slip in these directions, plus psi
 
@@ -108,7 +108,7 @@ class Bounce(IntEnum):
     """bounce: impact of a contact (contact/restitution.py)."""
 
     FLOOR = 0
-    RESTITUTION = 1  # in this step; 0 where there is no impact
+    RESTITUTION = 1  # in this step; 0 without an impact
     ROW1 = 2  # (6,) d(gap at configuration 1)/d(twist of configuration 1)
     ROW2 = 8  # (6,) the same of 2
     GAP1 = 14
@@ -118,7 +118,7 @@ class Bounce(IntEnum):
 
 
 class Witness(IntEnum):
-    """pair_out and pair_trial: what `collide` finds, in the frame of shape b."""
+    """pair_out and pair_trial: the results of `collide`, in the frame of shape b."""
 
     GAP = 0
     NORMAL = 1  # (3,)
@@ -134,7 +134,7 @@ class RelativePose(IntEnum):
 
 
 class PairBound(IntEnum):
-    """pair_far: what decides whether a collision is active (pairs/inactive_pairs.py), at its first pair."""
+    """pair_far: the data that decide whether a collision is active (pairs/inactive_pairs.py), at its first pair."""
 
     RADII = 0  # sum of those of the balls around the shapes
     DISTANCE = 1  # (2,) largest distances of the shapes from the centres of mass

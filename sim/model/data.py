@@ -1,4 +1,4 @@
-"""Data: what kernels write, as a NamedTuple of arrays; the glossary is in model.py, the shapes are in layout.py too."""
+"""Data: the arrays that kernels write, as a NamedTuple; model.py has the glossary, layout.py the shapes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from solvers.types import IntegerMatrix, Integers, Matrix, Vector
 
 
 class Data(NamedTuple):
-    """Scratch of one step, allocated once per thread by `Simulator`; also holds what derivatives need afterwards.
+    """Scratch of one step, allocated once per thread by `Simulator`; also holds intermediate results for derivatives.
 
-    The first block is no scratch: it is state between the steps of a motion (CARRY of layout.py), which a new motion
+    The first block is not scratch but the state between the steps of a motion (CARRY of layout.py), which a new motion
     clears. The end of a step stays in configuration 3 and `nu`, its impulses in `cone` and `bound`; they are used again
-    only where a motion goes on, as `carried_steps` and `Guess.impulses` say.
+    only if a motion continues, as `carried_steps` and `Guess.impulses` say.
     """
 
     # state between steps
@@ -54,7 +54,7 @@ class Data(NamedTuple):
     turn_in: Matrix  # (nbody, 4) rotation of interval 1-2: (cos, sin * axis), world axes
     turn: Matrix  # (nbody, 4) rotation of interval 2-3, likewise
     balance: Matrix  # (nbody, 6) momentum balance of each body without contacts, about O
-    node_inertia: Matrix  # (nbody, 9) inertia at the node whose energy is asked for, world axes
+    node_inertia: Matrix  # (nbody, 9) inertia at the node, for its energy, world axes
     node_momentum: Matrix  # (nbody, 6) momentum there, summed over the subtree, about O
     node_p: Vector  # (nv,) the same in joint coordinates
     node_share: Vector  # (nv,) scratch
@@ -105,7 +105,7 @@ class Data(NamedTuple):
     shape_pos: Matrix  # (2 npair, 3) centres of their shapes at configuration 3
     shape_rot: Matrix  # (2 npair, 9)
     pair_relative: Matrix  # (npair, 12) pose of shape a in the frame of shape b
-    pair_out: Matrix  # (npair, 43) what `collide` finds: Witness
+    pair_out: Matrix  # (npair, 43) result of `collide`: Witness
     pair_before: Matrix  # (npair, 13) pair_relative at configuration 2, and the gap that elements had at least there
     pair_activation: Vector  # (npair,) at its first pair: half the gap ahead of an inactive collision, or 0
     pair_travel: Vector  # (1,) displacement of a body after which inactive collisions are evaluated again [m]
@@ -113,7 +113,7 @@ class Data(NamedTuple):
     pair_change: Vector  # (1,) bound of the change of their wrenches per displacement, 0 where there are none
     inactive_pose: Matrix  # (nbody, 7) poses where the inactive collisions were evaluated
     inactive_wrench: Matrix  # (nbody, 6) their wrenches about O
-    pair_trial: Matrix  # (1, 43) what `collide` wrote last, of a choice that is not kept
+    pair_trial: Matrix  # (1, 43) last result of `collide`, of a feature pair that is not kept
     pair_frame: Matrix  # (npair, 12) rows n, t1, t2 and the contact point, world axes
     pair_turn: Matrix  # (npair, 18) rotation of the frame by the relative twist
     pair_shift: Matrix  # (npair, 18) displacement of the contact point by the relative twist
@@ -126,8 +126,8 @@ class Data(NamedTuple):
     coupling_K2: Matrix  # (2 ncoupling, 36) the same by twists of configuration 2
     couple_B: Matrix  # (nrow, 6) wrench on a of a unit force
     couple_G: Matrix  # (nrow, 6) constraint directions of loops at configuration 3
-    couple_R: Matrix  # (nrow, 12) what a force resists, of the twists of a and b
-    couple_E: Vector  # (nrow,) how much it gives, 0 for loops
+    couple_R: Matrix  # (nrow, 12) direction of a force, in the twists of a and b
+    couple_E: Vector  # (nrow,) its compliance, 0 for loops
     couple_Y: Matrix  # (nrow, nv) answer of the tree to a unit force
     couple_T: Matrix  # (nrow, nrow) the dense system
     couple_pivots: Matrix  # (nrow, 2)
@@ -166,7 +166,7 @@ class Data(NamedTuple):
     A1: Matrix  # (nbody, 36) d(balance)/d(pose 1), about O
     A2: Matrix  # (nbody, 36)
     A3: Matrix  # (nbody, 36)
-    F: Matrix  # (nv, 24) scratch; from 12 on, six numbers, what turns of test directions make of the residual wrench
+    F: Matrix  # (nv, 24) scratch; from 12 on, six numbers: the residual wrench times rotations of test directions
     G: Matrix  # (nv, 24) rows of test directions times the composites, 18, and scratch
     S_across: Matrix  # (18, nwide) S1, S2, S3, a dof per column
     F_across: Matrix  # (12, nwide) composites times unit columns, likewise
@@ -180,5 +180,5 @@ class Data(NamedTuple):
     step_B: Matrix  # (2 nv, nu)
     chain: Matrix  # (2 nv, 2 nv + nu) their product with those of the steps before
     step_x: Matrix  # (2, nq + nv) states inside a knot
-    report: Vector  # (6,) of a step nobody asks about
+    report: Vector  # (6,) report of an internal step
     pace: Vector  # (2,) when to go back to Python, work done since the last look at the clock: sim/model/pace.py

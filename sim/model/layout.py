@@ -133,7 +133,7 @@ class Sizes(NamedTuple):
 def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
     """Rows and columns of one field."""
     nv, nu = sizes.nv, sizes.nu
-    columns = max(2 * nv + whole(nu), nv + whole(nv))  # with what lanes write behind dR_dv and the inputs
+    columns = max(2 * nv + whole(nu), nv + whole(nv))  # with the numbers that lanes write behind dR_dv and the inputs
     columns = -(-columns // SIDE) * SIDE
     named = {
         **sizes._asdict(),
@@ -160,7 +160,7 @@ def _extent(shape: Shape, sizes: Sizes) -> tuple[int, int]:
 def _carve(fields: dict[str, Shape], sizes: Sizes, kind: Any) -> dict[str, Any]:
     """Zeroed arrays of these shapes, end to end in one buffer."""
     extents = {name: _extent(shape, sizes) for name, shape in fields.items()}
-    line = 128 // 8  # a pair of cache lines: what two threads write must not share one
+    line = 128 // 8  # a pair of cache lines: arrays that two threads write must not share one
     buffer: NDArray[Any] = np.zeros(sum(whole(rows * cols) for rows, cols in extents.values()) + 2 * line, dtype=kind)
     first = -(buffer.ctypes.data // 8) % line
     arrays, start = {}, first
@@ -204,7 +204,7 @@ def sizes_of(model: Model) -> Sizes:
 
 
 def _fields(cls: Any, shapes: dict[str, Shape]) -> list[Field]:
-    """What compiled code knows about the fields: widths that are numbers are constants there."""
+    """Types of the fields in compiled code; widths that are numbers are constants there."""
     return [
         Field(
             name,

@@ -1,4 +1,4 @@
-"""Model: what kernels read, as a NamedTuple of arrays; data.py has what they write.
+"""Model: the arrays that kernels read, as a NamedTuple; data.py has those that they write.
 
 Compiled code takes each as one pointer (solvers/compiler); layout.py holds the shapes and allocates them.
 
@@ -29,7 +29,7 @@ class Law(IntEnum):
 
 
 class InputKind(IntEnum):
-    """What an input acts on."""
+    """The target of an input."""
 
     JOINT = 0  # one joint coordinate
     WORLD = 1  # wrench on a body at its centre of mass, world axes

@@ -1,4 +1,4 @@
-"""StepOptions, Guess, NewtonTarget, Outcome: what a step is asked for, and how it ended."""
+"""StepOptions, Guess, NewtonTarget, Outcome: the request of a step, and its outcome."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Guess(NamedTuple):
 
 
 class NewtonTarget(NamedTuple):
-    """What a Newton step of the interior point aims at."""
+    """The target of a Newton step of the interior point."""
 
     kappa: float  # target of the complementarity products
     share: float  # part of the equality residuals to remove
@@ -51,7 +51,7 @@ class FeatureChoice(IntEnum):
 
 
 class Verdict(IntEnum):
-    """What the energy and the shapes say of a solution of the equations."""
+    """The verdict of the energy balance and the shapes on a solution of the equations."""
 
     VALID = 0
     OVERLAPPING = 1  # in features that were not active

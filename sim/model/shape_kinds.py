@@ -1,4 +1,4 @@
-"""Shape, Pair: which pairs of shapes can touch, how their sizes are laid out, and how many contact points they have."""
+"""Shape, Pair: the supported pairs of shapes, the layout of their sizes, and the number of their contact points."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from enum import IntEnum
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
-OUT = 43  # length of what `collide` writes
+OUT = 43  # length of the result of `collide`
 EDGES = 8  # points of two polytopes beside their corners: pairs of edges that cross
 SPARE = 2  # points of a shape without edges beside its corner, for elements that are kept (kept.py)
-CROSSINGS = 9  # points of a cylinder and another shape that are no corners: places where edges, axes and rims cross
+CROSSINGS = 9  # points of a cylinder and another shape other than corners: places where edges, axes and rims cross
 RIM_POINTS = 8  # points on a rim that a plane may touch
 
 
@@ -75,7 +75,7 @@ _COUNT = {
 
 
 def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
-    """Kind of the pair, and whether the two have to change places to match its order; None if there is no such pair."""
+    """Kind of the pair, and whether the two must be swapped to match its order; None if the pair is not supported."""
     if (a, b) in _PAIRS:
         return _PAIRS[a, b], False
     if (b, a) in _PAIRS:

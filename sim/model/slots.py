@@ -8,7 +8,7 @@ from enum import IntEnum
 class Slot(IntEnum):
     """The number of each optional kernel: machine code on disk holds it, never the order of imports."""
 
-    # what all scenes do, compiled once
+    # kernels of all scenes, compiled once
     STEP = 0
     INTERIOR_POINT = 1
     NEWTON = 2

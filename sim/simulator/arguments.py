@@ -1,4 +1,4 @@
-"""Arguments: checks of what Simulator's methods are given; messages name the method, the argument and the error."""
+"""Arguments: checks of the arguments of Simulator; messages name the method, the argument and the error."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Arguments:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        # copies: what broadcast_to returns is read-only, and kernels would be compiled once more for it
+        # copies: arrays of broadcast_to are read-only, and kernels would be compiled once more for them
         rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
@@ -100,7 +100,7 @@ class Arguments:
     def policy(
         self, call: str, start: Floats, us: Floats, wrenches: Floats | None, parts: tuple[ArrayLike | None, ...]
     ) -> FeedbackLaw:
-        """FeedbackLaw around the inputs us with the parts (xs, ks, Ks, gaps); where left out, zero, and xs `start`."""
+        """FeedbackLaw around the inputs us with the parts (xs, ks, Ks, gaps); zero by default, and xs `start`."""
         ndx, knots = self._engine.ndx, len(us)
         shapes = ((knots + 1, self.nx), (knots, self.nu), (knots, self.nu, ndx), (knots + 1, ndx))
         xs, ks, Ks, gaps = (
@@ -127,7 +127,7 @@ class Arguments:
         return lo, hi
 
     def finite(self, method: str, out: Floats, *given: Floats) -> Floats:
-        """What a call made of the rows (n, ...) of its arguments; refused where it is too large for a float."""
+        """The result of a call for the rows (n, ...) of its arguments; refused if it overflows."""
         if checks.finite(out):
             return out
         row = int(np.argwhere(~np.isfinite(out.reshape(len(given[0]), -1)).all(axis=1))[0, 0])

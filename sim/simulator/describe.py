@@ -15,7 +15,7 @@ from sim.simulator.settings import Settings
 
 
 def describe(mech: Mechanism, model: Model, settings: Settings, rank: str) -> str:
-    """A page of text; rank: of the loop constraints, where there are any."""
+    """A page of text; rank: of the loop constraints, if there are any."""
     lines = [
         f"{mech.name}: {_count(mech.nbody, 'body', 'bodies')}, {_count(mech.nv, 'degree', 'degrees')} of freedom, "
         f"{_total_mass(mech):.4g} kg",
@@ -46,7 +46,7 @@ def _span(s: slice) -> str:
 
 
 def _joint_line(mech: Mechanism, joint: Joint) -> str:
-    """Name, kind, place in the tree, coordinates, and what else is on the joint."""
+    """Name, kind, place in the tree, coordinates, and further elements of the joint."""
     extra = [
         word
         for word, there in (
@@ -64,7 +64,7 @@ def _joint_line(mech: Mechanism, joint: Joint) -> str:
 
 
 def _loop_lines(mech: Mechanism, rank: str) -> list[str]:
-    """What closes loops, and how many of its constraints say something new."""
+    """Loop joints and gears, and the number of their independent constraints."""
     loops, gears = mech.loops, mech.gears
     if not loops and not gears:
         return []
@@ -85,11 +85,11 @@ def _contact_lines(mech: Mechanism) -> list[str]:
 
 
 def _collision_lines(mech: Mechanism) -> list[str]:
-    """Which shapes touch, and at how many points they may."""
+    """The shapes of each collision, and the number of their contact points."""
     lines = []
     for c in mech.collisions:
         points = sum(touch.name == c.name or touch.name.startswith(f"{c.name}_") for touch in mech.touches)
-        met = _count(points, "point", "points") if points else "fixed to one another, left out"
+        met = _count(points, "point", "points") if points else "fixed to one another, omitted"
         kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
         more = f", restitution {c.restitution:g}" if c.restitution else ""
         law = c.law if c.friction > 0 else "impact"
@@ -101,7 +101,7 @@ def _collision_lines(mech: Mechanism) -> list[str]:
 
 
 def _solid(mech: Mechanism, body: str, shape: Solid | None) -> str:
-    """What kind of shape a collision has on a body."""
+    """The kind of shape that a collision has on a body."""
     own = shape if shape is not None or body == WORLD else mech.bodies[mech.body_names.index(body)].shape
     return type(own).__name__.lower()
 
@@ -116,18 +116,18 @@ def _count(number: int, one: str, many: str) -> str:
 
 
 def _far_lines(mech: Mechanism, model: Model, settings: Settings) -> list[str]:
-    """From how far on contacts are left out of the solver at this kappa and tolerance."""
+    """The gap beyond which contacts are inactive at this kappa and tolerance."""
     if not len(model.contact_body):
         return []
     distances = reach(model, settings.time_step, settings.kappa, settings.tolerance)
     last = int(np.argmax(distances))
     nearest, farthest = f"{distances.min():.2g}", f"{distances[last]:.2g}"
     span = f"{nearest} m" if nearest == farthest else f"{nearest} m, {mech.contact_names[last]} {farthest} m"
-    return [f"  {'far contacts':<18}left out of the solver from a gap of {span} on; their push kappa/gap stays"]
+    return [f"  {'inactive contacts':<18}omitted from the solver beyond a gap of {span}; their force kappa/gap stays"]
 
 
 def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
-    """What a step computes, and what it leaves out."""
+    """The parts of a step, and those that it omits."""
     nlimit = mechanism_sizes(mech).nlimit
     points: list[Contact | Touch] = [*mech.contacts, *mech.touches]
     cones = sum(c.friction > 0 and c.law == "nonlinear" for c in points)
@@ -135,13 +135,15 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
     impacts = len(points) - cones - pyramids
     springs = sum(bool(np.any(np.asarray(j.spring))) for j in mech.joints)
     dampers = sum(bool(np.any(np.asarray(j.damper))) for j in mech.joints)
-    solver = "interior point" if points or nlimit else "Newton's method; interior point left out"
+    solver = "interior point" if points or nlimit else "Newton's method; interior point omitted"
     if order > 2:
         from sim.integrators.tableau import tableau
 
         far = f"{len(tableau(order)[1])} evaluations of the equations of motion"
         solver = (
-            f"{solver}; while contacts and limits are far none: {far}" if mech.contacts or nlimit else f"none: {far}"
+            f"{solver}; none while contacts and limits are inactive: {far}"
+            if mech.contacts or nlimit
+            else f"none: {far}"
         )
     counts = (
         ("contacts", len(points), f"{cones} cones, {pyramids} pyramids, {impacts} without friction"),
@@ -149,4 +151,4 @@ def _parts(mech: Mechanism, order: int) -> list[tuple[str, str]]:
         ("springs", springs, _count(springs, "joint", "joints")),
         ("dampers", dampers, _count(dampers, "joint", "joints")),
     )
-    return [("solver", solver), *((what, text if n else "left out") for what, n, text in counts)]
+    return [("solver", solver), *((what, text if n else "omitted") for what, n, text in counts)]

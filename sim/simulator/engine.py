@@ -135,7 +135,7 @@ class Engine:
         return self._model
 
     def tables(self, *needs: Callable[[Model], None]) -> tuple[Table, Table]:
-        """Tables of the Model, linked for derivatives and what else a call needs, and of this thread's first Data."""
+        """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""
         return self.linked(link_step, link_gradient, *needs), self._scratch.table()
 
     # -- motions -------------------------------------------------------------------------------------------------------
@@ -183,7 +183,7 @@ class Engine:
         return Rolled(knot, xs, reports, contacts, A, B)
 
     def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
-        """What a rollout of so many knots fills in; without `cones`, there is nothing of contacts and limits in it."""
+        """Buffers of a rollout of so many knots; without `cones`, those of contacts and limits are empty."""
         kept = knots if keep else 0
         ncontact, nlimit = (self.sizes.ncontact, self.sizes.nlimit) if cones else (0, 0)
         return Path(
@@ -229,7 +229,7 @@ class Engine:
     ) -> tuple[Floats, ...]:
         """(A, B, next states, report of every knot) of all knots; in parallel where that pays.
 
-        guess: (T, nx) next states to start from, the states themselves when left out.
+        guess: (T, nx) next states to start from, by default the states themselves.
         """
         n = len(us)
         A, B = np.empty((n, self.ndx, self.ndx)), np.empty((n, self.ndx, self.nu))
@@ -289,18 +289,18 @@ class Engine:
         return xs, status.astype(np.int64), knots
 
     def far(self) -> NDArray[np.bool_]:
-        """Which contacts were far in the last step of this thread, (ncontact,)."""
+        """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
         data = data_view(self._scratch.table())
         out[data.active[: data.active_count[0]]] = False
         return out
 
     def last(self) -> Data:
-        """What the last step of this thread has left."""
+        """Data of the last step of this thread."""
         return data_view(self._scratch.table())
 
     def open_loops(self) -> list[float]:
-        """How far loops, then gears, were open in the last iterate of this thread [m, or sine of an angle]."""
+        """Gaps of loops, then gears, in the last iterate of this thread [m, or sine of an angle]."""
         ends = self.model.coupling_row[len(self.model.coupling_body) - self.sizes.nloop :]
         ends = np.concatenate([ends, ends[-1] + 1 + np.arange(self.sizes.ngear)])
         gap = np.abs(self.last().couple_gap)
@@ -315,7 +315,7 @@ class Engine:
         return int(status), x
 
     def started(self, q: Vector, v: Vector) -> Vector:
-        """`start`; SimulationError when there is no such state."""
+        """`start`; SimulationError if no such state exists."""
         status, x = self.start(q, v)
         if status != Status.SOLVED:
             reason = Status(status)

@@ -162,7 +162,7 @@ class HighOrderEngine(Engine):
         guess: Floats | None = None,
         wrenches: Cube | None = None,
     ) -> tuple[Floats, ...]:
-        """As Engine.linearize, on one core; there is no kappa and nothing to guess."""
+        """As Engine.linearize, on one core; without kappa or guess."""
         self._check_swings()
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))

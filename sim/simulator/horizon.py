@@ -1,7 +1,7 @@
-"""Horizon: rollouts and derivatives of trajectories of one length, as a planner asks for them again and again.
+"""Horizon: repeated rollouts and derivatives of trajectories of one length, for planners.
 
-Its arrays are those that it returned before, so they are not checked again; what a rollout learns about its steps is
-handed on to the next one nearby.
+Its arrays are those that it returned before, so they are not checked again; the steps of a rollout warm-start
+those of the next one nearby.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Steps(NamedTuple):
 
 
 class Rollout(NamedTuple):
-    """A rollout; what comes after the last solved knot is undefined."""
+    """A rollout; rows after the last solved knot are undefined."""
 
     x: Floats  # (T + 1, nx)
     u: Floats  # (T, nu) [N, N m]

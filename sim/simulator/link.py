@@ -1,6 +1,6 @@
 """The optional kernels that a mechanism uses (solvers/compiler): linked before the first call that needs them.
 
-Addresses are those of this process, so they are no part of a mechanism that is copied into another.
+Addresses are those of this process, so a mechanism that is copied into another process does not carry them.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def _has_strings(model: Model) -> bool:
 
 
 def link_poses(model: Model) -> None:
-    """What every call of a mechanism may need."""
+    """Link the kernels that every call of a mechanism may need."""
     if np.any(model.joint_nrot == 2):
         link(model.optional, swing_pose, swing_turn)
     if _has_ball_springs(model):
@@ -154,19 +154,19 @@ def link_poses(model: Model) -> None:
 
 
 def link_nodes(model: Model) -> None:
-    """What velocities and energies at the nodes of a motion need: those of loops follow from their constraints."""
+    """Link the kernels of velocities and energies at nodes: those of loops follow from their constraints."""
     if len(model.loop_ntrans) + len(model.gear_dof):
         link(model.optional, factor_coupling, solve_coupling, close_velocity)
 
 
 def link_smooth(model: Model) -> None:
-    """What steps of higher order need."""
+    """Link the kernels of steps of higher order."""
     if np.any(model.joint_nrot == 2):
         link(model.optional, swing_curvature)
 
 
 def link_step(model: Model) -> None:
-    """What a time step needs: the interior point only where there are contacts or limits."""
+    """Link the kernels of a time step: the interior point only if there are contacts or limits."""
     hard = len(model.contact_body) + len(model.limit_dof) > 0
     link(model.optional, step)
     if hard:
@@ -199,7 +199,7 @@ def link_step(model: Model) -> None:
 
 
 def link_gradient(model: Model) -> None:
-    """What the derivatives of a time step need beyond it."""
+    """Link the further kernels of the derivatives of a time step."""
     link(model.optional, gradient)
     if np.sum(model.count_above[model.dof_body]) > _DEEP * len(model.dof_body):
         link(model.optional, solve_deep_panel)
@@ -224,7 +224,7 @@ def link_gradient(model: Model) -> None:
 
 
 def link_parameters(model: Model) -> None:
-    """What derivatives by parameters need beyond that."""
+    """Link the further kernels of derivatives by parameters."""
     if np.any(model.contact_terrain):
         link(model.optional, add_surface_radius)
     if _has_strings(model):
@@ -232,5 +232,5 @@ def link_parameters(model: Model) -> None:
 
 
 def link_heights(model: Model) -> None:
-    """What gradients by the heights of a terrain need beyond that."""
+    """Link the further kernels of gradients by heights of terrain."""
     link(model.optional, add_height_gradient)

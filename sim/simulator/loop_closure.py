@@ -1,4 +1,4 @@
-"""States of mechanisms with closed loops: how far the loops are open, and the nearest state that closes them."""
+"""States of mechanisms with closed loops: the gaps of the loops, and the nearest state that closes them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _angle(sine: Floats, cosine: Floats) -> Floats:
 
 
 class _Frame(NamedTuple):
-    """What of a loop joint does not move."""
+    """The constrained directions of a loop joint."""
 
     turn: Floats  # (3, 3) joint to parent
     held: Floats  # (n, 3) directions along which it does not slide
@@ -53,7 +53,7 @@ class Closure:
         }
 
     def gaps(self, x: Floats) -> dict[str, Floats]:
-        """By loop joint and gear, what its constraints miss at x: distances [m], then angles [rad].
+        """By loop joint and gear, the violation of its constraints at x: distances [m], then angles [rad].
 
         Angles and not the sines of the step (sim/dynamics/loops/closure.py), which vanish after half a turn as well.
         """
@@ -139,7 +139,7 @@ class Closure:
         return q
 
     def _with_shares(self, x: Floats) -> Floats:
-        """A copy of x where shares of bodies (closing.py) that are far from the rest of it are brought there."""
+        """A copy of x with distant shares of bodies (closing.py) moved to the rest of their body."""
         gaps = self.gaps(x)
         far = [j for j in self._mechanism.loops if is_weld(j) and np.abs(gaps[j.name]).max() > _APART]
         x = x.copy()
@@ -159,7 +159,7 @@ class Closure:
     def rank(self, x: Floats) -> LoopRank:
         """Which constraints are redundant at the configuration of x, loops in their order.
 
-        And which of them are so at this configuration only: next to it, along what the loops allow, they count.
+        And those that are redundant at this configuration only: nearby, along the motions of the loops, they count.
         """
         here, free = self._rank_at(x)
         near = [self._rank_at(y)[0] for y in self._next_to(x, free)]
@@ -218,7 +218,7 @@ class Closure:
         return lambda d: np.concatenate(list(self._gaps(place(d), name).values()), axis=1)
 
     def _refusal(self, place: Callable[[Floats], Floats], d: Floats, search: bool) -> str:
-        """What to say when the state place(d) is the best that was found."""
+        """The error message when the state place(d) is the best that was found."""
         gaps = {name: float(np.abs(gap).max()) for name, gap in self.gaps(place(d[None])[0]).items()}
         names = [*gaps] if search and len(gaps) > 1 else []
         alone = [name for name in names if not nearest(self._error(place, name), len(d), _ALONE).found]

@@ -1,4 +1,4 @@
-"""What a step leaves out of its solver because it is far, and from how far on: inactive.py for people."""
+"""Inactive contacts of a step, and the gap beyond which a contact is inactive (see contact/inactive.py)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.model.model import Model
 
 
 def reach(model: Model, time_step: float, kappa: float, tolerance: float) -> NDArray[np.float64]:
-    """Gap from which on each contact of a body at rest is left out, (ncontact,) [m].
+    """Gap beyond which each contact of a body at rest is inactive, (ncontact,) [m].
 
     Twice the positive root a of the bound in inactive.py:
 

@@ -1,11 +1,11 @@
-"""Calls of a simulator of higher order with contacts or limits: order 2 near them, the higher order while all is far.
+"""Calls of a simulator of higher order with contacts or limits: order 2 near them, the higher one otherwise.
 
 Both have the same states, x = [q; v] with v = M(q)^-1 p of the node. For order 2, p is the momentum that the discrete
 Legendre transform gives the node; that is one to one with the mean velocity of the interval before it, so going over
 from one order to the other changes neither q nor p: momentum and energy are the same on both sides. Which order a step
 has depends on its state and input alone (phases.py).
 
-Between order-2 steps nothing is converted: their states, with mean velocities, are handed on.
+Between steps of order 2 nothing is converted: their states, with mean velocities, carry over.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from sim.simulator.settings import Settings
 from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
-_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is far again are thrown away
+_PIECE, _LARGEST = 16, 1024  # steps of order 2 at once; those after all is inactive again are discarded
 
 
 class March(NamedTuple):
-    """Steps from one state on; what comes after the last solved one is undefined."""
+    """Steps from one state on; rows after the last solved step are undefined."""
 
     knot: int  # number of solved steps
     xs: Floats  # (T + 1, nx)
@@ -96,7 +96,7 @@ class PhasedEngine(HighOrderEngine):
         return out._replace(knot=t)
 
     def _fly(self, flight: phases.Flight, kappa: float | None) -> tuple[int, int]:
-        """Steps of higher order while all is far: how many, and why no more, see `roll_far`."""
+        """Steps of higher order while all is inactive: their number, and the reason for the end; see `roll_far`."""
         model, data = self.linked(link_smooth, link_step), self._scratch.table()
         settings, scheme = self.settings.array(kappa), self._scheme()
         taken, why = 0, int(Status.SOLVED)
@@ -112,7 +112,7 @@ class PhasedEngine(HighOrderEngine):
     def _stay(
         self, out: March, first: int, given: tuple[Floats, Floats], mean: Vector, kappa: float | None
     ) -> tuple[int, Vector | None]:
-        """Steps of order 2 from the state `mean` at step `first` until all is far: their number, and the last state.
+        """Steps of order 2 from the state `mean` at step `first` until all is inactive: their number, the last state.
 
         None in its place where a step is not solved. given: inputs, and external wrenches.
         """
@@ -178,7 +178,7 @@ class PhasedEngine(HighOrderEngine):
         *,
         keep: bool = False,
     ) -> tuple[int, Path]:
-        """As Engine.closed_loop; nothing of what the policy knows of its steps is used."""
+        """As Engine.closed_loop; the warm starts of the policy are not used."""
         knots = len(policy.us)
         path = self._path(knots, keep=keep, cones=False)
         path.xs[0] = x

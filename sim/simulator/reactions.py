@@ -5,8 +5,8 @@ A step leaves in `data.subtree` the momentum balance of the bodies behind each j
     sum over the bodies behind it of (p_out - p_in - impulses of gravity, contacts, loops, inputs) = h wrench of a joint
 
 so the wrench of a joint of the tree is read from there, and that of a closing joint from its multipliers. Along the
-directions S in which the joint is free it is what springs, dampers, limits and inputs of the joint give, less what its
-armature takes; that part, as the smallest wrench at the joint point with these components, is the active one
+directions S in which the joint is free it is the sum of springs, dampers, limits and inputs, less the force on the
+armature; that part, as the smallest wrench at the joint point with these components, is the active one
 
     W_active = S (S^T S)^-1 S^T W
 
@@ -41,7 +41,7 @@ FRAMES = ("world", "joint", "body")
 
 @dataclass(frozen=True)
 class Reactions(Result):
-    """Wrenches of the joints on their children, means over a step; what acts on the parents is the opposite.
+    """Wrenches of the joints on their children, means over a step; the opposite wrenches act on the parents.
 
     Torques are about the joint point of the child where the step begins, whose place in the world is `point`. Axes are
     those of the world, of the joint frame in the parent, or of the child where the step begins, as `frame` says.
@@ -92,7 +92,7 @@ class _Row(NamedTuple):
     point: Floats  # (3,)
     wrench: Floats  # (2, 3) force, and torque about the point, world axes
     constraint: Floats  # (2, 3) likewise
-    axes: Floats  # (3, 3) of the frame asked for, as columns
+    axes: Floats  # (3, 3) of the requested frame, as columns
 
 
 def reactions(
@@ -159,7 +159,7 @@ def _loop_joint(mech: Mechanism, loop: Joint, m: int, model: Model, data: Data, 
 
 
 def _axes(joint: Joint, child: Floats, parent: int, data: Data, frame: str) -> Floats:
-    """Rotation to the world of the frame asked for."""
+    """Rotation from the requested frame to the world."""
     if frame == "world":
         return np.eye(3)
     if frame == "body":

@@ -1,6 +1,6 @@
-"""What Simulator returns: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
+"""Results of Simulator: frozen dataclasses of arrays, each a Result with `success`, `status` and `message`.
 
-No method raises because a step was not solved, unless it is asked to by throw=True: the result says so. Derivatives of
+No method raises for an unsolved step unless throw=True: the result has its status. Derivatives of
 an unsolved step are zero; taking them out of their result, by unpacking or by name, raises SimulationError.
 """
 
@@ -27,7 +27,7 @@ STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 
 
 class SimulationError(RuntimeError):
-    """A time step that did not reach its tolerance; `status` says why."""
+    """A time step that did not reach its tolerance; `status` is the reason."""
 
     def __init__(self, message: str, status: Status) -> None:
         super().__init__(message)
@@ -35,9 +35,9 @@ class SimulationError(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a long call, which is heard within a fifth of a second; `result` is what was done until then.
+    """Ctrl-C during a long call, which ends within a fifth of a second; `result` is the partial result.
 
-    result    as the call would have returned, as far as it came: the Trajectory, Shot or Batch of a rollout with the
+    result    the return value of the call so far: the Trajectory, Shot or Batch of a rollout with the
               steps that were solved, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
               `closed_loop`; None where nothing was done yet. Calls that only differentiate raise KeyboardInterrupt
     """
@@ -130,7 +130,7 @@ class StepResult(Result):
 
     x: Floats  # (nx,)
     status: Status
-    iterations: int  # of Newton's method; where loops have the step solved again, of all its solves
+    iterations: int  # of Newton's method; of all solves, if loops solve the step again
     residual: float  # largest error of a balance or gap equation [N s, m]
     violation: float  # largest |product - kappa| of the complementary pairs
     scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
@@ -188,7 +188,7 @@ class Shot(Result):
 
 @dataclass(frozen=True)
 class Jacobian(Result):
-    """Derivatives of one step: `A, B = jacobian`; asked for by names (wrt=...), a table of blocks by these names.
+    """Derivatives of one step: `A, B = jacobian`; with names (wrt=...), a table of blocks by these names.
 
     Taking out A, B or a block raises SimulationError where the step was not solved.
     """
@@ -198,7 +198,7 @@ class Jacobian(Result):
     status: Status
     accuracy: float = 0.0  # estimate of the error, relative to the largest entry
     detail: str = ""
-    by_name: bool = False  # asked for by names
+    by_name: bool = False  # requested by names
 
     __repr__ = brief_repr
 
@@ -250,7 +250,7 @@ class Linearization(Result):
     B: Floats  # (T, ndx, nu)
     x_next: Floats  # (T, nx)
     status: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
-    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); those asked for
+    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); the requested ones
     # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
     detail: str = ""
@@ -300,7 +300,7 @@ class Batch(Result):
 
 
 def carried(call: Callable[[], Any], made: Callable[[Any], Any]) -> Any:
-    """What is made of the result of a call; of what Interrupted carries instead, the same is made."""
+    """The converted result of a call; the result that Interrupted carries is converted likewise."""
     try:
         result = call()
     except Interrupted as stop:

@@ -1,4 +1,4 @@
-"""Where Python enters the compiled derivatives by parameters; they are compiled when first asked for."""
+"""Entries from Python to the derivatives by parameters, which are compiled on first use."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from solvers.types import Vector
 __all__ = ["Settings", "default_kappa", "free_parts"]
 
 _CREEP = 1e-9  # [m/s]
-_EARTH = 9.81  # [m/s^2] where there is no gravity
+_EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
 
 

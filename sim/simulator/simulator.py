@@ -63,11 +63,11 @@ class Simulator(StateSpace):
     max_iterations  of the interior point
     order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum
                     is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
-                    grows. Steps that might leave out impulses kappa / gap beyond the tolerance are of order 2
+                    grows. Steps that would omit impulses kappa / gap beyond the tolerance are of order 2
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
     With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
-    before what the ground does in the step to come: standing still, g h/2.
+    before the ground acts in the next step: standing still, g h/2.
 
     Every method that steps returns a result with `success`, `status` and `message`, and raises SimulationError for an
     unsolved step only with throw=True. External wrenches are (nbody, 6), with steps in front (T, nbody, 6), or
@@ -99,7 +99,7 @@ class Simulator(StateSpace):
         return Simulator, (self.mechanism, *self._given().values())
 
     def _given(self) -> dict[str, Any]:
-        """The settings as they were given: kappa None where it is the default."""
+        """The settings as given: kappa None for the default."""
         return {**self._engine.settings._asdict(), "kappa": self._kappa}
 
     def __repr__(self) -> str:
@@ -174,7 +174,7 @@ class Simulator(StateSpace):
         Args:
             x: (nx,) state.
             us: (T, nu) inputs [N, N m]; or a function u = us(time, x), asked before each step; zero by default.
-            steps: number of steps where `us` does not say it.
+            steps: number of steps, if `us` does not determine it.
             throw: raise SimulationError where a step is not solved.
             wrenches: external ones, (T, nbody, 6) or by body.
 
@@ -254,7 +254,13 @@ class Simulator(StateSpace):
         return text
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Batch:
-        """Rollouts from the states x0s (n, nx) under the inputs us (n, T, nu), over all cores."""
+        """Rollouts over all cores.
+
+        Args:
+            x0s: first states (n, nx).
+            us: inputs (n, T, nu).
+            throw: raise SimulationError if a step is not solved.
+        """
         call = "Simulator.rollout_batch"
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
         starts = self._arguments.states(f"{call}(x0s)", checks.array(f"{call}(x0s)", x0s, (len(inputs), self.nx)))
@@ -318,7 +324,7 @@ class Simulator(StateSpace):
         wrenches: Wrenches | None = None,
         throw: bool = False,
     ) -> Reactions:
-        """What every joint transmits to its child in the step from x under u: force [N] and torque [N m].
+        """Force [N] and torque [N m] that every joint transmits to its child in the step from x under u.
 
         Args:
             x: (..., nx) states; `sim.reactions(t.x[:-1], t.u)` has the reactions of a whole trajectory.
@@ -342,7 +348,7 @@ class Simulator(StateSpace):
         return ended(found, throw)
 
     def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
-        """Names of the contacts that the step from x is solved without, because they are far.
+        """Names of the inactive contacts of the step from x, which the solver omits.
 
         Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
         An unsolved step raises SimulationError.
@@ -495,7 +501,7 @@ class Simulator(StateSpace):
         """d(next maximal state)/d(z, u), (12 nbody, 12 nbody) and (12 nbody, nu).
 
         Tangent coordinates per body: position, velocity (world), rotation (right perturbation of the quaternion),
-        angular velocity (body). The step sees z through minimal(z): what leaves the joints has no effect, so A is the
+        angular velocity (body). The step sees z through minimal(z): violations of joints have no effect, so A is the
         derivative of maximal(step(minimal(z))).
         """
         bodies = checks.array("Simulator.linearize_maximal(z)", z, (self.nbody, 13))
@@ -518,7 +524,7 @@ class Simulator(StateSpace):
     ) -> Gradient:
         """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
 
-        The steps are solved anew at `kappa`; nothing but one step is kept, so the memory is that of the trajectory.
+        The steps are solved again at `kappa`. Only one step is stored at a time: memory is that of the trajectory.
 
         Args:
             trajectory: of `rollout`, or (states (T + 1, nx), inputs (T, nu)).
@@ -576,13 +582,13 @@ class Simulator(StateSpace):
         return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
 
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Simulator:
-        """The same, also its kappa, with other values of parameters; a ValueError names what nothing can have."""
+        """The same, including its kappa, with other values of parameters; a ValueError names impossible ones."""
         mech, time_step = self._by_parameters.with_values("Simulator.with_parameters(...)", values)
         return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
 
     @cached_property
     def _by_parameters(self) -> ParameterEngine:
-        """Calls by parameters, and sweeps; their modules are imported by those who ask for them."""
+        """Calls by parameters, and sweeps; their modules are imported on first use."""
         from sim.simulator.parameter_engine import ParameterEngine
 
         return ParameterEngine(self._engine, self.mechanism, self.time_step)

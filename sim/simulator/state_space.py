@@ -63,10 +63,17 @@ class StateSpace:
     def close(self, x: ArrayLike) -> Floats:
         """The state near x that closes the loops of the mechanism, at both ends of its interval.
 
-        Where Newton's method finds none, as for a linkage in one line, the nearest one of those that are found from
-        some starts around it, the same every time (sim/dynamics/loops/closest_root.py).
+        If Newton's method fails, as for a linkage in one line, it starts again from a fixed set of states around x,
+        and the nearest solution is returned (sim/dynamics/loops/closest_root.py).
 
-        Trees: x itself. ValueError: no such state is found; which loop joint or gear stays open, and by how much.
+        Args:
+            x: state (nx,).
+
+        Returns:
+            The state (nx,); x itself for trees.
+
+        Raises:
+            ValueError: no such state is found; the message names the loop joint or gear that stays open, and its gap.
         """
         state = self._placed("close", x)
         return Closure(self.mechanism, self._engine).close(state) if self._closes else state
@@ -84,11 +91,28 @@ class StateSpace:
         return bool(self.mechanism.loops or self.mechanism.gears)
 
     def loop_gaps(self, x: ArrayLike) -> dict[str, Floats]:
-        """By loop joint, and "gear NAME", how far it is open: distances [m], then angles [rad]."""
+        """Gaps by loop joint and "gear NAME": distances [m], then angles [rad].
+
+        Args:
+            x: state (nx,).
+
+        Returns:
+            {name: (n,)}, one number per constraint.
+        """
         return Closure(self.mechanism, self._engine).gaps(self._placed("loop_gaps", x))
 
     def loop_rank(self, x: ArrayLike | None = None) -> LoopRank:
-        """Which loop constraints are redundant at x, the neutral state when left out; `print` it."""
+        """The redundant loop constraints at a state.
+
+        Args:
+            x: state (nx,); the neutral state by default.
+
+        Returns:
+            LoopRank, which `print` shows as text.
+
+        Raises:
+            ValueError: the mechanism has neither loops nor gears.
+        """
         if not self._closes:
             raise ValueError(
                 f"Simulator.loop_rank: {self.mechanism.name!r} has no joint that closes a loop, and no gear"
@@ -106,6 +130,17 @@ class StateSpace:
         `neutral` and of `equilibrium`.
 
         Closed loops: those of the state are closed, as by `close`, and its velocity is the part of v that they allow.
+
+        Args:
+            q: coordinates (nq,).
+            v: velocities (nv,).
+
+        Returns:
+            State (nx,).
+
+        Raises:
+            ValueError: the shapes are wrong, a quaternion is not of unit length, or a loop cannot be closed.
+            SimulationError: no state has this velocity.
         """
         q0 = checks.array("Simulator.start(q)", q, (self.nq,))
         v0 = checks.array("Simulator.start(v)", v, (self.nv,))
@@ -116,32 +151,60 @@ class StateSpace:
         return self._arguments.finite("start", self._engine.started(q0, v0), x0[None])
 
     def velocity(self, x: ArrayLike) -> Floats:
-        """Joint velocities at the node (nv,), the v of start(q, v); leading axes allowed.
+        """Joint velocities at the node, the v of start(q, v).
 
         They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node, and of that the part
         along closed loops, whose forces act before and after the node.
+
+        Args:
+            x: state (..., nx).
+
+        Returns:
+            Velocities (..., nv).
         """
         xs, lead = self._arguments.stacked("velocity", "x", x)
         return self._arguments.finite("velocity(x)", self._engine.node_velocities(xs), xs).reshape(*lead, self.nv)
 
     def bodies(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """(nbody, 13) per body [position, velocity (world), quaternion, omega (body)] where the joints have the
-        coordinates q (nq,) and the velocities v (nv,) at this moment; leading axes are broadcast.
+        """Positions and velocities of the bodies for coordinates q and velocities v at one moment.
 
         `maximal` has mean velocities over the last interval instead.
+
+        Args:
+            q: coordinates (..., nq).
+            v: velocities (..., nv); leading axes are broadcast.
+
+        Returns:
+            (..., nbody, 13) per body [position, velocity (world), quaternion, omega (body)].
         """
         qs, vs, lead = self._arguments.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
         xs = self._arguments.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
         return self._arguments.finite("bodies", self._engine.bodies(xs), xs).reshape(*lead, self.nbody, 13)
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
-        """x (+) dx: the state moved by a perturbation; leading axes are broadcast."""
+        """x (+) dx: the state moved by a perturbation.
+
+        Args:
+            x: state (..., nx).
+            dx: perturbation (..., ndx); leading axes are broadcast.
+
+        Returns:
+            State (..., nx).
+        """
         xs, dxs, lead = self._arguments.paired("integrate", ("x", x, self.nx), ("dx", dx, self.ndx))
         xs = self._arguments.states("Simulator.integrate(x)", xs)
         return self._arguments.finite("integrate", self._engine.integrate(xs, dxs), xs, dxs).reshape(*lead, self.nx)
 
     def difference(self, x1: ArrayLike, x0: ArrayLike) -> Floats:
-        """x1 (-) x0: the dx with integrate(x0, dx) = x1; leading axes are broadcast."""
+        """x1 (-) x0: the dx with integrate(x0, dx) = x1.
+
+        Args:
+            x1: state (..., nx).
+            x0: state (..., nx); leading axes are broadcast.
+
+        Returns:
+            Perturbation (..., ndx).
+        """
         x1s, x0s, lead = self._arguments.paired("difference", ("x1", x1, self.nx), ("x0", x0, self.nx))
         x1s, x0s = (self._arguments.states(f"Simulator.difference({n})", x) for n, x in (("x1", x1s), ("x0", x0s)))
         return self._arguments.finite("difference", self._engine.difference(x0s, x1s), x1s, x0s).reshape(
@@ -149,16 +212,31 @@ class StateSpace:
         )
 
     def maximal(self, x: ArrayLike) -> Floats:
-        """z (nbody, 13) per body [position, velocity (world), quaternion, omega (body)]; leading axes allowed."""
+        """The maximal state z of a minimal state x.
+
+        Args:
+            x: state (..., nx).
+
+        Returns:
+            (..., nbody, 13) per body [position, velocity (world), quaternion, omega (body)].
+        """
         xs, lead = self._arguments.stacked("maximal", "x", x)
         zs = self._arguments.finite("maximal(x)", self._engine.maximal(xs, self.nbody), xs)
         return zs.reshape(*lead, self.nbody, 13)
 
     def minimal(self, z: ArrayLike, joint_tolerance: float = 1e-6) -> Floats:
-        """The state x with maximal(x) = z; leading axes allowed.
+        """The state x with maximal(x) = z.
 
-        A z that is off its joints by more than `joint_tolerance` [m, rad] at either end of its interval is refused;
-        with infinity, the nearest motion along the joints is returned.
+        Args:
+            z: maximal state (..., nbody, 13).
+            joint_tolerance: largest violation of a joint at either end of the interval [m, rad]; with infinity, the
+                nearest motion along the joints is returned.
+
+        Returns:
+            State (..., nx).
+
+        Raises:
+            ValueError: z violates a joint by more than `joint_tolerance`.
         """
         zs = np.array(shaped("Simulator.minimal(z)", z, (self.nbody, 13)))
         lead = zs.shape[:-2]
@@ -170,26 +248,54 @@ class StateSpace:
         return xs.reshape(*lead, self.nx)
 
     def maximal_jacobian(self, x: ArrayLike) -> Floats:
-        """dz/dx (12 nbody, ndx), per body [position, velocity, rotation, omega], in tangent coordinates."""
+        """dz/dx in tangent coordinates, per body [position, velocity, rotation, omega].
+
+        Args:
+            x: state (nx,).
+
+        Returns:
+            (12 nbody, ndx).
+        """
         state = self._arguments.state("maximal_jacobian", x)
         return self._arguments.finite(
             "maximal_jacobian(x)", self._engine.maximal_jacobian(state, self.nbody)[None], state[None]
         )[0]
 
     def minimal_jacobian(self, z: ArrayLike) -> Floats:
-        """dx/dz (ndx, 12 nbody), the inverse of `maximal_jacobian` along the joints."""
+        """dx/dz, the inverse of `maximal_jacobian` along the joints.
+
+        Args:
+            z: maximal state (nbody, 13).
+
+        Returns:
+            (ndx, 12 nbody).
+        """
         zs = checks.array("Simulator.minimal_jacobian(z)", z, (self.nbody, 13))
         self._arguments.check_maximal("minimal_jacobian", zs[None])
         return self._arguments.finite("minimal_jacobian(z)", self._engine.minimal_jacobian(zs)[None], zs[None])[0]
 
     def energy(self, x: ArrayLike) -> Any:
-        """Kinetic and potential energy at the node [J]; leading axes allowed."""
+        """Kinetic and potential energy at the node.
+
+        Args:
+            x: state (..., nx).
+
+        Returns:
+            Energy [J], a float or (...,).
+        """
         xs, lead = self._arguments.stacked("energy", "x", x)
         total = self._energies("energy", xs, [0, 1]).reshape(lead)
         return total if lead else float(total)
 
     def kinetic_energy(self, x: ArrayLike) -> Any:
-        """Kinetic energy at the node [J]; leading axes allowed."""
+        """Kinetic energy at the node.
+
+        Args:
+            x: state (..., nx).
+
+        Returns:
+            Energy [J], a float or (...,).
+        """
         xs, lead = self._arguments.stacked("kinetic_energy", "x", x)
         kinetic = self._energies("kinetic_energy", xs, [0]).reshape(lead)
         return kinetic if lead else float(kinetic)
@@ -201,7 +307,14 @@ class StateSpace:
         return self._arguments.finite(f"{method}(x)", total, xs)
 
     def momentum(self, x: ArrayLike) -> tuple[Floats, Floats]:
-        """(linear [N s], angular about the world's origin [N m s]) momentum at the node; leading axes allowed."""
+        """Momentum of all bodies at the node.
+
+        Args:
+            x: state (..., nx).
+
+        Returns:
+            (linear (..., 3) [N s], angular about the origin of the world (..., 3) [N m s]).
+        """
         xs, lead = self._arguments.stacked("momentum", "x", x)
         with np.errstate(all="ignore"):
             momenta = self._engine.momenta(xs)

@@ -1,4 +1,4 @@
-"""What impulses of contacts and joint limits do to each other: G = J H^-1 B^T, after Delassus.
+"""The coupling of impulses of contacts and joint limits: G = J H^-1 B^T, after Delassus.
 
 The elimination of H (elimination.py) goes from a body to the root and back. On the way up the answer to an impulse
 has entries of the joints on that way alone, and so have, on the way down, the rates of a body:

@@ -49,8 +49,8 @@ def direction(model: Model, data: Data, h: float, kappa: float, mean: float) -> 
 
     predictor     full residual, products to kappa                      -> sigma = (mean ahead / mean)^3
     corrector     full residual, products to max(kappa, sigma mean), second-order term        (Mehrotra 1992);
-                  left out where the predictor already lands on kappa. The term is that of the part of the predictor
-                  that stays in the cones: whole, it can cancel what it corrects, and nothing would move
+                  omitted where the predictor already lands on kappa. The term is that of the part of the predictor
+                  that stays in the cones: the whole term can cancel its own correction and stall
     if short      half the residual, products to half the mean; then a tenth, to nine tenths
     """
     sigma = 0.0

@@ -1,4 +1,4 @@
-"""The energy balance of a solved step, which tells the solution that goes on with the motion from others.
+"""The energy balance of a solved step, which distinguishes the solution that continues the motion from others.
 
 The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
 and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
@@ -7,23 +7,23 @@ up, to any energy. No solution is accepted that gains more than a tenth of the k
     K23 - K12 - W > 0.1 max(K12, |G|) + |D| + slack
 
 K12, K23: p.M^-1 p/2 of the momentum p with which the bodies arrive at configurations 2 and 3. W: work of gravity,
-springs and inputs at 2, at the mean of the velocities of both intervals. |G|: that of gravity, |D|: that of what drives
-the bodies, the sum of its parts, each input and spring; where contacts make velocities jump against them, as a foot
+springs and inputs at 2, at the mean of the velocities of both intervals. |G|: that of gravity, |D|: that of the drives,
+the sum of its parts, each input and spring; where contacts make velocities jump against them, as a foot
 does that is set down, their work is known to its size only. Dampers and friction lose. Contacts and limits may give
 
     slack = sum over contacts and limits of gamma max(0, gap3 - gap2)/h + kappa/h
 
-that of those that throw out what overlapped where the step began; others have gap2 >= 0 and gamma gap3 = kappa. Loops
-may give what closes them, where they were open.
+that of those that remove the overlap at the beginning of the step; others have gap2 >= 0 and gamma gap3 = kappa. Loops
+may give the work that closes them if they were open.
 
-These energies cost a factorisation of the mass matrix each. They are asked for where constraints did work,
+Each of these energies costs a factorisation of the mass matrix. They are computed if constraints did work,
 
     work = sum over bodies of b.(V + V')/2  -  sum over dofs of S2^T (subtree sums of w) (v + v')/2  >  0.1 K12 + noise
 
-b, w the wrenches that the momenta of a body leave over without and with those of contacts: what is left when springs,
-dampers, inputs and limits are taken away is the work of joints, loops and contacts, and none of third order in a motion
-that time steps can follow. It is that of mean velocities, so they are asked for in every step, too, in which a body
-turns so far that its sine says little. Nothing is asked for where the ground is flat and no body turns by .15 rad, with
+b, w the wrenches that the momenta of a body leave over without and with those of contacts: the rest, without springs,
+dampers, inputs and limits, is the work of joints, loops and contacts, and none of third order in a motion
+that time steps can follow. It is that of mean velocities, so they are also computed in every step in which a body
+turns too far for its sine. They are skipped if the ground is flat and no body turns by .15 rad, with
 contacts by .05 rad: of the motions of benchmarks/attacks.py, none that is accepted in this way gains a tenth.
 """
 
@@ -53,7 +53,7 @@ from solvers.rotation import cross, rotate
 from solvers.types import Vector
 
 LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an accepted step
-# cosines of half the turns below which there is no such work, without contacts and with them, and above which it says
+# cosines of half the turns below which there is no such work, without contacts and with them, and above which it tells
 # nothing
 _NEAR, _NEAR_GROUND, _FAR = 0.99719, 0.99969, 0.825
 
@@ -140,7 +140,7 @@ def input_work(model: Model, data: Data, j: int, u: float) -> float:
 def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tuple[float, float]:
     """Work of gravity, springs, inputs and external wrenches at configuration 2, and its size without gravity [J].
 
-    S2^T (subtree sums of w) is what springs, inputs, dampers and limits of a coordinate leave of -I (v' - v).
+    S2^T (subtree sums of w) is the rest of -I (v' - v) beside springs, inputs, dampers and limits of a coordinate.
     """
     total = -0.5 * (gravity_energy(model, data.move_in) + gravity_energy(model, data.move))
     size = 0.0
@@ -168,7 +168,7 @@ def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tu
 
 @kernel
 def contact_slack(model: Model, data: Data, options: StepOptions) -> float:
-    """What contacts and limits may give to what overlapped where the step began [J], and kappa/h each."""
+    """Work that contacts and limits may do on the overlap at the beginning of the step [J], and kappa/h each."""
     total = pair_slack(model, data)
     for m in range(data.active_ground_count[0]):
         c = data.active[m]

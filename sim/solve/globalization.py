@@ -1,6 +1,6 @@
 """Globalization: the strategies from which the interior point starts, in the order in which they are tried.
 
-The first strategy begins with what is known of the solution (`known_start`). The others are rescues: an attempt that
+The first strategy begins with a known approximation (`known_start`). The others are rescues: an attempt that
 ends in a fold of the central path is given up, and the next one starts elsewhere, at another kappa0. Some solutions lie
 beyond folds, such as those of legs that jam between a joint limit and the ground.
 
@@ -94,7 +94,7 @@ _ROUNDS = 13
 
 
 def _numbered(k: int, strategy: Strategy) -> Strategy:
-    """Strategy k of the list: shares go on by the golden ratio, modulo 1, and kappa0 grows."""
+    """Strategy k of the list: shares advance by the golden ratio, modulo 1, and kappa0 grows."""
     share = _GOLDEN * (k - 2) % 1.0 if strategy.start == Start.SHARE else 1.0
     return strategy._replace(share=share, growth=_GROWTH ** ((k - 1) % _GROWTHS) if k > 0 else 1.0)
 
@@ -149,7 +149,7 @@ def known_start(
     """The first of these that is near the solution, with its iterate in `data`:
 
         warm        at the guess, with the impulses of the step before
-        predicted   at what the step linearised there predicts (prediction.py)
+        predicted   at the prediction of the linearised step (prediction.py)
         resumed     near these impulses, on the central path of a larger kappa
         at kappa    at the guess, with the impulses kappa / gap: a robot at rest
 

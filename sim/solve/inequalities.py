@@ -1,4 +1,4 @@
-"""All active contacts, and all limits, of a step at once: what the interior point asks of them, one verb per kernel.
+"""All active contacts, and all limits, of a step at once: the operations of the interior point on them, one per kernel.
 
 Their complementarity products are in complementarity.py. Inactive contacts (inactive.py) have no part in its variables
 and its matrix.
@@ -119,7 +119,7 @@ def return_inequalities(model: Model, data: Data, h: float, kappa: float) -> Non
 
 @kernel
 def total_impulse(model: Model, data: Data) -> float:
-    """Sum of the normal impulses of active contacts and limits: of what they balance, an estimate."""
+    """Sum of the normal impulses of active contacts and limits: an estimate of the load that they balance."""
     total = 0.0
     for m in range(data.active_count[0]):
         c = data.active[m]

@@ -9,10 +9,10 @@ Algorithm 1 of Howell et al. 2022 (Dojo), a primal-dual method with the predicto
 
 It differs in these points (60,000 random extreme states, `benchmarks/robustness.py`, seeds 0 to 2):
 
-* The friction cone is no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
+* The friction cone has no variable. On the central path it is a smooth law of the slip, solved for beta by Newton, at a
   `smoothing` that follows down to kappa (contact_law.py); conic scalings jam on thin cones.
 * The boundary of the cones stops no step: pairs that would leave return to the central path.
-* No body turns by more than .7 rad per iteration, beyond which a gap is not what its Jacobian says.
+* No body turns by more than .7 rad per iteration, beyond which the Jacobian of a gap does not predict it.
 * Where the path has folded, friction bounds and arms of impulses count as constant, half or more.
 * An attempt that ends in a fold is given up, and the next strategy starts elsewhere (globalization.py).
 * Equations of a step have several solutions. One in which shapes overlap in features that were not active, or which
@@ -52,7 +52,7 @@ from solvers.status import Status
 from solvers.types import Vector
 
 _ROUNDING = 2e-14  # [N s m] of the products: slips come from differences of positions over a time step
-# times the residual before: what smaller violations may cost, and where friction is led down
+# times the residual before: growth allowed for smaller violations, and during the continuation in friction
 _WORSE, _WORSE_LED = 10.0, 2.0
 _PATIENCE = 30  # iterations of an attempt
 _REPETITIONS = 3  # of an attempt, with other active features
@@ -140,7 +140,7 @@ def solve_from(
 def judge_solution(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], out: Outcome
 ) -> int:
-    """The Verdict on the outcome of an attempt; VALID where it is no solution.   inputs: (q, v, u)."""
+    """The Verdict on the outcome of an attempt; VALID if it is not a solution.   inputs: (q, v, u)."""
     if out.status != Status.SOLVED:
         return Verdict.VALID
     found = overlapping(model, data)

@@ -1,7 +1,7 @@
 """The step of a scene with loops: its solution on the branch of the motion, also at singular poses.
 
 Where loops are regular (branch_motion.py), they move on one branch, and the step is solved as any other. At a singular
-pose branches meet (bifurcation.py): the motion goes on along the one on which it arrived.
+pose branches meet (bifurcation.py): the motion continues along the one on which it arrived.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far an iterate of the interior point is from the solution."""
+"""Merit: the distance of an iterate of the interior point from the solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The step of a scene without contacts and limits: Newton's method on the momentum balance, nothing else compiled."""
+"""The step of a scene without contacts and limits: Newton's method on the momentum balance."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def newton_step(model: Model, data: Data, h: float, q: Vector, v: Vector) -> boo
 
 @kernel
 def closed_to(data: Data, options: StepOptions) -> float:
-    """How far loops may be open: near where two branches of their motion meet, gaps grow slowly away from either.
+    """Tolerance of loop gaps: near a bifurcation of their motion, gaps grow slowly away from either branch.
 
     Least pivot: the product of the distances of configurations 2 and 3 from there.
     """

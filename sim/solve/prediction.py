@@ -1,10 +1,10 @@
-"""Where a motion goes on: the step linearised at its incoming velocity, with contacts and limits on the central path.
+"""Prediction of a step: the step linearised at its incoming velocity, with contacts and limits on the central path.
 
     H (v' - v25) = -R(v25, l) + B^T (l' - l),      w' = w(v25) + J (v' - v25) = w0 + G (l' - l)
 
 from the impulses l of the step before: a step of Josephy's method. Newton's method finds out slowly which contacts
 press, stick and slide, one iteration of it costs as much as all of this (sim/solve/delassus.py), and from here it takes
-two or three. What the solution does differently is of second order in the change of the velocity; the same once more,
+two or three. The error is of second order in the change of the velocity; the same once more,
 with the residual there and the matrices of before, costs less than an iteration and leaves a tenth of it or less.
 """
 
@@ -28,14 +28,14 @@ from solvers.gauss_seidel import gauss_seidel
 from solvers.rotation import Vec3
 from solvers.types import Vector
 
-_NEAR = 0.2  # of the way to a contact that the motion goes: what may touch
+_NEAR = 0.2  # of the way to a contact: motion beyond which it may become active
 _STEPS = 2
 _CLOSE = 1e-3  # error, as of the merit, from which one iteration of Newton's method does more
 
 
 @kernel
 def predictable(model: Model, data: Data) -> bool:
-    """Whether `predict` knows all that acts: no pairs of bodies, loops, gears or friction pyramids."""
+    """Whether `predict` covers the scene: no pairs of bodies, loops, gears or friction pyramids."""
     if data.active_count[0] != data.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return False
     for m in range(data.active_ground_count[0]):

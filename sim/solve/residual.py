@@ -1,4 +1,4 @@
-"""The generalized residual of a step: body wrenches along the test directions, and what acts in the joints."""
+"""The generalized residual of a step: body wrenches along the test directions, and joint forces."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def norm(x: Vector) -> float:
 
 @kernel
 def absorb_residual(model: Model, data: Data) -> None:
-    """momentum_out less the residual r of the joints: a motion hands on the momenta that its steps should have left, so
+    """momentum_out less the residual r of the joints: a motion carries over the momenta of exact steps, so
     that the tolerance of the solve does not add up.
 
     Each joint takes (f, m) = (sum r_k t_k, sum r_k a_k) at its point o from its body, and gives it to the parent: about
@@ -87,7 +87,7 @@ def _add(P: Vector, r: float, s: Vector, x: float, y: float, z: float) -> None:
 
 @kernel
 def balance_to_wrench(data: Data) -> None:
-    """wrench = balance: what forces are then added to."""
+    """wrench = balance, to which forces are then added."""
     for i in range(data.balance.shape[0]):
         for k in range(6):
             data.wrench[i, k] = data.balance[i, k]

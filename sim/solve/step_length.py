@@ -1,4 +1,4 @@
-"""How far to go along the Newton direction."""
+"""Step length along the Newton direction."""
 
 from __future__ import annotations
 

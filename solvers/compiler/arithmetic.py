@@ -21,7 +21,7 @@ _COMPARED = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, op
 
 
 def _arithmetic() -> dict[Any, Callable[..., Any]]:
-    """What writes an operator of two numbers of one type, by both."""
+    """The code generators of operators on two numbers of one type, by operator and type."""
     table: dict[Any, Callable[..., Any]] = {}
     for name in ("add", "sub", "mul"):
         for op in (getattr(operator, name), getattr(operator, f"i{name}")):

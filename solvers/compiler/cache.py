@@ -1,4 +1,4 @@
-"""Compiled code on disk: a folder that nobody else can write to, with one file per compiled signature.
+"""Compiled code on disk: a folder that no other user can write to, with one file per compiled signature.
 
 Numba's own cache looks only at the file a function is written in, so a caller keeps an old copy of a callee that lives
 in another file. Here the folder is named by a digest of every source file that can reach a kernel, so any edit starts
@@ -6,7 +6,7 @@ from an empty folder.
 
 To load compiled code is to run it. So a folder is read only where its owner is the user or root, and where neither a
 group nor the world can write; and a file only when it is as it was written. Everything else is compiled, in memory
-where it cannot be kept, with one warning that says why.
+if it cannot be stored, with one warning that gives the reason.
 
     DOJO_OPT_CACHE=0         compile in memory only
     NUMBA_CACHE_DIR=DIR      keep the compiled code below DIR instead of the user's cache folder
@@ -44,7 +44,7 @@ _KEEP = 4  # digests kept on disk however old they are, so that switching betwee
 _IN_USE = 14 * 24 * 3600.0  # [s] since its last use for which a folder is kept
 _DIGEST = re.compile("[0-9a-f]{16}")
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
-_CHECK = hashlib.blake2b().digest_size  # bytes of a file before what it holds
+_CHECK = hashlib.blake2b().digest_size  # bytes of a file before its contents
 _KERNELS = re.compile(rb"from solvers\.compiler import (\([^)]*|.*)(kernel|inlined)")  # in a file that may hold some
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
@@ -58,7 +58,7 @@ def _sources() -> list[Path]:
 
 
 def _digest() -> str:
-    """Digest of all kernel sources and of the flags that Numba's own cache key leaves out."""
+    """Digest of all kernel sources and of the flags that Numba's own cache key omits."""
     digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK} {FAST}".encode())
     for path in _sources():
         digest.update(path.name.encode() + path.read_bytes())
@@ -66,7 +66,7 @@ def _digest() -> str:
 
 
 def _base() -> tuple[Path | None, int]:
-    """(folder of NUMBA_CACHE_DIR, or the user's cache folder; who must not write there); None where nobody knows one.
+    """(folder of NUMBA_CACHE_DIR, or the user's cache folder; who must not write there); None if there is none.
 
     A folder that the XDG specification calls invalid, because it depends on where the process was started, is none.
     """
@@ -78,7 +78,7 @@ def _base() -> tuple[Path | None, int]:
         home = Path.home()
     except RuntimeError:  # of a user that the system does not know
         return None, 0
-    # the group of a home is often that of its user alone; and what is below is looked at folder by folder
+    # the group of a home is often that of its user alone; and folders below are checked one by one
     return (home / ".cache" if home.is_absolute() else None), stat.S_IWOTH
 
 
@@ -105,7 +105,7 @@ def _opened(base: Path, forbidden: int) -> tuple[Path | None, str]:
     for part in (base, folder.parent, folder):
         part.mkdir(mode=0o700, exist_ok=True)
         about = part.stat()
-        # in a sticky folder, as /tmp is, nobody can put another one in the place of ours
+        # in a sticky folder such as /tmp, other users cannot replace ours
         bits = _OTHERS if part != base else 0 if about.st_mode & stat.S_ISVTX else forbidden
         if why := _foreign(part, about, bits):
             return None, why
@@ -123,7 +123,7 @@ def _prune(root: Path) -> None:
 
 
 def _found() -> tuple[Path | None, str]:
-    """(folder of the compiled code; why there is none, empty where nobody wants one)."""
+    """(folder of the compiled code; the reason if there is none, empty if it is turned off)."""
     if os.environ.get("DOJO_OPT_CACHE", "1") == "0":
         return None, ""
     try:
@@ -150,11 +150,11 @@ class Store:
                 os.utime(self.folder)  # says when it was used last
 
     def read(self, name: str) -> bytes:
-        """What was written under this name; OSError or ValueError when that cannot be had."""
+        """The contents stored under this name.  OSError, ValueError: missing or damaged."""
         if self.folder is None:
             raise FileNotFoundError(name)
         path = self.folder / name
-        # a named pipe, which nobody writes to, would be waited for
+        # a named pipe without a writer would block
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | getattr(os, "O_NONBLOCK", 0))) as file:
             about = os.fstat(file.fileno())
             if not stat.S_ISREG(about.st_mode) or _foreign(path, about):
@@ -165,7 +165,7 @@ class Store:
         return data[_CHECK:]
 
     def write(self, name: str, body: bytes) -> None:
-        """Keep it, at once and as a whole; where that cannot be, say so once."""
+        """Store it atomically; warn once if that fails."""
         if self.folder is None or self._told:
             self.tell(self.why_not)
             return
@@ -188,7 +188,7 @@ class Store:
                 self.tell(str(error))
 
     def drop(self, name: str) -> None:
-        """Remove a file that is of no use, or what else is in its place."""
+        """Remove an unusable file, or anything else in its place."""
         if self.folder is not None:
             path = self.folder / name
             with suppress(OSError):
@@ -199,8 +199,8 @@ class Store:
         if not self._told:
             self._told = True
             warnings.warn(
-                f"dojo_opt: compiled code is not kept, and every process compiles it again: {why}. "
-                "NUMBA_CACHE_DIR=DIR keeps it elsewhere, DOJO_OPT_CACHE=0 asks for none to be kept",
+                f"dojo_opt: compiled code cannot be stored, so every process compiles it again: {why}. "
+                "NUMBA_CACHE_DIR=DIR stores it elsewhere; DOJO_OPT_CACHE=0 turns storing off",
                 RuntimeWarning,
                 stacklevel=2,
             )
@@ -226,7 +226,7 @@ class KernelCache(FunctionCache):
         self.enable()
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
-        """(what the compiled code depends on, apart from the sources of the digest; name of its file)."""
+        """(dependencies of the compiled code, apart from the sources of the digest; name of its file)."""
         version = (*sys.version_info[:2], getattr(sys, "abiflags", ""))
         key = (self._form, self._file, _text_digest(self._file), version, self._index_key(sig, codegen))
         return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
@@ -255,6 +255,6 @@ class KernelCache(FunctionCache):
         STORE.write(name, dumps((key, data._reduce())))
 
     def flush(self) -> None:
-        """Drop what is kept of this form."""
+        """Delete the stored files of this form."""
         for path in STORE.folder.glob(f"{self._stem}-*.nbc") if STORE.folder else ():
             STORE.drop(path.name)

@@ -1,9 +1,9 @@
-"""The fast pipeline: how kernels become machine code, each entry once, with all that it calls; nothing else at all.
+"""The fast pipeline from kernels to machine code: each entry once, with all its callees, and nothing else.
 
 Numba optimises every function together with all that it calls, translates it to machine code, and does both again
-for each of its callers. Here a kernel that kernels call is kept as it was written, and what is optimised and translated
-are entries: functions called from Python or by their address. Inside an entry everything but itself is private, so that
-the optimiser may drop arguments nobody reads and copies nobody calls.
+for each of its callers. Here a kernel that kernels call is kept as it was written, and only entries are optimised and
+translated: functions called from Python or by their address. Inside an entry everything but itself is private, so that
+the optimiser may drop unused arguments and uncalled copies.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class InnerLibrary(JITCodeLibrary):
     """Code of a kernel for its callers: made smaller, not optimised, never translated."""
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Numba runs all of its optimisations here; each entry does so again, on what these three leave."""
+        """Numba runs all of its optimisations here; each entry does so again, after these three."""
         ll_module.data_layout = self._codegen._data_layout
         passes, builder = llvm.create_new_function_pass_manager(), self._codegen._pass_builder()
         passes.add_sroa_pass()
@@ -57,7 +57,7 @@ class InnerLibrary(JITCodeLibrary):
         """Left to the entries."""
 
     def _finalize_final_module(self) -> None:
-        """Keep the code for linking; what is loaded, and cached as translated, is a shell without functions."""
+        """Keep the code for linking; the loaded and cached translation is a shell without functions."""
         code: Any = self._final_module  # type: ignore[has-type]
         code.verify()
         for function in code.functions:
@@ -83,14 +83,14 @@ class EntryLibrary(JITCodeLibrary):
         super()._optimize_final_module()
 
     def _get_module_for_linking(self) -> Any:
-        """What is cached beside the machine code: nothing links an entry, and Numba wants to know its names only."""
+        """Data cached beside the machine code: nothing links an entry, and Numba needs its names only."""
         self._ensure_finalized()
         code: Any = self._final_module
         external = [f for f in code.functions if not f.is_declaration and f.linkage == llvm.Linkage.external]
         return _shell(self, code, tuple(f.name for f in external))
 
 
-_IDLE = (  # passes for what kernels do not do: closures, array expressions, literals as types, exceptions; print types
+_IDLE = (  # features that kernels do not use: closures, array expressions, literals as types, exceptions; print types
     untyped_passes.WithLifting,
     untyped_passes.InlineClosureLikes,
     untyped_passes.RewriteDynamicRaises,
@@ -121,7 +121,7 @@ def _seldom_collected() -> Iterator[None]:
     try:
         yield
     finally:
-        if gc.get_threshold() == _SELDOM:  # nobody else has set another one meanwhile
+        if gc.get_threshold() == _SELDOM:  # unless it was changed meanwhile
             gc.set_threshold(*before)
 
 
@@ -160,6 +160,6 @@ class InnerCompiler(_Compiler):
 
 
 class EntryCompiler(_Compiler):
-    """For what Python calls, or what is called by its address."""
+    """For functions called from Python or by their address."""
 
     library = EntryLibrary

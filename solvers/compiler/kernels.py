@@ -61,8 +61,8 @@ class _Form(CPUDispatcher):
         super().__init__(func, targetoptions=options, pipeline_class=compiler)
 
     def compile(self, sig: Any) -> Any:
-        """Compile or load; what returns a NamedTuple or an enum to Python is refused: Numba 0.68 runs Python to make
-        one, does not look whether that failed, and crashes where Ctrl-C, which came during the call, is heard there.
+        """Compile or load. Kernels that return a NamedTuple or an enum to Python are refused: Numba 0.68 runs Python
+        to make one, ignores failures, and crashes on a Ctrl-C that arrived during the call.
         """
         compiled = super().compile(sig)
         for found in () if self.targetoptions.get("no_cpython_wrapper") else self.overloads.values():
@@ -79,7 +79,7 @@ class _Form(CPUDispatcher):
 class Kernel:
     """A compiled function in two forms: an entry, which Python calls, and `inner`, for other kernels.
 
-    Each is made when it is first asked for: a dispatcher of Numba takes a third of a millisecond to make, and of the
+    Each is made on first use: a dispatcher of Numba takes a third of a millisecond to make, and of the
     hundreds of kernels that a plan imports Python calls a dozen.
     """
 
@@ -97,7 +97,7 @@ class Kernel:
 
     @classmethod
     def _rebuild(cls, func: Callable[..., Any]) -> Any:
-        """What Numba's unpickling calls with what `__reduce__` kept."""
+        """Rebuild a kernel from the data of `__reduce__`, for Numba's unpickling."""
         return local_kernel(func)
 
     @cached_property
@@ -130,7 +130,7 @@ def cached(form: Any, name: str = "entry") -> Any:
 
 
 def registered(kernel: Any) -> Any:
-    """The kernel, which `compiled_signatures` knows from now on."""
+    """Register the kernel with `compiled_signatures`."""
     _REGISTRY.append(kernel)
     return kernel
 

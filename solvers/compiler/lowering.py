@@ -1,4 +1,4 @@
-"""How what kernels are made of becomes LLVM's instructions: entries and rows of arrays, shapes, plain arithmetic.
+"""Translation of kernels to LLVM instructions: entries and rows of arrays, shapes, plain arithmetic.
 
 For one entry of a matrix Numba 0.68 writes 45 instructions, most of which copy its seven words about, and looks through
 every implementation of every operator for each `+`: reading, cleaning and optimising that was a third of a cold start.
@@ -6,7 +6,7 @@ Here the same takes four to ten, which the optimiser turns into the same code. E
 
 An index counts from the end where it is written as a number, a[-1]. Any other must not be negative: to ask, at every
 access, whether it is took a tenth of the time of a step. Where bounds are checked (NUMBA_BOUNDSCHECK=1), a negative
-index is an IndexError like one beyond the end: the checks find what would read other memory without them.
+index is an IndexError like one beyond the end: the checks catch reads of other memory.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NUMBERS = (types.float64, types.int64)
 
 
 class _Lower(Lower):
-    """Numba's, but for what is said above; for functions without reference counts."""
+    """Numba's lowering with the changes above, for functions without reference counts."""
 
     def init(self) -> None:
         """Before anything is lowered."""
@@ -94,7 +94,7 @@ class _Lower(Lower):
             super().lower_inst(inst)
 
     def lower_assign(self, ty: Any, inst: Any) -> Any:
-        """What is assigned."""
+        """Lower the assigned value."""
         value = inst.value
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
@@ -265,5 +265,5 @@ class KernelLowering(NativeLowering):
 
     @property
     def lowering_class(self) -> type[Lower]:
-        """What does it."""
+        """The lowering class."""
         return _Lower

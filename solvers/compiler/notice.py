@@ -1,4 +1,4 @@
-"""What a person at a terminal is told while kernels are compiled, which is done once and takes a while."""
+"""A notice at the terminal during compilation, which happens once and takes a while."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TEXT = "dojo_opt: compiling, for up to a minute; kept on disk where it can be. 
 
 
 class _Clock:
-    """Time spent on compilations so far; those of what a kernel calls happen within its own."""
+    """Time spent on compilations so far; those of its callees are part of that of a kernel."""
 
     def __init__(self) -> None:
         self.depth = 0
@@ -23,7 +23,7 @@ class _Clock:
         self.told = False
 
     def look(self) -> None:
-        """Say a word, once, when it takes long and somebody waits: at a terminal or in a notebook."""
+        """Print the notice once, if compilation takes long and a user waits: at a terminal or in a notebook."""
         if self.told or self.spent + time.perf_counter() - self.begin < _PATIENCE:
             return
         self.told = True

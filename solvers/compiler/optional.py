@@ -76,7 +76,7 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
     return types.BaseTuple.from_types(parts)
 
 
-_UNCOMPILED: list[OptionalKernel] = []  # asked for an address with NUMBA_DISABLE_JIT=1
+_UNCOMPILED: list[OptionalKernel] = []  # addresses requested with NUMBA_DISABLE_JIT=1
 
 
 class OptionalKernel:
@@ -88,7 +88,7 @@ class OptionalKernel:
         self._code: Any = None
 
     def __call__(self, *args: Any) -> Any:
-        """What compiled code does at a call, for kernels that run uncompiled."""
+        """The call of compiled code, for kernels that run uncompiled."""
         if not numba.config.DISABLE_JIT:
             raise TypeError(f"{self.name} is called from kernels only")
         number = int(args[0].optional[self.slot])
@@ -102,7 +102,7 @@ class OptionalKernel:
 
     @property
     def compiled(self) -> bool:
-        """Whether its address was asked for."""
+        """Whether its address was requested."""
         return self._code is not None
 
     def signature(self) -> Any:
@@ -175,7 +175,7 @@ def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
 
 
 def _caller(kernel: OptionalKernel) -> Any:
-    """What Numba compiles a call of the kernel to."""
+    """The code of a call of the kernel."""
 
     def call(typing: Any, *args: Any) -> Any:
         signature = kernel.signature()

@@ -27,7 +27,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class _Process:
-    """What is special about this process."""
+    """Special conditions of this process."""
 
     def __init__(self) -> None:
         self.serial = False  # it has threads on paper only

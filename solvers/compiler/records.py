@@ -115,7 +115,7 @@ def record(cls: type[R], fields: Sequence[Field]) -> Callable[[Table], R]:
     def view(table: Table) -> R:
         return cls(*(_array(field, table[3 * k : 3 * k + 3]) for k, field in enumerate(fields)))
 
-    @overload(view, strict=False)  # not strict: annotations are no part of the signature
+    @overload(view, strict=False)  # not strict: annotations are not part of the signature
     def compiled(table: Any) -> Any:
         return lambda table: at(table)
 

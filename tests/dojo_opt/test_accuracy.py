@@ -128,7 +128,7 @@ def test_a_robot_gets_a_recommendation() -> None:
     rows = {row.name: row for row in report.rows}
     assert "after 0.1 s" in rows["recommended time step"].note
     h, kappa = rows["recommended time step"].value / 1e3, rows["recommended kappa"].value
-    assert report.summary.startswith(f"Take dojo.Simulator(mechanism, time_step={h:g}, kappa={kappa:g}): ")
+    assert report.summary.startswith(f"Use dojo.Simulator(mechanism, time_step={h:g}, kappa={kappa:g}): ")
     assert any("smaller steps need a smaller kappa" in note for note in report.notes)
     assert 0.1 < rows["recommended time step"].value < 100.0
     assert [table.title for table in report.tables] == [
@@ -159,12 +159,12 @@ def trial(h: float, kappa: float, error: float, message: str = "") -> robot.Sett
 def test_advice_is_what_the_trials_say() -> None:
     fine, rough = trial(1e-3, 1e-6, 8e-4), trial(2e-2, 1e-4, 6e-3)
     assert "time_step=0.001, kappa=1e-06): 0.8 mm off" in advice.recommendation(fine, 1e-3, 1e-5)
-    assert "as exact as asked for, 1 mm. The best one is" in advice.recommendation(rough, 1e-3, 1e-5)
-    assert "asked for, 4 mm, twice what the converged motion" in advice.recommendation(rough, 4e-3, 2e-3)
+    assert "meets the target, 1 mm. The best one is" in advice.recommendation(rough, 1e-3, 1e-5)
+    assert "the target, 4 mm, twice the change of the converged motion" in advice.recommendation(rough, 4e-3, 2e-3)
     lost = trial(1e-3, 1e-6, np.inf, "step 3 was not solved")
     assert advice.recommendation(lost, 1e-3, 1e-5).endswith("to its end: step 3 was not solved")
     hopper = advice.hints(dojo.models.raiberthopper(), fine, [fine, rough], robot.choose)
-    assert "To plan with, where 6 mm" in hopper[0] and "time_step=0.02 and kappa=0.0001" in hopper[0]
+    assert "For planning, if 6 mm" in hopper[0] and "time_step=0.02 and kappa=0.0001" in hopper[0]
     alone = advice.hints(dojo.models.raiberthopper(), fine, [fine], robot.choose)
     assert len(alone) == 1 and "kappa/(gap h)" in alone[0]
     arm = advice.hints(dojo.models.npendulum(2), fine, [fine, rough], robot.choose)

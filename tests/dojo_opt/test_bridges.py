@@ -139,7 +139,7 @@ def test_jax_says_what_is_wrong(jax: Any) -> None:
         rollout(np.zeros(2), np.zeros(1))
     with pytest.raises(ValueError, match=r"argument u: expected shape \(1,\), got \(2,\)"):
         step(np.zeros(2), np.zeros(2))
-    with pytest.raises(ValueError, match="there are no parameters"):
+    with pytest.raises(ValueError, match="no parameters are declared"):
         step(np.zeros(2), np.zeros(1), np.ones(3))
     with pytest.raises(Exception, match=r"SimulationError: bridges.to_jax: row 1: .*half a turn"):
         jax.vmap(step)(np.array([[0.0, 0.0], [0.0, 100.0]]), np.zeros((2, 1))).block_until_ready()

@@ -53,7 +53,7 @@ def test_closed_loops_and_studies_keep_what_they_have() -> None:
     plant = dojo.tasks.plant(mpc, 2e-3)
     dojo.closed_loop(mpc, plant, 0.05)
     loop = heard(lambda: dojo.closed_loop(mpc, plant, 1000.0), 2.0)
-    assert loop.message == "Ctrl-C ended it before it was done."
+    assert loop.message == "Ctrl-C interrupted the computation."
     assert not loop.survived
     assert len(loop.x) == len(loop.u) + 1 == len(loop.time) == len(loop.contacts.gap) + 1 > 1
     expected = dojo.closed_loop(mpc, plant, loop.duration)

@@ -150,7 +150,7 @@ def test_substeps_take_the_gait_at_the_time_step_of_the_simulator():
     assert problem.horizon == 20 and problem.sim.time_step == 0.01
     assert ilqr(problem).success
     gait = gaits.stand(Simulator(models.quadruped(), time_step=0.02), duration=0.1)
-    with pytest.raises(ValueError, match="5 time steps are no multiple of 2"):
+    with pytest.raises(ValueError, match="5 time steps are not a multiple of 2"):
         problems.follow(gait, substeps=2)
     with pytest.raises(ValueError, match="'flying' is not one of"):
         problems.follow(gait, guess="flying")

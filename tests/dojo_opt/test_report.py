@@ -78,7 +78,7 @@ def test_names_of_a_user_are_text_in_every_page(tmp_path: Path) -> None:
     assert page.open == [] and not {"script", "img"} & {tag for tag, _ in page.seen}
     outside = re.sub(r"(`+)(?!`).*?(?<!`)\1(?!`)", "", (tmp_path / "report.md").read_text())
     assert "<" not in outside and "](javascript" not in outside
-    assert [line for line in outside.splitlines() if line.startswith("# ")] == ["# dojo-opt: what it measures here"]
+    assert [line for line in outside.splitlines() if line.startswith("# ")] == ["# dojo-opt: measurements"]
     assert json.loads((tmp_path / "report.json").read_text())["studies"]["accuracy"]["title"] == name
 
 

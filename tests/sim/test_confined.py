@@ -167,7 +167,7 @@ def test_parts_that_are_fixed_to_one_another_do_not_collide() -> None:
         both = [dojo.Collision("a", "b"), dojo.Collision("b", shape_b=dojo.Box(1, 1, 1))]
         sim = dojo.Simulator(Mechanism(bodies, joints, collisions=both), 0.01)
         assert sim.step(sim.neutral(), throw=True).contacts.gap.shape == (0,)
-        assert "fixed to one another, left out" in sim.describe()
+        assert "fixed to one another, omitted" in sim.describe()
         assert not any(n.startswith("friction") for n in sim.parameters().names)
 
 

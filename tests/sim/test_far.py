@@ -197,8 +197,8 @@ def test_names_and_distances_of_what_is_left_out():
     assert sim.left_out(x) == ("wall",)
     assert dojo.Simulator(pendulum()).left_out(np.zeros(2)) == ()
     text = sim.describe()
-    assert "far contacts" in text and "left out of the solver from a gap of" in text
-    assert "far contacts" not in dojo.Simulator(pendulum()).describe()
+    assert "inactive contacts" in text and "omitted from the solver beyond a gap of" in text
+    assert "inactive contacts" not in dojo.Simulator(pendulum()).describe()
 
 
 @pytest.mark.parametrize("kappa", [1e-9, 1e-6])

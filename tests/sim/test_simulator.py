@@ -71,12 +71,12 @@ def test_describe_says_what_is_there_and_what_is_not() -> None:
         "interior point",
     ):
         assert word in text
-    assert "joint limits      left out" in text
+    assert "joint limits      omitted" in text
     text = PENDULUM.describe()
     for word in (
-        "contacts          left out",
-        "Newton's method; interior point left out",
-        "springs           left out",
+        "contacts          omitted",
+        "Newton's method; interior point omitted",
+        "springs           omitted",
     ):
         assert word in text
 

@@ -1,4 +1,4 @@
-"""What the trials of a robot mean for its user, in sentences."""
+"""Recommendations to the user from the trials of a robot, in sentences."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ _ROUGH = 1e-2  # [m] good enough for a plan that feedback follows
 
 
 def recommendation(best: SettingTrial, target: float, own: float) -> str:
-    """The first sentences of the report; own: what the converged motion changes by when its step is doubled [m]."""
+    """The first sentences of the report; own: change of the converged motion when its step is doubled [m]."""
     asked = f"{1e3 * target:.2g} mm"
     if target == 2.0 * own:
-        asked += ", twice what the converged motion itself changes by when its step is doubled"
+        asked += ", twice the change of the converged motion when its step is doubled"
     call = f"dojo.Simulator(mechanism, time_step={best.time_step:g}, kappa={best.kappa:g})"
-    found = f"{1e3 * best.error:.2g} mm off after .1 s, {best.realtime:.3g} times as fast as the motion itself"
+    found = f"{1e3 * best.error:.2g} mm off after .1 s, {best.realtime:.3g} times as fast as real time"
     if best.error <= target:
-        return f"Take {call}: {found}. Asked for were {asked}."
+        return f"Use {call}: {found}. The target was {asked}."
     if best.message:
-        return f"No setting that was tried carries the motion to its end: {best.message}"
-    return f"No setting that was tried is as exact as asked for, {asked}. The best one is {call}: {found}."
+        return f"No setting tried carries the motion to its end: {best.message}"
+    return f"No setting tried meets the target, {asked}. The best one is {call}: {found}."
 
 
 def hints(
@@ -31,29 +31,29 @@ def hints(
     trials: Sequence[SettingTrial],
     choose: Choose,
 ) -> list[str]:
-    """What else there is to know: contacts that are missing, planning, derivatives, kappa."""
+    """Further remarks: missing contacts, planning, derivatives, kappa."""
     contacts = bool(mechanism.contacts or mechanism.collisions)
     said = []
     if not contacts:
         said.append(f"{mechanism.name} has no contacts: this is its motion in the air and at its stops.")
     if not contacts and mechanism.joints[0].kind == "floating":
         said.append(
-            "How it lands or walks is another question. Meshes make no contacts: name the links that touch the ground, "
+            "Landing and walking are not measured. Meshes make no contacts: name the links that touch the ground "
             "with --contacts LINK, or LINK=RADIUS for a ball about the origin of its frame; in Python, "
             "load_urdf(contacts=[...])."
         )
     rough = choose(trials, _ROUGH)
     if contacts and best.error < rough.error <= _ROUGH:
         said.append(
-            f"To plan with, where {1e3 * rough.error:.2g} mm after .1 s may do, take time_step={rough.time_step:g} and "
-            f"kappa={rough.kappa:g}, {rough.realtime:.3g} times as fast as the motion; replay the plan with the "
+            f"For planning, if {1e3 * rough.error:.2g} mm after .1 s is enough, use time_step={rough.time_step:g} and "
+            f"kappa={rough.kappa:g}, {rough.realtime:.3g} times as fast as real time; replay the plan with the "
             "recommended ones."
         )
     if contacts:
         said.append(
-            "A contact pushes from afar, with a force of kappa/(gap h): smaller steps need a smaller kappa, or their "
-            "errors grow again. Up to which kappa derivatives are those of hard contact: dojo-opt report gradients "
-            "ROBOT.urdf. Up to which time step its motion is sound at all: dojo-opt report stability ROBOT.urdf."
+            "A contact acts at a distance, with a force of kappa/(gap h): smaller steps need a smaller kappa, or their "
+            "errors grow again. For the largest kappa with derivatives of hard contact, run dojo-opt report gradients "
+            "ROBOT.urdf. For the largest stable time step, run dojo-opt report stability ROBOT.urdf."
         )
         if len(mechanism.contacts) > 50:
             said.append(

@@ -1,4 +1,4 @@
-"""Curves: errors of every engine over its time steps, with the processor time they took, and what they say."""
+"""Curves: errors of every engine over its time steps, with their processor times, and their comparison."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 STEPS = (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.002, 0.001, 5e-4, 2.5e-4, 2e-4, 1e-4)  # [s] whole parts of .1
 BETWEEN = (0.2, 0.1 / 3)  # [s] for ours of higher order besides: points at the times of a peer's largest steps
 FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither better nor worse; see `floors`
-LOST = 1.0  # of the energy, relative to all there is: such a run is lost, whether the engine knows it or not
+LOST = 1.0  # of the energy, relative to all there is: such a run is lost, reported or not
 
 
 class Point(NamedTuple):
@@ -66,7 +66,7 @@ def measure(scene: SmoothScene, engines: Sequence[PhysicsEngine], steps: Sequenc
 
 
 def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> Point:
-    """One run against the reference; one that the engine refuses has infinite errors, and says why."""
+    """One run against the reference; one that the engine refuses has infinite errors, and the reason."""
     args: dict[str, Any] = {"time_step": h, "q": scene.q, "v": scene.v, "duration": scene.duration}
     try:
         run = engine.simulate(scene.mechanism, **args, samples=SAMPLES)
@@ -79,7 +79,7 @@ def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> Po
 
 
 def floors(scene: SmoothScene) -> dict[str, float]:
-    """Errors that count as equal: FLOOR, or what becomes of a change of the start by one rounding, if that is more."""
+    """Errors that count as equal: FLOOR, or the effect of one rounding of the start, if that is larger."""
     moved = replace(scene, q=np.nextafter(scene.q, np.inf), v=np.nextafter(scene.v, np.inf))
     return {what: max(FLOOR, error) for what, error in scene.errors(moved.exact(), scene.exact()).items()}
 
@@ -99,7 +99,7 @@ def ratios(curves: Curves, peer: str, what: str, floor: float = FLOOR) -> dict[f
     """Our error over the peer's at equal processor time, by time step of the peer [s].
 
     Ours is the best of our orders, whose time steps may differ from the peer's; infinite where all of them take longer.
-    A step with which the peer is lost is left out. Errors below `floor` count as that.
+    Steps with which the peer is lost are omitted. Errors below `floor` count as that.
     """
     mine = [points for name, points in curves.items() if name.startswith("dojo-opt")]
     return {

@@ -26,7 +26,7 @@ from solvers.compiler import threads
 
 Floats = NDArray[np.float64]
 
-_TARGET = 1e-3  # [m] error that is asked for after a piece
+_TARGET = 1e-3  # [m] target of the error after a piece
 _CONVERGED = 1e-2  # [m] beyond which there is no motion to compare with
 _STEPS = (0.05, 0.025, 0.02, 0.01, 0.005, 0.0025, 0.001, 5e-4)
 _KAPPAS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
@@ -123,7 +123,7 @@ def _trial(mechanism: Mechanism, exact: Converged, settings: tuple[float, float,
 
 
 class Advice(NamedTuple):
-    """What a mechanism needs, and the trials behind it."""
+    """The settings for a mechanism, and the trials behind them."""
 
     best: SettingTrial
     trials: list[SettingTrial]
@@ -161,7 +161,7 @@ def _hard(report: Report, mechanism: Mechanism, q: Floats, v: Floats, quick: boo
             1e3 * own,
             "mm",
             1e3 * _CONVERGED,
-            note=f"h = {1e3 * exact.time_step:g} ms, kappa {exact.kappa:g}; asked for is no less than twice this",
+            note=f"h = {1e3 * exact.time_step:g} ms, kappa {exact.kappa:g}; the target is at least twice this",
         ),
     ]
     rows: list[list[Cell]] = [
@@ -237,7 +237,7 @@ def _figure(name: str, best: SettingTrial, trials: Sequence[SettingTrial], own: 
             )
     label = f"recommended: {1e3 * best.time_step:g} ms, kappa {best.kappa:g}"
     axis.plot(1e3 * best.seconds, 1e3 * best.error, "o", ms=13, mfc="none", mec="k", mew=1.5, label=label)
-    axis.axhline(1e3 * target, color="k", lw=0.8, ls=":", label="asked for")
+    axis.axhline(1e3 * target, color="k", lw=0.8, ls=":", label="target")
     if np.isfinite(own) and own > 0.0:
         axis.axhline(1e3 * own, color="k", lw=0.8, ls="--", label="the converged motion itself")
     axis.set(xlabel=f"processor time of {DURATION:g} s [ms]", ylabel="position error [mm]")

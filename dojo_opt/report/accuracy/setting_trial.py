@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PIECE, PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos say nothing of a step
+PIECE, PIECES = 0.1, 5  # [s] and how many: the motion is cut, for errors that grow by chaos do not measure a step
 DURATION = PIECE * PIECES
 
 
 @dataclass(frozen=True)
 class SettingTrial:
-    """One setting and what came of it."""
+    """One setting and its result."""
 
     time_step: float
     kappa: float

@@ -22,7 +22,7 @@ SAMPLES = 10  # equal parts of a duration: whole steps for every time step of th
 
 @dataclass(frozen=True)
 class SmoothScene:
-    """One motion, and how its errors are told."""
+    """One motion, and the measure of its errors."""
 
     name: str
     mechanism: Mechanism
@@ -87,7 +87,7 @@ def without_contact(mechanism: Mechanism) -> Mechanism:
 
 
 def not_in_reference(mechanism: Mechanism) -> str:
-    """What `TreeReference` does not represent of a mechanism without contacts; empty if it is all there."""
+    """The first element of a mechanism, contacts aside, that `TreeReference` does not support; empty if none."""
     model = model_of(replace(mechanism, contacts=(), collisions=()))
     swings = [mechanism.joint_names[i] for i in np.flatnonzero(model.joint_nrot == 2)]
     for what, names in (

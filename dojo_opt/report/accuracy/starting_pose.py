@@ -1,4 +1,4 @@
-"""Where a robot starts from when nobody says: random, but the same for everybody."""
+"""The default starting pose of a robot: random, but the same in every run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sim.simulator.simulator import Simulator
 Floats = NDArray[np.float64]
 
 _ABOVE = 0.02  # [m] above the ground
-_SHIFT = 1e-3  # [m] by which a base is moved to see what that does
+_SHIFT = 1e-3  # [m] trial displacement of a base
 _STEEP = 0.1  # least rise of the lowest contact over the way of the base
 
 

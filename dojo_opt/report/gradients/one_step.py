@@ -1,7 +1,7 @@
-"""(A, B) of one step: how far each way to get it is from the derivative of the same step, and what it costs.
+"""(A, B) of one step: the error of each method against the derivative of the same step, and its cost.
 
-Every engine is judged by its own step, at the state that its own motion has led to: what is measured here is how
-exactly a derivative is computed, not how exact the contact is.
+Every engine is judged by its own step, at the state of its own motion: the study measures the accuracy
+of derivatives, not that of contact.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ IMPLICIT, TIGHTLY = "implicit", "implicit, solved to 1e-13"
 FORWARD, CENTRED = "differences, one-sided", "differences, centred"
 
 
-Cases = dict[str, tuple[Callable[[], Any], int]]  # what is clocked, and how many Jacobians it computes
+Cases = dict[str, tuple[Callable[[], Any], int]]  # timed call, and the number of Jacobians that it computes
 
 
 class StepScene(NamedTuple):
@@ -56,7 +56,7 @@ class JacobianPoint(NamedTuple):
     microseconds: float  # a step and its Jacobian, or all steps that are differenced
 
 
-Peer = tuple[str, Callable[[StepScene], tuple[list[JacobianPoint], Cases]]]  # an engine: its name, and what it measures
+Peer = tuple[str, Callable[[StepScene], tuple[list[JacobianPoint], Cases]]]  # an engine: its name, and its measurement
 
 
 def scene_of(mechanism: Mechanism) -> StepScene:

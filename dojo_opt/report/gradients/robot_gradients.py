@@ -75,7 +75,7 @@ def _exactness(name: str, points: list[one_step.JacobianPoint]) -> list[Row]:
 
 
 def _advice(scene: one_step.StepScene) -> list[str]:
-    """kappa that a mechanism needs, from what its contacts carry."""
+    """kappa for a mechanism, from the loads of its contacts."""
     loads = one_step.loads(scene)
     if not len(loads):
         return ["no contact carries a load here, which would tell the kappa that its derivatives need"]

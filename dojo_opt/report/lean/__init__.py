@@ -1,4 +1,4 @@
-"""The terms that a step of a robot omits, and what each of its features costs."""
+"""The terms that a step of a robot omits, and the cost of each of its features."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of what each feature of a robot costs."""
+"""The figure of the cost of each feature of a robot."""
 
 from __future__ import annotations
 

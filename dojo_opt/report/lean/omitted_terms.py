@@ -1,4 +1,4 @@
-"""The terms that a step of a robot omits, and what each of its features costs."""
+"""The terms that a step of a robot omits, and the cost of each of its features."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class OmittedTerms:
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
-        report = Report(f"What each feature of {self.mechanism.name} costs")
+        report = Report(f"Cost of each feature of {self.mechanism.name}")
         with threads(1):
             _robot(report, self.mechanism, self.time_step, 15 if self.quick else 100, progress)
         return report
@@ -36,7 +36,7 @@ def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, 
     """A robot as it is, and without each of its features."""
     report.summary = (
         f"{mechanism.name}, moving freely from its neutral state with {1e3 * time_step:g} ms steps; then without each "
-        "of its features. A feature costs what the robot takes less without it: processor time on one core, medians "
+        "of its features. The cost of a feature is the time saved without it: processor time on one core, medians "
         "over interleaved rounds."
     )
     scenes = [robot_scene(name, variant, time_step) for name, variant in without(mechanism)]
@@ -58,7 +58,7 @@ def _robot(report: Report, mechanism: Mechanism, time_step: float, rounds: int, 
 
 
 def _far_notes(scene: CostScene, cost: Cost) -> list[str]:
-    """What is far where the robot stands."""
+    """The inactive contacts of the neutral state."""
     if not np.isfinite(cost.iterations):
         return ["the first step from the neutral state is not solved: " + cost.message]
     far = scene.simulator.left_out(scene.state)

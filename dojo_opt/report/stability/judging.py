@@ -24,7 +24,7 @@ def judge(
 
     Args:
         report: Gets a row per trial, a table per group, the count of those that passed, and the figure.
-        trials: What is run.
+        trials: Trials to run.
         peers: Engines beside ours.
         progress: Shows the trial that runs.
 

@@ -1,4 +1,4 @@
-"""What trials measure on a run; every value is better when smaller."""
+"""Measures of trials on a run; smaller is better."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def growth_and_penetration(energy: float, depth: float) -> Measure:
 
 
 def resting(mechanism: Mechanism, run: Run) -> float:
-    """The larger of the penetration at any time, and of how far a body moves in the last tenth of the time [m]."""
+    """The larger of the penetration at any time, and of the motion of a body in the last tenth of the time [m]."""
     last = run.position[-max(2, len(run.time) // 10) :]
     return max(gauge.penetration(mechanism, run), float(np.abs(last[-1] - last[0]).max()))
 
 
 def standing_at(body: int, height: float) -> Measure:
-    """Penetration, and how far a body is off its height at the end [m]."""
+    """Penetration, and the error of the height of a body at the end [m]."""
 
     def measure(mechanism: Mechanism, run: Run) -> float:
         return max(gauge.penetration(mechanism, run), abs(float(run.position[-1, body, 2]) - height))
@@ -79,7 +79,7 @@ def travelled(body: int, axis: int, distance: float) -> Measure:
 
 
 def beyond(body: int, axis: int, low: float, high: float) -> Measure:
-    """How far a body has been beyond its limits [m]."""
+    """The largest violation of the limits of a body [m]."""
 
     def measure(_: Mechanism, run: Run) -> float:
         path = run.position[:, body, axis]

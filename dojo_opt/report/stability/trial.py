@@ -17,7 +17,7 @@ Measure = Callable[[Mechanism, Run], float]
 
 
 class TrialVerdict(NamedTuple):
-    """What an engine made of a trial."""
+    """The result of an engine in a trial."""
 
     value: float  # not-a-number where it did not get through
     passed: bool
@@ -29,7 +29,7 @@ NOT_GIVEN = "not given"  # a scene that this study does not translate for an eng
 
 @dataclass(frozen=True)
 class StabilityTrial:
-    """A motion, what is measured on it, and the largest value that passes.
+    """A motion, its measure, and the largest value that passes.
 
     rule      in words, with unit and bar
     refusal   words in the reason with which the engine has to refuse the scene, where it cannot be represented
@@ -53,7 +53,7 @@ class StabilityTrial:
     refusal: str = ""
     why: str = ""
     peer_duration: float = 0.0  # [s] of other engines, where the whole would take minutes; 0: the whole
-    slow: bool = False  # left out of quick runs
+    slow: bool = False  # omitted from quick runs
 
     def run(self, engine: PhysicsEngine, duration: float = 0.0) -> Run:
         """The motion by one engine, the whole or part of it."""
@@ -72,7 +72,7 @@ class StabilityTrial:
     def judge(self, run: Run, *, ours: bool) -> TrialVerdict:
         """The rule applied.
 
-        Only ours is asked to refuse what cannot be represented; an engine that goes on is measured.
+        Only dojo-opt must refuse states that cannot be represented; an engine that goes on is measured.
         """
         if self.refusal and ours:
             refused = self.refusal in run.message

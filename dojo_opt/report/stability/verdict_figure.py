@@ -12,7 +12,7 @@ from dojo_opt.report.stability.trial import NOT_GIVEN, StabilityTrial, TrialVerd
 
 _LEGEND = (
     "green: passed; red: not (x: above the bar of its rule); yellow: refused with a reason; grey: not represented.\n"
-    "Numbers are what the rule of the row measures; the rules are in the tables."
+    "Numbers are the measure of the rule of each row; the rules are in the tables."
 )
 
 

@@ -1,7 +1,7 @@
 """Separating axes of two boxes: three faces of each, nine pairs of edges.   Gottschalk, Lin, Manocha 1996.
 
 Axes 0-2 are the normals of b, 3-5 those of a, 6 + 3 i + j is e_i of b x e_j of a. An axis has two sides, and a is on
-one of them; `sides` has two bits per axis and says which of them are open (edge_axes.py).
+one of them; `sides` has two bits per axis that mark those that are open (edge_axes.py).
 """
 
 from __future__ import annotations

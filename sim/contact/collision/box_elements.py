@@ -1,6 +1,6 @@
-"""Two elements of two boxes, named by a number: what a contact point of boxes is made of, smooth in their pose.
+"""Two elements of two boxes, named by a number: the features of a contact point of boxes, smooth in their pose.
 
-A code holds the kind, the two faces and what else it takes (`code_of`); 0 is no elements.
+A code holds the kind, the two faces and further indices (`code_of`); 0 means no elements.
 
     VERTEX_FACE     vertex k of the face `bottom` e_j of a above the face `top` e_i of b
     CROSSING        edge k of the face of a across a side of the face of b

@@ -1,7 +1,7 @@
 """Capsule against box: a segment with a radius around it.
 
     feature 0, 1    begin and end of the part of the segment above the nearest face of the box: an end of the segment,
-                    or where it crosses an edge of the face; an end that is not above it against what is nearest to it
+                    or where it crosses an edge of the face; an end that is not above it against the nearest feature
     feature 2       the segment across an edge of the box, or against the corner nearest to it
     feature 3, 4    the two corners of the edge of the box that the segment is most parallel to
 

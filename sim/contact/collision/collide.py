@@ -29,7 +29,7 @@ def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: 
     hull     tables of polytopes (hull.py); one row will do where there are none
     R, r     pose of a in the frame of b: rotation (9,), row-major, and centre (3,) [m]
     out      (43,), overwritten, in the frame of b:
-             0       phi, signed distance [m], negative inside; 1e9 where there is no such point now
+             0       phi, signed distance [m], negative inside; 1e9 if the point does not exist now
              1:4     n, unit normal from b to a
              4:7     p, midpoint of the two nearest points [m]
              7:25    dn/d(v, w), 25:43 dp/d(v, w): (3, 6), row-major; (v, w) is the twist of a about the origin of b:
@@ -41,7 +41,7 @@ def collide(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: 
 
 @kernel
 def open_sides(kind: int, sizes: Vector, R: Vector, r: Vector) -> int:
-    """Which axes separate the shapes at this pose, and on which side: what `arrange` may choose from a step later.
+    """Axes that separate the shapes at this pose, and their sides: the candidates of `arrange` one step later.
 
     Of the axes that separate shapes at the end of a step, one that did so at its beginning is the one that was there
     all the time; the others mean that a body has gone around a corner of the other one, or through it, and a contact
@@ -78,7 +78,7 @@ def arrange(kind: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, sides:
 def choose(
     kind: int, feature: int, arrangement: Arrangement, sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector
 ) -> int:
-    """`collide`, with what `arrange` returns; and which elements of the shapes it found: a number, 0 for none."""
+    """`collide`, with the result of `arrange`; also the elements that it found: a number, 0 for none."""
     code = _choose(kind % SWAPPED, feature, arrangement, sizes, hull, R, r, out)
     if kind >= SWAPPED and code != 0:
         exchange(R, r, out)
@@ -114,7 +114,7 @@ def collide_chosen(
 
 @kernel
 def instead(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
-    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is left out."""
+    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is omitted."""
     return hulls.face_towards(feature, sizes, hull, R, r) if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE else 0
 
 

@@ -1,4 +1,4 @@
-"""A point against a cylinder along the z axis of its frame: an end, the side, or a rim; how far a cylinder reaches."""
+"""A point against a cylinder along the z axis of its frame: an end, the side, or a rim; the extent of a cylinder."""
 
 from __future__ import annotations
 

@@ -4,10 +4,10 @@
     feature 8-15    points of the rims of a at such an end of b
     the rest        CROSSINGS: the two axes, the axis of one and a rim of the other, two rims; or a point of a rim of a
 
-The rules are those of polytope_cylinder.py. What is seen from a, whose rims a line or a plane of b touches, is written
+The rules are those of polytope_cylinder.py. Features of a, whose rims touch a line or a plane of b, are computed
 in the frame of a and exchanged; `turned` (12,) is the pose of b in that frame.
 
-Codes: 16 + 8 i + what it is, i: the end; or which rims, the side of the normal of two axes, and the sector on a rim.
+Codes: 16 + 8 i + kind, i: the end; or which rims, the side of the normal of two axes, and the sector on a rim.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ Survey = tuple[float, int, float, float]  # separation, code of a crossing that 
 def survey(
     sizes: Vector, R: Vector, r: Vector, turned: Vector, out: Vector, codes: Integers, first: int, room: int
 ) -> Survey:
-    """How far the two are apart, negative inside, and what gives it; the codes of all crossings from `first`."""
+    """Distance of the two, negative inside, and its source; the codes of all crossings from `first`."""
     best, which, found, up, down = -1e300, 0, 0, 1.0, 1.0
     u = column(R, 2)
     for k in range(2):

@@ -58,7 +58,7 @@ def collide_with_cylinder(
 
 @kernel
 def instead_on_cylinder(kind: int, feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
-    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is left out."""
+    """Elements for a point whose choice overlapped at this pose, where a step begins; 0 for none: it is omitted."""
     if kind % SWAPPED == Pair.POLYTOPE_CYLINDER:
         return polytope_cylinder.corner_instead(feature, sizes, hull, R, r)
     return 0

@@ -1,4 +1,4 @@
-"""Rules of the separating axes: which of a face and an edge decides, and what then counts as contact."""
+"""Rules of the separating axes: the choice between a face and an edge, and the resulting contact points."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from sim.contact.collision.witness import TIE
 from solvers.compiler import inner_kernel
 from solvers.rotation import Vec3
 
-# what `separation` of a pair returns: face, edge or -1, separation, side of the axis of the face (1, -1), of the edge
+# result of `separation` of a pair: face, edge or -1, separation, side of the axis of the face (1, -1), of the edge
 Arrangement = tuple[int, int, float, float, float]
 
 OPEN = (1 << 30) - 1  # both sides of every axis
@@ -30,7 +30,7 @@ def side(x: float, sides: int, k: int) -> float:
 
 @inner_kernel
 def opened(k: int, x: float) -> int:
-    """The bit of axis k that says that its side x (1, -1) is open."""
+    """The bit of axis k for an open side x (1, -1)."""
     return (1 if x >= 0.0 else 2) << (2 * k)
 
 
@@ -49,7 +49,7 @@ def edge_must_exceed(s: float, h: Vec3) -> float:
 
 @inner_kernel
 def deepest(s: float, h: Vec3) -> float:
-    """Distance below which a point is no contact, when the separation is s: far inside, but beside a way out."""
+    """Distance below which a point is not a contact, at separation s: deep inside, but beside a way out."""
     return (_DEEPER * s if s < 0.0 else s / _DEEPER) - _SLACK * min(h[0], h[1], h[2])
 
 

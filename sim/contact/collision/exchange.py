@@ -20,7 +20,7 @@ def _turn(R: Vector, r: Vector, out: Vector, first: int, sign: float, arm: Vec3,
     """out[first : first + 18] = sign R^T (derivative of a vector in b's frame) + its motion with b
 
     The twist (v, w) of b, seen from a, is for b a twist of a: w' = -R w, v' = -R v + R w x r.
-    arm: what b carries along, (whole v +) w x arm.
+    arm: displacement with b, (whole v +) w x arm.
     """
     c0, c1, c2 = _columns(out, first, 0), _columns(out, first, 1), _columns(out, first, 2)
     c3, c4, c5 = _columns(out, first, 3), _columns(out, first, 4), _columns(out, first, 5)

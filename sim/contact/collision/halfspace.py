@@ -11,7 +11,7 @@ from solvers.rotation import Vec3
 from solvers.types import Vector
 
 _LEVEL = 1e-4  # sine of the tilt below which the lowest point of a rim leaves the rim for its centre
-_STEEP = 0.5  # cosine of the tilt beyond which the fixed points of the rims are left out
+_STEEP = 0.5  # cosine of the tilt beyond which the fixed points of the rims are omitted
 _COS120, _SIN120 = -0.5, 0.75**0.5
 
 

@@ -47,7 +47,7 @@ def edge_faces(hull: Matrix, o: int, e: int) -> tuple[int, int]:
 
 @inner_kernel
 def highest_face(hull: Matrix, o: int, x: Vec3) -> tuple[int, float]:
-    """The row of the face that a point is highest above, and the height; -1 where there are no faces."""
+    """The row of the face that a point is highest above, and the height; -1 without faces."""
     first = o + 1 + int(hull[o, 0] + hull[o, 1])
     best, height = _NONE, -1e300
     for f in range(first, first + int(hull[o, 2])):

@@ -175,7 +175,7 @@ def two_edges(m: int, deepest: float, sizes: Vector, hull: Matrix, R: Vector, r:
 @inner_kernel
 def face_towards(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
     """The elements of feature `feature` where it is a corner: the face of the other shape that it is highest above, if
-    it is not below that one, else the nearest element. 0 for what is no corner.
+    it is not below that one, else the nearest element. 0 if that is not a corner.
     """
     radius = sizes[1] + sizes[5]
     oa, ob = int(sizes[0]), int(sizes[4])

@@ -1,6 +1,6 @@
 """Elements of one contact point in the place of another: those of a choice before that still press.
 
-The number of a point that has taken over others says which: KEPT + feature 2^24 + code.
+The number of a point that has taken over others encodes them: KEPT + feature 2^24 + code.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
     the rest            CROSSINGS edges of a across the side or a rim of b; or the point of a rim that is nearest to a
 
 Every normal is a lower bound of the distance, by the reach of the two shapes along it; of the normals of all pairs of
-elements that may be nearest the best is the distance, apart as well as inside. What is deeper is no contact.
+elements that may be nearest the best is the distance, apart as well as inside. Deeper points are not contacts.
 
 Codes: 16 + 8 i + the element of b (cylinder.py), i: the face, or the edge, with its side and its sector on a rim.
 """
@@ -37,7 +37,7 @@ from solvers.types import Integers, Matrix, Vector
 MISSED = 1e-2  # parts of the radius by which no contact is as near as the shapes: a point is added
 
 END, FACE, CORNER, CROSS, ALIGNED = 0, 1, 2, 3, 4
-Survey = tuple[float, int, int, int, int]  # separation, what gives it, which, face of a (row), end of b (TOP, BOTTOM)
+Survey = tuple[float, int, int, int, int]  # separation, its source, index, face of a (row), end of b (TOP, BOTTOM)
 
 
 @inner_kernel
@@ -51,7 +51,7 @@ def face_plane(hull: Matrix, face: int, R: Vector, r: Vector) -> tuple[Vec3, flo
 def survey(
     sizes: Vector, hull: Matrix, R: Vector, r: Vector, out: Vector, codes: Integers, first: int, room: int
 ) -> Survey:
-    """How far the two are apart, negative inside, and along the normal of which elements; uses up `out`."""
+    """Distance of the two, negative inside, and the elements that give its normal; overwrites `out`."""
     o, rho, half = int(sizes[0]), sizes[4], sizes[5]
     na = int(hull[o, 0])
     best, kind, which, face, end = -1e300, END, 0, 0, TOP
@@ -153,7 +153,7 @@ def put_elements(feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector
 
 @inner_kernel
 def corner_instead(feature: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> int:
-    """Code of the element of b nearest to corner `feature` of a; 0 for what is no corner."""
+    """Code of the element of b nearest to corner `feature` of a; 0 if that is not a corner."""
     o = int(sizes[0])
     if feature >= int(hull[o, 0]):
         return 0

@@ -1,5 +1,5 @@
-"""Collisions of cylinders with polytopes and cylinders (cylinders.py): what active_features.py and pair_contact.py
-do for the others. Scenes without such collisions do not compile these kernels.
+"""Collisions of cylinders with polytopes and cylinders (cylinders.py), as active_features.py and pair_contact.py
+for the others. Scenes without such collisions do not compile these kernels.
 """
 
 from __future__ import annotations

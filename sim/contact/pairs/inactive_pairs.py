@@ -1,4 +1,4 @@
-"""The active set of collisions: the law of an inactive one is evaluated, not solved for; it is no part of the matrix.
+"""The active set of collisions: the law of an inactive one is evaluated, not solved for; the matrix omits it.
 
 As for contacts with the ground (contact/inactive.py): on the central path a contact is an explicit force law, gamma =
 kappa/gap and friction with it. At a large gap it changes little while a step is solved, so it is a given impulse. It is

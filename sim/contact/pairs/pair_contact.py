@@ -40,7 +40,7 @@ def tangents(nx: float, ny: float, nz: float) -> tuple[Vec3, Vec3]:
     """t1, t2: the frame of the pole a, turned the shortest way to n: t1 = b - (b.n)/(1 + a.n) (a + n), t2 = n x t1.
 
     Continuous but at n = -a, so that a pyramid of friction does not jump from one iterate to the next. At n = z it is
-    x and y, as of contacts with the ground. A pole that nobody would build along keeps -a out of the way.
+    x and y, as of contacts with the ground. An unusual direction of the pole keeps -a away from it.
     """
     a, b = POLE, _FIRST
     p = (b[0] * nx + b[1] * ny + b[2] * nz) / max(1.0 + a[0] * nx + a[1] * ny + a[2] * nz, 1e-12)

@@ -6,11 +6,11 @@ that they never had. So no solution is accepted whose impulses do both, over all
 
     sum f.(u + u')/2 > allowed,    sum f.u' > allowed,    u, u' the relative velocities at P before and after
 
-Of the two the first is the kinetic energy that the impulses add. The second leaves out what other forces do: they may
+Of the two the first is the kinetic energy that the impulses add. The second omits the work of other forces: they may
 press bodies together that were moving apart. Impacts with restitution are looked at by contact/restitution.py.
 Taut strings pass through nothing.
 
-    allowed = share (T + T') + sum of (2 kappa + f_n (overlap where the step began + what may be left at its end))/h
+    allowed = share (T + T') + sum of (2 kappa + f_n (overlap where the step began + tolerance at its end))/h
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross
 from solvers.types import Vector
 
-_SHARE = 0.01  # of the kinetic energies before and after: what turning normals give, of first order in the time step
+_SHARE = 0.01  # of the kinetic energies before and after: the work of turning normals, of first order in the time step
 _LEFT = 2e-4  # part of the smallest size: more than steps end with, but for late attempts (active_features.py)
 _THROWN = 2e-2  # the same of shapes that are thrown out, not pushed: they overlapped more where the step began
 
@@ -61,7 +61,7 @@ def power_after(model: Model, data: Data, h: float, j: int) -> float:
 
 @kernel
 def _overlapped(model: Model, data: Data, j: int) -> float:
-    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond what is rounding [m]."""
+    """Overlap of the shapes of pair j, the first of a collision, where the step began, beyond rounding [m]."""
     return max(0.0, -(data.pair_before[j, RelativePose.GAP] + overlap_before(model, j)))
 
 

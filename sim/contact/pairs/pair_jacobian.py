@@ -1,6 +1,6 @@
 """Derivatives of gap, slip, frame and contact point of a pair by the twists of its bodies about O at configuration 3.
 
-Everything moves with b, plus what the motion of a relative to b does:
+Everything moves with b, plus the effect of the motion of a relative to b:
 
     dn = phi_b x n + N zeta,   dp = v_b + phi_b x (p - O) + M zeta,   zeta = zeta_a - zeta_b
 """

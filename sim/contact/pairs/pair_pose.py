@@ -1,4 +1,4 @@
-"""Where the shapes of a collision are, and how they lie to one another."""
+"""Poses of the shapes of a collision, and their relative pose."""
 
 from __future__ import annotations
 

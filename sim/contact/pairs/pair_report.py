@@ -1,4 +1,4 @@
-"""What a step has to say about bodies that touch each other."""
+"""The report of a step about bodies in contact with each other."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def condense_pairs(model: Model, data: Data, h: float, kappa: float, share: floa
 
 @optional(Slot.APPLY_PAIRS, default=0.0)
 def apply_pairs(model: Model, data: Data) -> float:
-    """wrench -= impulses of the pairs; returns the largest |gap - slack| of the near ones."""
+    """wrench -= impulses of the pairs; returns the largest |gap - slack| of the active ones."""
     ground = model.contact_height.shape[0]
     r = 0.0
     for m in range(data.active_ground_count[0], data.active_count[0]):

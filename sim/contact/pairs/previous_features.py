@@ -1,4 +1,4 @@
-"""What collisions remember of the beginning of a step, and by how much elements may overlap there; and elements that
+"""State of collisions at the beginning of a step, and the overlap of elements allowed there; and elements that
 pressed, kept beside new ones: where those of one place make the shapes overlap in another, and those of the other in
 the first. Collisions of polytopes and of cylinders have room for them (sim/contact/collision/kept.py).
 """

@@ -15,7 +15,7 @@ from solvers.types import Matrix
 
 @optional(Slot.ADD_STRING_STIFFNESS)
 def add_string_stiffness(model: Model, data: Data, j: int) -> None:
-    """coupling_K += taut string j, condensed: where it acts, and along what, is given at configuration 2."""
+    """coupling_K += taut string j, condensed: its point and direction are given at configuration 2."""
     c = model.contact_height.shape[0] + j
     zero = (0.0, 0.0, 0.0)
     P = string_arm(model, data, j)

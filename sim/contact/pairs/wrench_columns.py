@@ -1,4 +1,4 @@
-"""Columns of the derivatives of wrenches by unit twists about O: displacements of points, and what they make of F."""
+"""Columns of the derivatives of wrenches by unit twists about O: displacements of points, and their effect on F."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of bodies and joints that leave the geometry alone: dR/d(parameter) of the residual of a step.
+"""Parameters of bodies and joints that do not change the geometry: dR/d(parameter) of the residual of a step.
 
 Every kernel does columns[:, col] -= w dR/d(parameter). A change of the wrench on body i by (f, m), about O, reaches the
 joints between the body and the root: dR_d = S2_d.(f, m).

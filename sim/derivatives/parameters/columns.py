@@ -91,7 +91,7 @@ def add_contact_term(model: Model, data: Data, h: float, effect: int, i: int, k:
 
 @kernel
 def add_coupled_term(model: Model, data: Data, h: float, effect: int, i: int, k: int, w: float, col: int) -> None:
-    """`add_term` of effects on what couples branches: shapes of collisions, loops, gears."""
+    """`add_term` of effects on couplings of branches: shapes of collisions, loops, gears."""
     if effect == Effect.SHAPE_SHIFT:
         add_shapes_shift(model, data, h, i, k, w, col)
     elif effect == Effect.SHAPE_SIZE:

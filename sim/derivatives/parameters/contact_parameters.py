@@ -20,7 +20,7 @@ from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Spher
 
 Floats = NDArray[np.float64]
 
-# of the shapes: what they are called, how a step feels them, and how much of it a unit is
+# of the shapes: their names, their effects on a step, and the scale of a unit
 _SIZES: dict[type, dict[str, tuple[Size, float]]] = {
     Sphere: {"radius": (Size.BALL, 1.0)},
     Capsule: {"radius": (Size.BALL, 1.0), "length": (Size.ROD, 0.5)},

@@ -9,7 +9,7 @@ from solvers.types import Matrix, Vector
 
 
 class Effect(IntEnum):
-    """What an elementary change changes; index and component of its term in brackets."""
+    """The target of an elementary change; index and component of its term in brackets."""
 
     MASS = 0  # of a body, its inertia fixed [body]
     INERTIA = 1  # xx, yy, zz, xy, xz, yz of a body [body, which]

@@ -1,4 +1,4 @@
-"""Parameters of the geometry of joints: where a joint sits, and how it is turned.
+"""Parameters of the geometry of joints: the place and orientation of a joint.
 
 Such a change moves the subtree of the joint like one more degree of freedom: by twists T1, T2, T3 at the three
 configurations, about O. So its column is that of `residual_derivatives` with T in the place of S:
@@ -7,7 +7,7 @@ configurations, about O. So its column is that of `residual_derivatives` with T 
     the joint          S2_d.F + (B x S2_d).r         B: how its own columns move
     below              S2_d.(A3 T3 + A2 T2 + A1 T1) + (T2 x S2_d).r       of the body of d
 
-The coordinates of the joint stay what they are.
+The coordinates of the joint stay constant.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _add_rotation(out: Vector, p: Vec3, a: Vec3) -> None:
 
 @kernel
 def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: Matrix) -> None:
-    """The directions of motion of joint i turn by a, its body on them by -b, so that only what it does is changed.
+    """The directions of motion of joint i turn by a, its body on them by -b, so that only its motion changes.
 
     o: joint point on the child; t: from that on the parent to it.
     """
@@ -154,7 +154,7 @@ def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, 
 
 @kernel
 def add_coupled_geometry(model: Model, data: Data, at: At, w: float, col: int) -> None:
-    """What a change of geometry does to couplings across branches: wrench F on a and -F on b, gaps of loops."""
+    """The effect of a change of geometry on couplings across branches: wrench F on a and -F on b, gaps of loops."""
     T2, T3, F = at.twists[3], at.twists[6], at.twists[_PRODUCT]
     loops = model.coupling_body.shape[0] - model.loop_ntrans.shape[0]
     for k in range(model.coupling_body.shape[0]):

@@ -57,7 +57,7 @@ def spread(model: Model, k: int, at: Vec3, s: Vec3, X: Matrix, first: int, out: 
 
 @kernel
 def spread_earlier(model: Model, data: Data, c: int, configuration: int, X: Matrix, out: Matrix) -> None:
-    """What the floor of an impact feels of the ground below configuration 1 or 2."""
+    """The effect of the ground below configuration 1 or 2 on the offset of an impact."""
     k = model.contact_terrain[c] - 1
     b = data.bounce[c]
     share, phi = (

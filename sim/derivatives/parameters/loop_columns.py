@@ -1,4 +1,4 @@
-"""Parameters of what closes the tree: joints that close loops, and gears; columns[:, col] -= w dR/d(parameter).
+"""Parameters of the couplings of the tree: joints that close loops, and gears; columns[:, col] -= w dR/d(parameter).
 
 The gaps of loops and gears have rows of their own: couple_panel[:, col] += w dg.
 """

@@ -88,7 +88,7 @@ class Draft:
         self.joints[name] = changed
 
     def _move_centre(self, name: str, d: Floats) -> None:
-        """The centre of mass moves by d, body axes; what is on the body stays where it is."""
+        """The centre of mass moves by d, body axes; elements of the body stay in place."""
         body = self.bodies[name]
         if body.shape is not None:
             self.bodies[name] = replace(body, shape=_moved(body.shape, -d))

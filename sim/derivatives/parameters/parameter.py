@@ -1,4 +1,4 @@
-"""Parameter: one number of a mechanism, with its kind and unit, and how a step feels it."""
+"""Parameter: one number of a mechanism, with its kind, its unit, and its effects on a step."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Derivatives of the next state by parameters, by the implicit function theorem: dv25 = -H^-1 dR/d(parameter).
 
-The minimal state x = (q2, v15) and the input are held fixed; what hangs on them moves with the parameter: poses at all
-three configurations, so also the momentum that enters the step. The factors of H are those that the derivatives by
+The minimal state x = (q2, v15) and the input are held fixed; dependent quantities move with the parameter: poses at all
+three configurations, and so the momentum that enters the step. The factors of H are those that the derivatives by
 state and input have left in `data`.
 
 By the time step h: R depends on it by h v15, h v25, and directly, so with A_vv = dv25/dv15

@@ -1,4 +1,4 @@
-"""Parameters of a mechanism by name: what they are, what they are now, and how a step feels them.
+"""Parameters of a mechanism by name: their meaning, their values, and their effects on a step.
 
     kind:part[component]     mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
 
@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 
 class Parameters(NamedTuple):
-    """The parameters of a selection, in order; `rows` says which of them each of its names stands for."""
+    """The parameters of a selection, in order; `rows` has those of each name."""
 
     names: tuple[str, ...]
     values: Floats  # (n,)

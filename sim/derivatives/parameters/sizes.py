@@ -3,7 +3,7 @@
 Distance, normal and point depend on a shape by the surface that is touched, and near it by the corner, edge, face or
 ball that is there. When a size grows by ds, that element moves by e ds, as if the whole shape did: a corner of a box
 away from the middle, an edge with it (along itself it may move as it likes), the surface of a ball along its normal. So
-a size costs what a shift costs, by an e of its own for every point, and no pair of shapes needs more derivatives.
+a size costs as much as a shift, with an e of its own for every point, and no pair of shapes needs more derivatives.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def element_shift(
 
 @kernel
 def earlier_shift(model: Model, data: Data, j: int, which: int, b: Vector, configuration: int) -> Vec3:
-    """`element_shift` at configuration 1 or 2, from what `look_back` (contact/restitution.py) has kept of it in b."""
+    """`element_shift` at configuration 1 or 2, from the values of `look_back` (contact/restitution.py) in b."""
     first = configuration == 1
     n = row(b, 2 if first else 8)
     p = row(b, 16 if first else 19)

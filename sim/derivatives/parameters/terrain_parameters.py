@@ -1,8 +1,8 @@
-"""Heights of the terrains of a mechanism as parameters: which there are, and gradients by them.
+"""Heights of the terrains of a mechanism as parameters: their list, and gradients by them.
 
 They stand in a row, terrain after terrain in the order of the contacts, each like heights.ravel(). Kernels know the
-coefficients of one surface per terrain and radius (pack.py); what those have of a gradient is brought back here, all
-heights at once, so there are no terms for them in the lists of columns.py.
+coefficients of one surface per terrain and radius (pack.py); their gradient is mapped to the heights here, all
+heights at once, so the lists of columns.py have no terms for them.
 """
 
 from __future__ import annotations

@@ -136,7 +136,7 @@ def gear_parameters(mech: Mechanism) -> Iterator[Parameter]:
 
 
 def input_parameters(mech: Mechanism) -> Iterator[Parameter]:
-    """input_force, input_torque: what a unit of an input on a body is."""
+    """input_force, input_torque: force and torque per unit of an input on a body."""
     for j, part in enumerate(mech.inputs or ()):
         if part.body is not None:
             for first, kind, values in ((0, "input_force", part.force), (3, "input_torque", part.torque)):

@@ -32,7 +32,7 @@ def limit_gaps(model: Model, data: Data, h: float) -> None:
 
 @kernel
 def add_limit_blocks(model: Model, data: Data, h: float) -> None:
-    """joint_block += h gamma/s on the diagonal, and what a cone has in its place."""
+    """joint_block += h gamma/s on the diagonal, and the corresponding terms of cones."""
     for k in range(model.limit_dof.shape[0]):
         d = model.limit_dof[k]
         i = model.dof_body[d]
@@ -46,7 +46,7 @@ def add_limit_blocks(model: Model, data: Data, h: float) -> None:
 
 @optional(Slot.ADD_LIMIT_DERIVATIVES)
 def add_limit_derivatives(model: Model, data: Data, h: float) -> None:
-    """dR_dq += gamma/s, and what a cone has in its place."""
+    """dR_dq += gamma/s, and the corresponding terms of cones."""
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
             cone_derivative(model, data, h, k)

@@ -4,7 +4,7 @@
     coordinates    p, two plain numbers [rad]: a step adds h v to them, springs, dampers, limits and inputs act on them
     columns        d(rotation)/d(p_k) = J(t)^T V_k in the child's axes, J the left Jacobian of exp
 
-The coordinates are regular for |p| < 2 pi. This is no universal joint, which is two hinges one after the other and
+The coordinates are regular for |p| < 2 pi. This is not a universal joint, which is two hinges one after the other and
 turns its child about the axis by an amount of second order.
 
 Scenes without such joints do not compile these kernels.

@@ -81,7 +81,7 @@ def add_spring_derivatives(model: Model, data: Data, h: float, q: Vector, v: Vec
 
 @kernel
 def add_swing_curvature(model: Model, data: Data, q: Vector) -> None:
-    """dR_dq += what changes in the test directions of joints with two rotations, beyond turning (swing.py)."""
+    """dR_dq += the change of the test directions of joints with two rotations, beyond their rotation (swing.py)."""
     for i in range(model.body_parent.shape[0]):
         if model.joint_nrot[i] == 2:
             a = model.body_qadr[i + 1] - 2

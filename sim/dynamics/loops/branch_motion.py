@@ -1,16 +1,16 @@
-"""Motion of closed loops: where a step begins to look for its velocity, so that it stays on its branch.
+"""Motion of closed loops through a bifurcation: the start velocity that keeps a step on its branch.
 
-Where two branches of a loop's motion meet, the links of a parallelogram in one line, the equations of a step have a
-solution on each, as near to one another as configuration 3 to the place where they meet. The solution is that of the
-branch of configurations 1 and 2, which Newton's method finds from a start closer to it than that: the leapfrog start
-2 P v - v (loop_velocity.py), off by O(h^3), where the incoming velocity is off by O(h^2). Of two solutions the one that
-is closer to it is taken.
+At a bifurcation two branches of a loop's motion meet, as when the links of a parallelogram lie in one line. Near it the
+equations of a step have a solution on each branch, as close to one another as configuration 3 is to the bifurcation.
+The right one continues configurations 1 and 2. Newton's method finds it from a start that is closer to it than to the
+other: the leapfrog start 2 P v - v (loop_velocity.py) has an error of O(h^3), the incoming velocity one of O(h^2). Of
+two solutions the one closer to this start is taken.
 
-All that costs as much as the step, and where no branches are near it changes nothing. The least pivot of the dense
-system (coupling_system.py) is the product of the distances of configurations 2 and 3 from singular ones: where it is
-not small in the step before, the step is solved from its guess as if there were no branches, and where it is not small
-then either, that is the solution. At a singular configuration itself a constraint depends on others; how many always
-do is counted along the motion, whose first step takes the long way.
+This costs as much as the step, and far from a bifurcation it changes nothing. The least pivot of the dense system
+(coupling_system.py) is the product of the distances of configurations 2 and 3 from singular ones. If it was not small
+in the last step, the step is solved from its guess without regard to branches; if it is still not small, that is the
+solution. At a singular configuration a constraint depends on others. The number of constraints that always do is
+counted along the motion, and the first step of a motion always takes the full procedure.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from solvers.status import Status
 from solvers.types import Vector
 
 _CLOSER = 0.5  # share of a least pivot
-_REGULAR = 5e-3  # a pivot above this is far from where branches meet
+_REGULAR = 5e-3  # a pivot above this is far from a bifurcation
 _ACROSS = 0.5  # share of a velocity across its loops; of more, the loops were not closed
 
 
 @optional(Slot.LOOPS_REGULAR, default=True)
 def loops_regular(model: Model, data: Data) -> bool:
-    """Whether the step before in this motion was far from where branches meet; forgets its pivot and directions."""
+    """Whether the last step of this motion was far from a bifurcation; clears its pivot and directions."""
     data.bifurcation_count[0] = 0
     if data.carried_steps[0] == 0:
         data.couple_rank[CoupleRank.DEFICIENCY] = 1e300
@@ -102,7 +102,7 @@ def lead_again(model: Model, data: Data, h: float, q: Vector) -> bool:
 
 @optional(Slot.MEET_AHEAD, default=False)
 def meet_ahead(model: Model, data: Data) -> bool:
-    """Whether the solution lies closer to where branches meet than configuration 2, so that it may be that of another.
+    """Whether the solution is closer to the bifurcation than configuration 2, and so may be on another branch.
 
     Then loop_start is a start on the other side of the prediction, and loop_kept the solution.
     """

@@ -27,7 +27,7 @@ _FAR = 1.0  # [m, rad] a zero further away than this may not be the nearest
 _AROUND = (0.1, 0.4, 1.6)  # standard deviations of the starts [m, rad]
 STARTS = 6  # of each of them
 _EVALUATIONS = 40  # of least squares from each
-_SLOW = 1e-3  # share of the sum of squares by which a step of least squares that goes on reduces it at least
+_SLOW = 1e-3  # least relative reduction of the sum of squares by a step of least squares
 _NEAR = 1e-2  # [m, rad] from a minimum above this, no zero is within the reach of Newton's method
 _BACK = 30  # steps along the zeros
 
@@ -96,7 +96,7 @@ def _settled(error: Error, d: Floats) -> Zero:
     """The zero downhill from d, or the minimum of the sum of squares that is there.
 
     Towards a zero, the sum falls ever faster. Where it hardly falls, there is a minimum of another kind, which most
-    starts of a loop that cannot be closed come to; to go on there would take most of the time.
+    starts of a loop that cannot be closed come to; to continue there would take most of the time.
     """
     from scipy.optimize import least_squares
 

@@ -1,4 +1,4 @@
-"""Rows of the dense system of the couplings (coupling_system.py): which there are, their forces and their responses."""
+"""Rows of the dense system of the couplings (coupling_system.py): their list, their forces and their responses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def is_loop(model: Model, k: int) -> bool:
 def take_apart(data: Data, k: int, row: int) -> None:
     """Rows of couple_B, couple_R and couple_E from row on: (K_a, K_b) = B D R by elimination with full pivoting.
 
-    coupling_K is used up; what is left when the pivots have fallen to rounding is dropped: forces without effect.
+    coupling_K is overwritten; rows whose pivots have fallen to rounding are omitted: their forces have no effect.
     """
     first = 0.0
     for r in range(row, row + 6):

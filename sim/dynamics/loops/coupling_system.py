@@ -1,4 +1,4 @@
-"""What couples branches of the tree: pairs of bodies in contact, and closed loops, as a small dense system.
+"""Couplings of branches of the tree, pairs of bodies in contact and closed loops, as a small dense system.
 
 A coupling of the bodies a and b adds B f to the wrench on a and takes it from that on b, about O:
 
@@ -12,8 +12,8 @@ zeta_0 answers the right-hand side and Z the unit forces:
     (E - R_a Z_a - R_b Z_b) f = g + R_a zeta_0a + R_b zeta_0b        E = 1/D or 0,  R = (G3, -G3) for a loop
 
 so trees stay linear, and pay nothing. Rows of couple_B, couple_R, ... follow coupling_row, those of gears (gears.py)
-come last; couple_live names those that the dense system has: not those of far pairs, nor those without stiffness.
-Constraints that say nothing new (a planar loop in space) are found by the pivots, and their forces set to zero; their
+come last; couple_live lists the rows of the dense system, without those of inactive pairs or zero stiffness.
+Redundant constraints (a planar loop in space) are found by the pivots, and their forces set to zero; their
 rows are rounding, and kept so by a scale that does not look at directions.
 """
 

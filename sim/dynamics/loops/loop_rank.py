@@ -1,4 +1,4 @@
-"""LoopRank: how many constraints closed loops have, which of them are redundant, and whether the pose is singular."""
+"""LoopRank: the number of constraints of closed loops, the redundant ones, and whether the pose is singular."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ _NEAR = 0.1  # `weakest` of configurations close to a singular one, over that ne
 
 
 class LoopRank(NamedTuple):
-    """How many constraints the loops of a mechanism have, and how many of them say something new."""
+    """The number of loop constraints of a mechanism, and of those that are independent."""
 
     constraints: dict[str, int]  # by loop joint
-    redundant: dict[str, int]  # by loop joint: what those before it, and its own, say already
+    redundant: dict[str, int]  # by loop joint: constraints implied by those before it and its own
     mobility: int  # degrees of freedom that the loops leave
     weakest: float  # least singular value of the independent constraints, over the largest
     leftover: float  # largest one of the redundant constraints, over the largest

@@ -1,4 +1,4 @@
-"""What closed loops and gears leave of a velocity at one moment: its nearest one in the kinetic metric.
+"""Projection of a velocity onto the constraints of loops and gears, in the kinetic metric.
 
     P v = v - M^-1 G^T (G M^-1 G^T)^-1 G v        M, G at configuration 2
 

@@ -51,7 +51,7 @@ def _loop_work(model: Model, data: Data) -> float:
 
 @kernel
 def _closing_work(model: Model, data: Data, tolerance: float) -> float:
-    """Twice the work that the forces of loops may do to close what was open at the configurations 1 and 2."""
+    """Twice the work that the forces of loops may do to close the gaps at configurations 1 and 2."""
     for m in range(model.loop_ntrans.shape[0]):
         loop_rows(model, data, m, data.pos1, data.rot1, data.couple_G)
     total = 0.0
@@ -65,7 +65,7 @@ def _closing_work(model: Model, data: Data, tolerance: float) -> float:
 
 @optional(Slot.LOOP_SLACK, default=0.0)
 def loop_slack(model: Model, data: Data, options: StepOptions) -> float:
-    """Energy that the forces of loops may give to close what was open where the step began [J]."""
+    """Energy that the forces of loops may give to close the gaps at the beginning of the step [J]."""
     return 0.5 * _closing_work(model, data, options.tolerance) / options.h
 
 

@@ -23,7 +23,7 @@ Settings = tuple[float | None, str, int]
 
 
 def find_collisions(model: Any, where: Where, settings: Settings, notes: Notes) -> list[Collision]:
-    """The collisions of all geoms that may meet; settings: friction, law, and what contacts need."""
+    """The collisions of all geoms that may meet; settings: friction, law, and further settings of contacts."""
     chosen, law, _ = settings
     out = []
     for a, b, (friction, slippery) in _pairs(model, where):

@@ -5,7 +5,7 @@
     box         its eight corners
     cylinder    points on both rims
 
-A plane counts where it is fixed to the world; a geom touches it where MuJoCo's contype and conaffinity say so. Friction
+A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it. Friction
 is the larger of both, or that of the geom with priority; condim 1 is without.
 """
 

@@ -1,4 +1,4 @@
-"""Inputs from the actuators of an MJCF file, and what of it the mechanism leaves out."""
+"""Inputs from the actuators of an MJCF file, and notes on its unsupported elements."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _bounds(model: Any, a: int, gear: float, ratio: float, plain: bool) -> tuple
 
 
 def left_out(model: Any, collisions: bool, notes: Notes) -> None:
-    """Notes on what the file has and the mechanism does not."""
+    """Notes on the elements of the file that the mechanism lacks."""
     if model.ntendon:
         forces = (model.tendon_stiffness, model.tendon_damping, model.tendon_limited, model.tendon_frictionloss)
         felt = any(np.any(field) for field in forces)

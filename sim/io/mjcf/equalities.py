@@ -29,7 +29,7 @@ _SITE = 6  # mjtObj
 
 
 def find_loops(model: Any, where: Where, notes: Notes) -> list[Joint]:
-    """The joints that close loops; what cannot be represented goes into the notes."""
+    """The joints that close loops; unsupported ones go into the notes."""
     out = []
     for k in range(model.neq):
         name, kind = name_of(model, "equality", k), int(model.eq_type[k])

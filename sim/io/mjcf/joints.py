@@ -2,7 +2,7 @@
 
 Translations followed by at most one hinge or ball are one joint where a kind with these coordinates exists. All others
 are a chain: a body without mass between one joint and the next. That is exact: the configurations are the same, and
-what has no mass has no part in the discrete Lagrangian; and as in MuJoCo, two hinges whose axes have become parallel
+massless bodies do not appear in the discrete Lagrangian; and as in MuJoCo, two hinges whose axes have become parallel
 make the step singular unless they have an armature.
 """
 
@@ -26,7 +26,7 @@ _CLOSE = 1e-9
 
 
 class Carried(NamedTuple):
-    """What joins a group to its parent: bodies without mass, joints, and where each joint of the file is in them."""
+    """The link of a group to its parent: massless bodies, joints, and the place of each joint of the file in them."""
 
     bodies: list[Body]
     joints: list[Joint]
@@ -145,7 +145,7 @@ def _dofs(model: Any, field: str, j: int, count: int) -> Floats:
 
 
 def _ball_notes(model: Any, j: int, armature: Floats, notes: Notes) -> None:
-    """What a ball joint has in the file and not here."""
+    """Notes on the unsupported attributes of a ball joint."""
     name = [name_of(model, "joint", j)]
     if model.jnt_limited[j]:
         notes.add(

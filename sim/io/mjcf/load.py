@@ -39,23 +39,28 @@ def load_mjcf(
 ) -> MjcfMechanism:
     """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
 
-        ground      whether geoms cannot enter the planes of the file
-        friction    coefficient of all contacts; None: that of the geoms
-        law         of contacts with friction, see Contact; geoms with condim 1 are without
-        merge       whether slides and a hinge in a row become one joint where there is a kind for it; the coordinates
-                    are the same. All other joints in a row are a chain with bodies without mass between them.
-        keyframe    number of the keyframe whose qpos is the neutral state; None: the default one, joints that it has
-                    outside their range in its middle, and a floating base so high that nothing is in the ground
-        rim_points  points per rim of a cylinder
-        collisions  whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
-                    them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
-        gravity     [m/s^2]; None: that of the file
+    Args:
+        source: path of the file, or its text
+        ground: whether geoms cannot enter the planes of the file
+        friction: coefficient of all contacts; None: that of the geoms
+        law: of contacts with friction, see Contact; geoms with condim 1 are without
+        merge: whether slides and a hinge in a row become one joint if there is a kind for it, with the same
+            coordinates. All other joints in a row are a chain with massless bodies between them.
+        keyframe: number of the keyframe whose qpos is the neutral state; None: the default one, with joints outside
+            their range in its middle, and a floating base high enough that nothing penetrates
+        rim_points: points per rim of a cylinder
+        collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
+            them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
+        gravity: [m/s^2]; None: that of the file
 
-    What of the file is represented, and what not: MjcfMechanism. What changes the motion in a way that a user would not
-    expect is also an MjcfWarning.
+    Returns:
+        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also an
+        MjcfWarning.
 
-    ImportError without MuJoCo; ValueError with its message for a file that it cannot read, or with the name of the body
-    whose inertia no rigid body has; OSError for a file that is not there.
+    Raises:
+        ImportError: MuJoCo is not installed.
+        ValueError: MuJoCo cannot read the file, or no rigid body has the inertia of the named body.
+        OSError: the file does not exist.
     """
     model, file = _compile(source)
     touching = _touching(friction, law, rim_points)
@@ -95,7 +100,7 @@ def _touching(friction: float | None, law: str, rim_points: int) -> tuple[float 
 
 
 def _warn(report: MjcfReport) -> None:
-    """Warnings, at the line that called load_mjcf, of what changes the motion."""
+    """Warnings of changes of the motion, at the line that called load_mjcf."""
     for note in report.notes:
         if note.warn:
             warnings.warn(f"load_mjcf: {report.file}: {note}", MjcfWarning, stacklevel=3)

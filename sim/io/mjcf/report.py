@@ -1,4 +1,4 @@
-"""MjcfReport: what a loaded mechanism has of its MJCF file, and what not; MjcfMechanism carries it."""
+"""MjcfReport: supported and unsupported elements of a loaded MJCF file; MjcfMechanism carries it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class MjcfWarning(UserWarning):
 
 @dataclass(frozen=True)
 class MjcfReport:
-    """What became of an MJCF file. `str(report)` is a page of text.
+    """The translation of an MJCF file. `str(report)` is a page of text.
 
     bodies   where the frame of every body of the file is now
     joints   of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them
@@ -45,12 +45,12 @@ class MjcfReport:
 
 @dataclass(frozen=True, repr=False)
 class MjcfMechanism(Mechanism):
-    """A Mechanism that `load_mjcf` made; `report` says what became of the file.
+    """A Mechanism that `load_mjcf` made; `report` describes the translation of the file.
 
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
     ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move, and with
-    `collisions=True` against one another and what is fixed; actuators on hinges and slides as inputs in N and N m, u =
+    `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, u =
     report.gear * ctrl, and on sites as wrenches that move with the body; connect and weld as joints that close loops,
     and linear couplings of two joints as gears, all of them rigid (equalities.py). Not represented, and listed
     in `report.notes`: other equality constraints, tendons, dry friction of joints, servos, fluids, meshes, height

@@ -1,1 +1,1 @@
-"""Mechanisms from URDF files: load.py, and what report.py and xml.py say about a file."""
+"""Mechanisms from URDF files: load.py, with reports (report.py) and errors (xml.py) about a file."""

@@ -1,4 +1,4 @@
-"""assemble: the parts of a Mechanism from what a URDF file says and what the caller chose."""
+"""assemble: the parts of a Mechanism from a URDF file and the choices of the caller."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
 
 @dataclass(frozen=True)
 class Choices:
-    """What the caller of `load_urdf` chose; see there."""
+    """The arguments of `load_urdf`; see there."""
 
     file: str
     fixed_base: bool
@@ -113,7 +113,7 @@ def _neutral(robot: Robot, choices: Choices, name: str) -> float:
 
 
 def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
-    """Inertia of every body in its own frame; what no rigid body has is repaired or refused."""
+    """Inertia of every body in its own frame; impossible inertias are repaired or refused."""
     out = {body.name: combined(body.inertias) for body in groups}
     if groups and not any(part.mass for part in out.values()):
         raise UrdfError(f"load_urdf: {choices.file}: nothing that moves has a mass")
@@ -185,7 +185,7 @@ def _closing(
 
 
 def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list[Input]:
-    """One per degree of freedom of the actuated joints; those that close loops only when they are asked for."""
+    """One per degree of freedom of the actuated joints; joints that close loops only if requested."""
     by_name = {j.name: j for j in (*joints, *closing)}
     if choices.actuated is None:
         chosen = [j for j in joints if j.kind != "floating"]
@@ -198,7 +198,7 @@ def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list
 
 
 def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: Notes) -> None:
-    """What a user should know about the ground before the first step."""
+    """Notes on the ground for the user, before the first step."""
     wanted = choices.contacts is None or len(choices.contacts) > 0
     if floating and wanted and not mech.contacts:
         notes.add("nothing of the robot makes contact with the ground: it falls through", warn=True)

@@ -1,4 +1,4 @@
-"""RigidInertia: masses put together, tested for being that of a rigid body, and repaired where that was asked for."""
+"""RigidInertia: combined masses, a test of physical consistency, and its repair on request."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def fault(body: RigidInertia) -> str:
 
 
 def repaired(body: RigidInertia) -> RigidInertia:
-    """The nearest inertia of a rigid body that is no smaller than a ball of BALL_RADIUS.
+    """The nearest inertia of a rigid body at least as large as a ball of BALL_RADIUS.
 
         S = tr(J)/2 I - J        second moments of the mass, >= 0 for whatever is made of matter
         principal values of S raised to m r^2/5, those of the ball;    J = tr(S) I - S

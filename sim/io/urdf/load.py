@@ -39,32 +39,38 @@ def load_urdf(
 ) -> UrdfMechanism:
     """The robot of a URDF file.
 
-        floating      whether the root can move or is fixed to the world; a root link called "world" is the world in
-                      either case. The joint is called "floating_base": its coordinates are the position of the root's
-                      frame and its quaternion, its speeds that of the frame's origin (world) and of rotation (body)
-        ground        whether collision shapes cannot enter the half-space z < 0
-        friction      coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
-        contacts      which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the
-                      frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder
-                      (points on both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make
-                      no contacts.
-        merge_fixed   whether links on fixed joints become one body; a link without mass always does
-        locked        joints that are held at their neutral coordinate, as if they were fixed
-        mimic         what becomes of joints that follow another one: "gear" couples them (see Gear), "free" and
-                      "locked" leave that out
-        repair        whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or
-                      more, and a moving link without mass by a ball of 1 g and 1 cm; False refuses them
-        neutral       coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their
-                      range when zero is outside. The base then stands so high that the lowest contact touches.
-        position      of the root's frame when it is fixed [m]
-        actuated      joints with an input, in the order of u; None: all that move, but for floating ones
-        rim_points    points per rim of a cylinder
+    Args:
+        path: of the file
+        floating: whether the root can move or is fixed to the world; a root link called "world" is the world in either
+            case. The joint is called "floating_base": its coordinates are the position of the root's frame and its
+            quaternion, its speeds that of the frame's origin (world) and of rotation (body)
+        ground: whether collision shapes cannot enter the half-space z < 0
+        friction: coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
+        contacts: which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the
+            frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder (points on
+            both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make no contacts.
+        merge_fixed: whether links on fixed joints become one body; a link without mass always does
+        locked: joints held at their neutral coordinate, as if they were fixed
+        mimic: treatment of joints that follow another one: "gear" couples them (see Gear), "free" and "locked" ignore
+            that
+        repair: whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or more, and
+            a moving link without mass by a ball of 1 g and 1 cm; False refuses them
+        neutral: coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their range
+            when zero is outside. The base then stands so high that the lowest contact touches.
+        position: of the root's frame when it is fixed [m]
+        actuated: joints with an input, in the order of u; None: all that move, but for floating ones
+        law: of contacts with friction, see Contact
+        rim_points: points per rim of a cylinder
+        gravity: (3,) [m/s^2]
 
-    What is read, and what `mechanism.report` says of the rest: UrdfMechanism. What changes the motion in a way that a
-    user would not expect is also a UrdfWarning.
+    Returns:
+        UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also a
+        UrdfWarning.
 
-    Raises UrdfError, a ValueError, with the file, the line and the element for a file that cannot be read, and with the
-    names of links and joints for a robot that cannot be simulated; OSError for a file that is not there.
+    Raises:
+        UrdfError: a ValueError, with the file, line and element if the file cannot be read, or with the names of
+            links and joints if the robot cannot be simulated.
+        OSError: the file does not exist.
     """
     file, notes = Path(path), Notes()
     root = parse(file)

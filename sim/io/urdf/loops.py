@@ -54,7 +54,7 @@ def read_loop(element: Element, notes: Notes) -> UrdfLoop:
 
 
 def read_loops(root: Element, robot: Robot, notes: Notes) -> dict[str, UrdfLoop]:
-    """The <loop_joint>s by name; ends that are no links of the file, and names that are taken, are refused."""
+    """The <loop_joint>s by name; unknown links and duplicate names are refused."""
     out: dict[str, UrdfLoop] = {}
     for element in root.all("loop_joint"):
         loop = read_loop(element, notes)

@@ -1,4 +1,4 @@
-"""UrdfReport: what a loaded mechanism has of its file, and what not; UrdfMechanism carries it."""
+"""UrdfReport: supported and unsupported elements of a loaded file; UrdfMechanism carries it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class LinkFrame:
 
 @dataclass(frozen=True)
 class UrdfReport:
-    """What became of a URDF file. `str(report)` is a page of text.
+    """The translation of a URDF file. `str(report)` is a page of text.
 
     links     where every link of the file is now
     effort    largest force or torque of every input [N, N m], infinite where the file gives none: as control limits
@@ -66,14 +66,14 @@ class UrdfReport:
 
 @dataclass(frozen=True, repr=False)
 class UrdfMechanism(Mechanism):
-    """A Mechanism that `load_urdf` made; `report` says what became of the file.
+    """A Mechanism that `load_urdf` made; `report` describes the translation of the file.
 
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
     PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in Dojo; and every kind
     of Joint by its own name, but for "planar", which turns in URDF and whose kind without is "planarfixed"), and
     <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (loops.py). A body's frame has the
     axes of its first link and its origin at the centre of mass; `report.links` has the pose of every link in its body,
-    `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` what is not represented (dry friction,
+    `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` unsupported elements (dry friction,
     meshes, mimics).
     """
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
 
 # URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
-# of Joint that nobody else has a word for. A kind's own name is read, too, except for "planar", which may turn in URDF.
+# of Joint without a standard word. A kind's own name is read, too, except for "planar", which may turn in URDF.
 KINDS = {
     "fixed": "fixed",
     "revolute": "revolute",
@@ -43,7 +43,7 @@ KINDS = {
 }
 KINDS |= {kind: kind for kind in parts.KINDS if kind not in KINDS}
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
-# elements that say nothing about the motion of bodies, or nothing that a step could use
+# elements without effect on the motion of bodies, or without use in a step
 READ = {"link", "joint", "loop_joint"}
 
 
@@ -94,7 +94,7 @@ class UrdfJoint:
 
 @dataclass(frozen=True)
 class Robot:
-    """What the file says."""
+    """The contents of the file."""
 
     name: str
     links: dict[str, UrdfLink]
@@ -103,7 +103,7 @@ class Robot:
 
 
 def read_robot(root: Element, notes: Notes) -> Robot:
-    """The robot of a <robot> element; what it holds that is not represented goes into the notes."""
+    """The robot of a <robot> element; its unsupported elements go into the notes."""
     if root.tag != "robot":
         raise root.error("expected a <robot> as the outermost element")
     for element in root.children:
@@ -132,7 +132,7 @@ def _by_name(elements: list[Element], read: Callable[[Element], T]) -> dict[str,
 
 
 def _pose(element: Element) -> Pose:
-    """The <origin> of an element: zero where it is left out."""
+    """The <origin> of an element: zero by default."""
     origin = element.one("origin")
     if origin is None:
         return HERE

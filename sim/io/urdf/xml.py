@@ -1,4 +1,4 @@
-"""Element: what an XML file says, with the line it says it on, so that every complaint can point at it."""
+"""Element: an element of an XML file with its line, so that every error can point at it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Element:
         if attribute not in self.attributes and default is not None:
             return default
         text = self.text(attribute)
-        # Python reads "1_000" and the digits of every script, too, which are no numbers of XML
+        # Python also reads "1_000" and the digits of every script, which are not numbers in XML
         plain = text.isascii() and "_" not in text
         try:
             values = [float(word) for word in text.split()] if plain else []
