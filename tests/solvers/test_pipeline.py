@@ -86,7 +86,9 @@ product(np.zeros(3), 1, 2)
 """
 
 
-@pytest.mark.parametrize("first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.rollout" + COMPILE])
+@pytest.mark.parametrize(
+    "first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.rollout" + COMPILE]
+)
 def test_numba_compiles_others_functions_as_it_does_without_us(first: str):
     """Lanes add cases of their own to `+`; nothing else is registered with an operator."""
     assert python(GUEST.format(first=first)) == python(GUEST.format(first=""))
