@@ -235,7 +235,7 @@ def linearize_knots(
 
 
 class BatchBuffers(NamedTuple):
-    """BatchBuffers from several states, kept as their states only."""
+    """Motions from several states, kept as their states only."""
 
     xs: Cube  # (n, T + 1, nx), of which the first rows are given
     us: Cube  # (n, T, nu)
@@ -249,7 +249,7 @@ class BatchBuffers(NamedTuple):
 
 @kernel
 def _roll_rows(model_at: Table, data_at: Table, settings: Vector, rows: tuple[int, int], motions: BatchBuffers) -> None:
-    """BatchBuffers rows[0] up to rows[1], as far as they are not done, until the deadline."""
+    """Motions rows[0] up to rows[1], as far as they are not done, until the deadline."""
     steps = motions.us.shape[1]
     for i in range(rows[0], rows[1]):
         report = motions.reports[i]

@@ -87,7 +87,7 @@ product(np.zeros(3), 1, 2)
 
 
 @pytest.mark.parametrize(
-    "first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.rollout" + COMPILE]
+    "first", ["import dojo_opt, sim.integrators.rollout", "import dojo_opt, sim.integrators.rollout" + COMPILE]
 )
 def test_numba_compiles_others_functions_as_it_does_without_us(first: str):
     """Lanes add cases of their own to `+`; nothing else is registered with an operator."""
