@@ -74,7 +74,7 @@ def test_the_report_of_a_robot():
         for what in ("friction", "contacts", "limits", "damper", "all of these")
     }
     assert all(np.isfinite(value) and value < 100.0 for value in saved.values())
-    assert any("far contacts" in note for note in report.notes)
+    assert any("inactive contacts" in note for note in report.notes)
     assert report.figure is not None and json.loads(report.as_json())["details"]["robot"]
 
 

@@ -42,7 +42,7 @@ ROLLOUTS = {  # calls of so many steps; enough of them take a second
     "under a policy": (lambda n: HOPPER.rollout(HOPPER.neutral(), lambda t, x: np.zeros(3), steps=n), 100_000),
     "under wrenches": (
         lambda n: QUADRUPED.rollout(QUADRUPED.neutral(), inputs(QUADRUPED, n), wrenches={"trunk": PUSH}),
-        150_000,
+        60_000,
     ),
     "closed loop": (
         lambda n: QUADRUPED.closed_loop(QUADRUPED.neutral(), inputs(QUADRUPED, n // 10), substeps=10),

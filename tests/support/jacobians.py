@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 STEPS = 10.0 ** np.arange(-1.5, -7.1, -0.5)
-ROUNDING = 100.0  # times the least change: beyond it a smaller step only has more rounding
 
 
 def five_point(f: Callable[[Vector], Vector], direction: Vector, step: float) -> Vector:
@@ -36,8 +35,6 @@ def _column(f: Callable[[Vector], Vector], direction: Vector) -> tuple[Vector, f
         change = np.abs(fine - coarse).max()
         if change < doubt:
             best, doubt = fine, change
-        elif change > ROUNDING * doubt:
-            break
         coarse = fine
     assert best is not None, "the function could not be evaluated around the point"
     return best, float(doubt)
