@@ -111,7 +111,7 @@ class Arguments:
             if parts[2] is not None:
                 raise ValueError(f"{call}(Ks=...): gains need the states xs=... that they are about")
             xs[:] = start
-        external = self._engine.no_wrenches if wrenches is None else wrenches
+        external = self._engine.external(wrenches)
         return FeedbackLaw(self.states(f"{call}(xs=...)", xs), us, external, ks, Ks, gaps, *self._engine.unknown)
 
     def limits(self, call: str, limits: tuple[ArrayLike, ArrayLike] | None) -> tuple[Floats, Floats]:

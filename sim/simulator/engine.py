@@ -138,6 +138,10 @@ class Engine:
         """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""
         return self.linked(link_step, link_gradient, *needs), self._scratch.table()
 
+    def external(self, wrenches: Cube | None) -> Cube:
+        """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""
+        return self.no_wrenches if wrenches is None else wrenches
+
     # -- motions -------------------------------------------------------------------------------------------------------
 
     def roll(
@@ -165,7 +169,7 @@ class Engine:
         else:
             contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
             model = self.linked(link_step)
-        motion = MotionBuffers(xs, us, self.no_wrenches if wrenches is None else wrenches, reports, contacts, A, B)
+        motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
         data = self._scratch.table()
         settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
         knot = 0
@@ -175,6 +179,8 @@ class Engine:
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
+            if derivatives:  # calls that differentiate have no partial result
+                raise
             raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
         if derivatives:
             knot = refuse(reports, knot, A[:knot], B[:knot])
@@ -240,7 +246,7 @@ class Engine:
             x_next[: len(xs) - 1] = xs[1 : n + 1]
             if len(xs) == n:
                 x_next[-1:] = xs[-1:]
-        line = rollout.Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
+        line = rollout.Linearized(xs, us, self.external(wrenches), A, B, x_next, reports)
         model, settings = self.linked(link_step, link_gradient), self.settings.array(kappa)
         if n * substeps * self.ndx < _WORTH_THREADS:
             data, step = self._scratch.table(), 0

@@ -60,7 +60,7 @@ class HighOrderEngine(Engine):
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
         xs[0] = x
-        external = self.no_wrenches if wrenches is None else wrenches
+        external = self.external(wrenches)
         A, B = self.unknown[:2]
         contacts = np.zeros((steps, 0, CONTACT))
         motion = MotionBuffers(xs, us, external, reports, contacts, A, B)
@@ -167,7 +167,7 @@ class HighOrderEngine(Engine):
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
-        line = Linearized(xs, us, self.no_wrenches if wrenches is None else wrenches, A, B, x_next, reports)
+        line = Linearized(xs, us, self.external(wrenches), A, B, x_next, reports)
         model, data, settings, scheme, tangents = *self._tables(), self._scheme(), self._tangents()
         step = 0
         for _ in pieces(settings, n * substeps):

@@ -59,7 +59,7 @@ class PhasedEngine(HighOrderEngine):
     def march(self, x: Vector, us: Floats, wrenches: Cube | None = None, kappa: float | None = None) -> March:
         """Steps from x under us (T, nu) and external wrenches (T, nbody, 6)."""
         steps, ncontact = len(us), self.sizes.ncontact
-        external = self.no_wrenches if wrenches is None else wrenches
+        external = self.external(wrenches)
         out = March(
             0,
             np.zeros((steps + 1, self.nx)),
@@ -212,7 +212,7 @@ class PhasedEngine(HighOrderEngine):
     ) -> tuple[Floats, ...]:
         """As Engine.linearize, on one core: products of the derivatives of the steps, each by its own order."""
         self._check_swings()
-        external = self.no_wrenches if wrenches is None else wrenches
+        external = self.external(wrenches)
         n = len(us)
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))

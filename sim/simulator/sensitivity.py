@@ -114,7 +114,7 @@ def adjoint_sweep(
     line = Sweep(
         xs=xs,
         us=us,
-        wrenches=engine.no_wrenches if wrenches is None else wrenches,
+        wrenches=engine.external(wrenches),
         loss=loss,
         A=np.empty((1, engine.ndx, engine.ndx)),
         B=np.empty((1, engine.ndx, engine.nu)),
