@@ -114,6 +114,16 @@ def momentum_slopes(model: Model, data: Data, h: float, q: Vector, v: Vector, p_
 
 
 @kernel
+def momentum_jacobian(model_at: Table, data_at: Table, h: float, x: Vector, p_q: Matrix, p_v: Matrix) -> None:
+    """`momentum_slopes` of the state x = (q, v15), from tables."""
+    model = model_view(model_at)
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
+    node_momentum(model, data, h, x, data.wrench)
+    momentum_slopes(model, data, h, x[:nq], x[nq:], p_q, p_v)
+
+
+@kernel
 def legendre_slopes(
     model_at: Table, data_at: Table, h: float, none: Integers, x: Vector, slopes: Slopes, p_q: Matrix, p_v: Matrix
 ) -> bool:  # fmt: skip

@@ -1,6 +1,7 @@
 """Whole horizons, where Python enters compiled code: rollouts, linearizations, batches.
 
-    settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
+    settings   (7,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s], largest gain
+               and loss of energy, of those that change in a step
     report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
                accuracy of derivatives, 0 where there are none
     contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
@@ -66,7 +67,7 @@ def options_of(data: Data, settings: Vector, begins: bool) -> StepOptions:
     start_pace(data, settings)
     if begins:
         begin(data)
-    return StepOptions(settings[0], settings[1], settings[2], int(settings[3]))
+    return StepOptions(settings[0], settings[1], settings[2], int(settings[3]), settings[5], settings[6])
 
 
 @kernel

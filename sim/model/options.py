@@ -16,6 +16,8 @@ class StepOptions(NamedTuple):
     kappa: float  # central-path parameter [N s m]
     tolerance: float  # largest residual [N s, m, m/s], times the scale of the momenta
     max_iterations: int
+    gain: float  # largest energy that a solution may gain, of those that change in the step (energy_balance.py)
+    loss: float  # largest that it may lose where nothing dissipates, likewise
 
 
 class Guess(NamedTuple):

@@ -1,6 +1,6 @@
 """Engine: the compiled calls of one packed mechanism, as functions of checked arrays.
 
-settings   (5,) time step [s], kappa [N s m], tolerance, largest number of iterations, deadline [s]
+settings   (7,) as in sim/integrators/rollout.py
 report     (6,) Status, iterations, residual, violation, contact with the largest violation (-1: none), and the
            accuracy of derivatives, 0 where there are none
 contacts   (ncontact, 11) impulse in world axes (3), point where it acts (3), gap, slip speed, normal (3)
@@ -42,6 +42,53 @@ _SMALL = 4096  # numbers; `dot` of more may wake up threads
 _WORTH_THREADS = 1000  # knots times tangent dimension: below, one core is done before the others wake up
 
 
+# what shorter steps may solve; a number that is not finite and a contact below the ground stay what they are
+DIVISIBLE = frozenset(
+    int(status)
+    for status in (
+        Status.MAX_ITERATIONS,
+        Status.NO_PROGRESS,
+        Status.SINGULAR,
+        Status.ANGULAR_STEP,
+        Status.LOOP_STEP,
+        Status.COLLISION_STEP,
+        Status.ENERGY_STEP,
+    )
+)
+
+
+class Divided(NamedTuple):
+    """A divided step; see dividing_engine.py."""
+
+    engine: Engine  # that of its parts
+    rolled: Rolled  # its parts
+    x: Vector  # (nx,) the state after it
+    exact: bool  # whether that has the momentum of the last part
+
+    @property
+    def parts(self) -> int:
+        """Their number."""
+        return len(self.rolled.reports)
+
+    def report(self) -> Vector:
+        """(6,) that of the whole: all iterations, the largest of the other numbers."""
+        out = self.rolled.reports.max(axis=0)
+        out[1], out[4] = self.rolled.reports[:, 1].sum(), -1.0
+        return np.asarray(out)
+
+    def contacts(self) -> Floats:
+        """(ncontact, 11) of the whole: impulses add up and act at their mean point; the rest is that of the end."""
+        parts = self.rolled.contacts
+        out = parts[-1].copy()
+        out[:, :3] = parts[..., :3].sum(axis=0)
+        share = np.linalg.norm(parts[..., :3], axis=2)
+        total = share.sum(axis=0)
+        pressed = total > 0.0
+        mean = np.einsum("tc,tcj->cj", share[:, pressed], parts[:, pressed, 3:6])
+        out[pressed, 3:6] = mean / total[pressed, None]
+        return np.asarray(out)
+
+
 class Rolled(NamedTuple):
     """A rollout; rows after the solved steps are undefined."""
 
@@ -51,6 +98,10 @@ class Rolled(NamedTuple):
     contacts: Floats  # (T, ncontact, 11), or (0, ncontact, 11) beside derivatives
     A: Floats  # (T, ndx, ndx) derivatives, or (0, ndx, ndx)
     B: Floats  # (T, ndx, nu)
+    substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
+
+
+Law = tuple[FeedbackLaw, float, tuple[Floats, Floats]]  # with the share of its steps that is taken, and limits of u
 
 
 def finite_rows(array: Floats) -> NDArray[np.bool_]:
@@ -138,6 +189,10 @@ class Engine:
         """Tables of the Model, linked for derivatives and further needs of a call, and of this thread's first Data."""
         return self.linked(link_step, link_gradient, *needs), self._scratch.table()
 
+    def table(self) -> Table:
+        """Table of this thread's first Data."""
+        return self._scratch.table()
+
     def external(self, wrenches: Cube | None) -> Cube:
         """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""
         return self.no_wrenches if wrenches is None else wrenches
@@ -170,23 +225,56 @@ class Engine:
             contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
             model = self.linked(link_step)
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
-        data = self._scratch.table()
-        settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
-        knot = 0
+        substeps = np.ones(steps, dtype=np.int64)
         try:
-            for _ in pieces(settings, steps):
-                knot = int(rollout.roll(model, data, settings, motion, knot))
-                if knot == steps or reports[knot, 0] != Status.SOLVED:
-                    break
-        except KeyboardInterrupt:
+            knot = self.take_steps(model, motion, kappa, substeps)
+        except Interrupted as stop:
             if derivatives:  # calls that differentiate have no partial result
-                raise
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
+                raise KeyboardInterrupt from None
+            knot = stop.result
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, substeps)) from None
         if derivatives:
             knot = refuse(reports, knot, A[:knot], B[:knot])
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
-        return Rolled(knot, xs, reports, contacts, A, B)
+        return Rolled(knot, xs, reports, contacts, A, B, substeps)
+
+    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers) -> int:
+        """Steps until the end or the first unsolved one: their number, which Interrupted carries, too.
+
+        substeps: (T,) ones, where a divided step leaves the number of its parts.
+        """
+        steps, knot = len(motion.us), 0
+        data = self._scratch.table()
+        settings = self._settings if steps <= 1 and kappa is None else self.settings.array(kappa)
+        try:
+            for _ in pieces(settings, steps):
+                knot = int(rollout.roll(model, data, settings, motion, knot))
+                if knot == steps or motion.reports[min(knot, len(motion.reports) - 1), 0] != Status.SOLVED:
+                    break
+        except KeyboardInterrupt:
+            raise Interrupted(knot) from None
+        return knot
+
+    def divide(
+        self,
+        start: tuple[Vector, float] | Vector,
+        u: Vector,
+        wrench: Cube,
+        kappa: float | None = None,
+        *,
+        derivatives: bool = False,
+    ) -> Divided | None:
+        """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
+        return None
+
+    def interval(self, x: Vector) -> float:
+        """That of the velocity of the state x [s]: the time step, but for engines that divide steps."""
+        return self.settings.time_step
+
+    def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+        """Derivatives at both ends of a divided step from x; only engines that divide steps make one."""
+        raise NotImplementedError
 
     def _path(self, knots: int, *, keep: bool, cones: bool = True) -> Path:
         """Buffers of a rollout of so many knots; without `cones`, those of contacts and limits are empty."""
@@ -214,15 +302,17 @@ class Engine:
         """(number of solved knots, rollout); with `keep` also the cone variables of its steps."""
         path = self._path(len(policy.us), keep=keep)
         path.xs[0] = x
-        model, data, settings = self.linked(link_step), self._scratch.table(), self.settings.array(kappa)
-
-        def go_on(first: int) -> int:
-            return int(closed_loop(model, data, settings, policy, alpha, limits, substeps, path, first))
-
-        knot = follow(go_on, settings, path, substeps)
+        settings = self.settings.array(kappa)
+        law = (policy, alpha, limits)
+        knot = follow(lambda first: self._follow(law, settings, substeps, path, first), settings, path, substeps)
         if knot < len(policy.us):
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         return knot, path
+
+    def _follow(self, law: Law, settings: Vector, substeps: int, path: Path, first: int) -> int:
+        """The piece of a closed loop that begins at a step: the number of solved steps, those before included."""
+        model, data = self.linked(link_step), self._scratch.table()
+        return int(closed_loop(model, data, settings, *law, substeps, path, first))
 
     def linearize(
         self,
@@ -314,10 +404,10 @@ class Engine:
 
     # -- single states ---------------------------------------------------------------------------------------------
 
-    def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
-        """(status, state) with the velocity v at the node q."""
+    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
+        """(status, state) with the velocity v at the node q; h: interval of the state, here and below, [s]."""
         x = np.concatenate([q, v])
-        status = start_velocity.start_at(self._model, self._scratch.table(), self.settings.time_step, v, x)
+        status = start_velocity.start_at(self._model, self._scratch.table(), h or self.settings.time_step, v, x)
         return int(status), x
 
     def started(self, q: Vector, v: Vector) -> Vector:
@@ -328,10 +418,10 @@ class Engine:
             raise SimulationError(f"Simulator.start: {MESSAGES[reason]}", reason)
         return x
 
-    def node_velocities(self, xs: Floats) -> Floats:
+    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
         """Joint velocities at the node of every row, (n, nv)."""
         out = np.zeros((len(xs), self.sizes.nv))
-        model, data, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        model, data, h = self.linked(link_nodes), self._scratch.table(), h or self.settings.time_step
         for part in rows(len(xs)):
             velocity.node_velocities(model, data, h, xs[part], out[part])
         return out
@@ -366,48 +456,48 @@ class Engine:
                 return part.start * self.sizes.nbody + found
         return -1
 
-    def maximal(self, xs: Floats, nbody: int) -> Floats:
+    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
         """z of every row, (n, nbody, 13)."""
         out = np.zeros((len(xs), nbody, 13))
-        data, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), h or self.settings.time_step
         for part in rows(len(xs)):
             coordinates.maximal_states(self._model, data, h, xs[part], out[part].reshape(-1, 13))
         return out
 
-    def minimal(self, zs: Floats) -> Floats:
+    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
         """x of every z, (n, nbody, 13)."""
         out = np.zeros((len(zs), self.nx))
-        data, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), h or self.settings.time_step
         for part in rows(len(zs)):
             coordinates.minimal_states(self._model, data, h, zs[part].reshape(-1, 13), out[part])
         return out
 
-    def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
+    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
         """dz/dx."""
         out = np.zeros((12 * nbody, self.ndx))
-        h = self.settings.time_step
-        coordinates_jacobian.maximal_jacobian_at(self._model, self._scratch.table(), h, x, out)
+        step = h or self.settings.time_step
+        coordinates_jacobian.maximal_jacobian_at(self._model, self._scratch.table(), step, x, out)
         return out
 
-    def minimal_jacobian(self, z: Floats) -> Floats:
+    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
         """dx/dz."""
         out = np.zeros((self.ndx, 12 * len(z)))
-        h = self.settings.time_step
-        coordinates_jacobian.minimal_jacobian_at(self._model, self._scratch.table(), h, z, out)
+        step = h or self.settings.time_step
+        coordinates_jacobian.minimal_jacobian_at(self._model, self._scratch.table(), step, z, out)
         return out
 
-    def energies(self, xs: Floats) -> Floats:
+    def energies(self, xs: Floats, h: float | None = None) -> Floats:
         """(kinetic, potential) energy of every row."""
         out = np.zeros((len(xs), 2))
-        model, data, h = self.linked(link_nodes), self._scratch.table(), self.settings.time_step
+        model, data, h = self.linked(link_nodes), self._scratch.table(), h or self.settings.time_step
         for part in rows(len(xs)):
             energy.energies(model, data, h, xs[part], out[part])
         return out
 
-    def momenta(self, xs: Floats) -> Floats:
+    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
         """(linear, angular) momentum of every row."""
         out = np.zeros((len(xs), 6))
-        data, h = self._scratch.table(), self.settings.time_step
+        data, h = self._scratch.table(), h or self.settings.time_step
         for part in rows(len(xs)):
             energy.momenta(self._model, data, h, xs[part], out[part])
         return out

@@ -59,7 +59,7 @@ class HighOrderEngine(Engine):
         """As Engine.roll; without contacts and without a kappa; derivatives take a second pass."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        xs[0] = x
+        xs[0], whole = x, np.ones(steps, dtype=np.int64)
         external = self.external(wrenches)
         A, B = self.unknown[:2]
         contacts = np.zeros((steps, 0, CONTACT))
@@ -72,10 +72,10 @@ class HighOrderEngine(Engine):
                 if knot == steps or reports[knot, 0] != Status.SOLVED:
                     break
         except KeyboardInterrupt:
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B)) from None
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, whole)) from None
         if derivatives:
             A, B, *_ = self.linearize(xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(knot, xs, reports, contacts, A, B)
+        return Rolled(knot, xs, reports, contacts, A, B, whole)
 
     def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
         """As Engine.roll_batch, on one core."""
@@ -95,29 +95,29 @@ class HighOrderEngine(Engine):
             status[i] = rolled.reports[min(rolled.knot, steps - 1), 0] if steps else Status.SOLVED
         return xs, status, knots
 
-    def start(self, q: Vector, v: Vector) -> tuple[int, Vector]:
+    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
         """The state is that of the node."""
         return int(Status.SOLVED), np.concatenate([q, v])
 
-    def node_velocities(self, xs: Floats) -> Floats:
+    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
         """The velocities of the states."""
         return np.array(xs[:, self.sizes.nq :])
 
-    def energies(self, xs: Floats) -> Floats:
+    def energies(self, xs: Floats, h: float | None = None) -> Floats:
         """(kinetic, potential) energy of every row."""
         potential = super().energies(xs)[:, 1]
         rotors = 0.5 * xs[:, self.sizes.nq :] ** 2 @ self.model.dof_armature
         return np.stack([bodies.kinetic_energy(self.model, self.bodies(xs)) + rotors, potential], axis=1)
 
-    def momenta(self, xs: Floats) -> Floats:
+    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
         """(linear, angular) momentum of every row."""
         return bodies.momentum(self.model, self.bodies(xs))
 
-    def maximal(self, xs: Floats, nbody: int) -> Floats:
+    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
         """z of every row, with velocities at the node."""
         return self.bodies(xs)
 
-    def minimal(self, zs: Floats) -> Floats:
+    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
         """x of every z; of velocities that violate a joint, the part of least kinetic energy off them is dropped."""
         still = zs.copy()
         still[..., 3:6] = still[..., 10:] = 0.0
@@ -211,11 +211,11 @@ class HighOrderEngine(Engine):
 
         return follow(go_on, settings, path, substeps), path
 
-    def maximal_jacobian(self, x: Vector, nbody: int) -> Floats:
+    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
         """Refused."""
         self._refuse("Jacobians are")
 
-    def minimal_jacobian(self, z: Floats) -> Floats:
+    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
         """Refused."""
         self._refuse("Jacobians are")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,12 +13,19 @@ from sim.derivatives.parameters.selection import select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.pack import pack
 from sim.simulator.engine import Engine, Rolled
-from sim.simulator.sensitivity import adjoint_sweep, parameter_columns, roll_parameters
+from sim.simulator.intervals import Intervals
+from sim.simulator.sensitivity import Request, adjoint_sweep, roll_parameters
 from solvers.types import Vector
 
 Floats = NDArray[np.float64]
 _VARIABLES = ("state", "input")
+_NUDGE, _LEAST = 1e-5, 1e-2  # relative size of the differences of parameters, of values of at least that size
+_OF_MOMENTUM = frozenset(  # kinds on which the momentum of a state depends
+    ("mass", "inertia", "com", "parent_point", "child_point", "orientation", "axis", "spring", "rest", "armature")
+    + ("gravity", "time_step")
+)
 
 
 class ParameterEngine:
@@ -55,26 +63,58 @@ class ParameterEngine:
         """The mechanism and the time step with other values of parameters."""
         return with_values(call, self._mechanism, self._time_step, values)
 
-    def columns(self, step: tuple[Vector, Vector], A: Floats, plan: ParameterPlan) -> Floats:
-        """See `parameter_columns`."""
-        return parameter_columns(self._engine, self._mechanism, step, A, plan)
-
     def roll(
-        self, x: Vector, us: Floats, plan: ParameterPlan, kappa: float | None, wrenches: Floats | None
+        self,
+        x: Vector,
+        us: Floats,
+        selection: tuple[Parameters, ParameterPlan],
+        kappa: float | None,
+        wrenches: Floats | None,
     ) -> tuple[Rolled, Floats]:
         """See `roll_parameters`."""
-        return roll_parameters(self._engine, self._mechanism, (x, us, wrenches), plan, kappa)
+        path = x, us, self._engine.external(wrenches)
+        return roll_parameters(self._engine, self._request(*selection), path, kappa)
 
     def sweep(
         self,
         path: tuple[Floats, Floats],
         loss: Floats,
-        plan: ParameterPlan,
+        selection: tuple[Parameters, ParameterPlan],
         kappa: float | None,
         wrenches: Floats | None,
     ) -> tuple[int, Sweep]:
         """See `adjoint_sweep`."""
-        return adjoint_sweep(self._engine, self._mechanism, (*path, wrenches), loss, plan, kappa)
+        return adjoint_sweep(self._engine, self._request(*selection), (*path, wrenches), loss, kappa)
+
+    def _request(self, found: Parameters, plan: ParameterPlan) -> Request:
+        return Request(self._mechanism, plan, lambda *conversion: self._conversion_columns(found, *conversion))
+
+    def _conversion_columns(self, found: Parameters, x: Vector, interval: float, other: float) -> Floats:
+        """d(x over another interval)/d(parameters), (ndx, n), by central differences: only divided steps need them.
+
+        Both intervals are multiples of the time step, so they grow with it. Contacts have no part in a momentum.
+        """
+        out = np.zeros((self._engine.ndx, len(found.names)))
+        for j, (name, value) in enumerate(zip(found.names, found.values, strict=True)):
+            if name.split(":")[0].split("[")[0] not in _OF_MOMENTUM:
+                continue
+            nudge = _NUDGE * max(abs(float(value)), _LEAST)
+            at = partial(self._converted, name, (interval, other), x)
+            try:
+                ends, weights = [at(value - nudge), at(value + nudge)], (-1.0, 1.0)
+            except ValueError:  # at the bound of its values: ahead of it
+                ends, weights = [at(value + nudge), at(value + 2.0 * nudge)], (4.0, -1.0)
+            steps = self._engine.difference(np.tile(at(value), (2, 1)), np.array(ends))
+            out[:, j] = weights @ steps / (2.0 * nudge)
+        return out
+
+    def _converted(self, name: str, intervals: tuple[float, float], x: Vector, value: float) -> Vector:
+        """x over another interval with another value of a parameter; NaN where it has no velocity there."""
+        mech, h = with_values("derivatives of a divided step", self._mechanism, self._time_step, {name: value})
+        engine, scale = Engine(pack(mech), self._engine.settings), h / self._time_step
+        interval, other = intervals
+        end = Intervals(engine).changed(scale * interval, scale * other, x)
+        return np.full_like(x, np.nan) if end is None else end
 
 
 def _different_names(call: str, wrt: Sequence[str]) -> tuple[str, ...]:

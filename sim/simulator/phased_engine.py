@@ -21,6 +21,7 @@ from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton_gradient import Slopes
 from sim.model.model import Model
 from sim.model.pace import pieces
+from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
 from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.link import link_smooth, link_step
@@ -53,7 +54,7 @@ class PhasedEngine(HighOrderEngine):
 
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings)
-        self._second = Engine(model, settings._replace(order=2))
+        self._second = (DividingEngine if settings.divide else Engine)(model, settings._replace(order=2))
         self._last = threading.local()
 
     def march(self, x: Vector, us: Floats, wrenches: Cube | None = None, kappa: float | None = None) -> March:
@@ -116,21 +117,21 @@ class PhasedEngine(HighOrderEngine):
 
         None in its place where a step is not solved. given: inputs, and external wrenches.
         """
-        model, data, settings = self.linked(link_step), self._second._scratch.table(), self.settings.array(kappa)
+        model, settings = self.linked(link_step), self.settings.array(kappa)
         us, external = given
         t, piece, nq = first, _PIECE, self.sizes.nq
         while t < len(us):
             count = min(piece, len(us) - t)
             means = np.zeros((count + 1, self.nx))
             means[0] = mean
-            rows, solved = slice(t, t + count), 0
+            rows = slice(t, t + count)
             line = rollout.MotionBuffers(
                 means, us[rows], external[rows], out.reports[rows], out.contacts[rows], *self.unknown[:2]
             )
-            for _ in pieces(settings, count):
-                solved = int(rollout.roll(model, data, settings, line, solved))
-                if solved == count or out.reports[t + solved, 0] != Status.SOLVED:
-                    break
+            try:
+                solved = self._second.take_steps(model, line, kappa, np.ones(count, dtype=np.int64))
+            except Interrupted:
+                raise KeyboardInterrupt from None
             nodes = means[1 : solved + 1].copy()
             nodes[:, nq:] = self._second.node_velocities(nodes)
             far = phases.first_far(self._model, self._scratch.table(), settings, self._scheme(), nodes)
@@ -157,11 +158,13 @@ class PhasedEngine(HighOrderEngine):
         try:
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
-            raise Interrupted(Rolled(*stop.result, *self.unknown[:2])) from None
+            knot, xs, reports, contacts = stop.result
+            none, whole = self.unknown[:2], np.ones(len(us), dtype=np.int64)
+            raise Interrupted(Rolled(knot, xs, reports, contacts, none[0], none[1], whole)) from None
         A, B = self.unknown[:2]
         if derivatives:
             A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B)
+        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, np.ones(len(us), dtype=np.int64))
 
     def far(self) -> NDArray[np.bool_]:
         """As Engine.far; all of them where the step was of higher order."""
@@ -253,7 +256,7 @@ class PhasedEngine(HighOrderEngine):
         none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
         out = np.eye(self.ndx)
         legendre.legendre_slopes(
-            self._model, self._scratch.table(), self.settings.time_step, none, mean, slopes, by_q, by_mean
+            self._model, self._scratch.table(), self._second.interval(mean), none, mean, slopes, by_q, by_mean
         )
         out[nv:] = np.linalg.solve(slopes.p_v, np.hstack([by_q - slopes.p_q, by_mean]))
         return out

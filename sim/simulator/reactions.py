@@ -30,7 +30,7 @@ from sim.mechanism.parts import WORLD, Joint
 from sim.mechanism.shapes import rotation_matrix
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.simulator.engine import Engine
+from sim.simulator.engine import Divided, Engine
 from sim.simulator.results import Result
 from solvers.status import MESSAGES, Status
 
@@ -115,22 +115,48 @@ def reactions(
     loops = [(m, loop) for m, loop in enumerate(mech.loops) if not is_weld(loop)]
     names = (*mech.joint_names, *(loop.name for _, loop in loops))
     out = np.full((5, len(states), len(names), 3), np.nan)
-    status, detail, h = Status.SOLVED, "", engine.settings.time_step
+    status, detail = Status.SOLVED, ""
     for k, (state, control) in enumerate(zip(states, us, strict=True)):
         rolled = engine.roll(state, control[None], None if wrenches is None else wrenches[k : k + 1])
         if rolled.knot == 0:
             if status == Status.SOLVED:
                 status, detail = Status(int(rolled.reports[0, 0])), explain(call, rolled.reports[0], state)
             continue
-        data = engine.last()
-        rows = [_tree_joint(joint, i, engine.model, data, h, frame) for i, joint in enumerate(mech.joints)]
-        rows += [_loop_joint(mech, loop, m, engine.model, data, h, frame) for m, loop in loops]
-        for n, row in enumerate(rows):
-            out[:, k, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
+        if rolled.substeps[0] == 1:
+            out[:, k] = _rows(mech, engine, loops, frame)
+        else:
+            external = engine.external(wrenches)[k : k + 1]
+            divided = engine.divide(state, control, external)
+            out[:, k] = np.nan if divided is None else _mean_rows(mech, divided, (control, external), loops, frame)
         if status == Status.SOLVED and not np.isfinite(out[:, k]).all():
             status, detail = Status.NOT_FINITE, f"{call}: {MESSAGES[Status.NOT_FINITE]}"
     point, force, torque, held_force, held_torque = out.reshape(5, *lead, len(names), 3)
     return Reactions(names, frame, point, force, torque, held_force, held_torque, status, detail)
+
+
+def _rows(mech: Mechanism, engine: Engine, loops: list[tuple[int, Joint]], frame: str) -> Floats:
+    """(5, n, 3) of all joints in the last step of the engine."""
+    data, h = engine.last(), engine.settings.time_step
+    rows = [_tree_joint(joint, i, engine.model, data, h, frame) for i, joint in enumerate(mech.joints)]
+    rows += [_loop_joint(mech, loop, m, engine.model, data, h, frame) for m, loop in loops]
+    out = np.zeros((5, len(rows), 3))
+    for n, row in enumerate(rows):
+        out[:, n] = row.point, *(row.wrench @ row.axes), *(row.constraint @ row.axes)
+    return out
+
+
+def _mean_rows(
+    mech: Mechanism, divided: Divided, given: tuple[Floats, Floats], loops: list[tuple[int, Joint]], frame: str
+) -> Floats:
+    """As `_rows` of a divided step: points where it begins, means of the wrenches of its parts."""
+    control, external = given
+    parts = []
+    for x in divided.rolled.xs[:-1]:
+        divided.engine.roll(x, control[None], external)
+        parts.append(_rows(mech, divided.engine, loops, frame))
+    out = np.mean(parts, axis=0)
+    out[0] = parts[0][0]
+    return np.asarray(out)
 
 
 def _tree_joint(joint: Joint, i: int, model: Model, data: Data, h: float, frame: str) -> _Row:

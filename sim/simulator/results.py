@@ -134,6 +134,7 @@ class StepResult(Result):
     residual: float  # largest error of a balance or gap equation [N s, m]
     violation: float  # largest |product - kappa| of the complementary pairs
     scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
+    substeps: int = 1  # that it was divided into
     detail: str = ""
 
     @cached_property
@@ -157,6 +158,7 @@ class Trajectory(Result):
     residual: float  # of the last step that was tried
     iterations: Integers  # (T,)
     contacts: Contacts
+    substeps: Integers  # (T,) that each step was divided into
     detail: str = ""
     wrenches: Floats | None = None  # (T, nbody, 6) external ones, if there were any [N, N m]
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.derivatives.parameters.directions import At
+from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.parameters.height_columns import height_jacobian
 from sim.derivatives.parameters.parameter_jacobian import parameter_jacobian
 from sim.derivatives.parameters.parameters import ParameterPlan
@@ -13,7 +16,7 @@ from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.mechanism.mechanism import Mechanism
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Engine, Rolled
+from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Engine, Rolled
 from sim.simulator.link import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
@@ -63,31 +66,95 @@ def adjoint_products(engine: Engine, line: Sweep, kappa: float | None) -> int:
     return -1
 
 
+class Request(NamedTuple):
+    """Requested parameters of a simulator."""
+
+    mechanism: Mechanism
+    plan: ParameterPlan
+    # d(x over another interval)/d(parameters), (ndx, n), of (x, its interval, the other one)
+    change: Callable[[Vector, float, float], Floats]
+
+    def of_parts(self, parts: int) -> Request:
+        """The same for the parts of a step, which last 1/parts of a time step."""
+        weights = self.plan.weights.copy()
+        weights[self.plan.terms[:, 0] == Effect.TIME_STEP] /= parts
+        return self._replace(plan=self.plan._replace(weights=weights))
+
+
+class Slopes(NamedTuple):
+    """Derivatives of one step."""
+
+    A: Floats  # (ndx, ndx)
+    B: Floats  # (ndx, nu)
+    x_next: Vector  # (nx,)
+    report: Vector  # (6,)
+    J: Floats  # (ndx, n) by parameters; zeros where the step was not solved
+
+
+def step_slopes(
+    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], kappa: float | None, *, whole: bool = True
+) -> Slopes:
+    """Derivatives of the step (state, input, external wrenches (1 or 0, nbody, 6)), divided where necessary.
+
+    whole: whether to try it as a whole.
+    """
+    x, u, external = step
+    J = np.zeros((engine.ndx, request.plan.size))
+    if whole:
+        A, B, x_next, reports = Engine.linearize(engine, x[None], u[None], 1, kappa, None, external)
+        out = Slopes(A[0], B[0], x_next[0], reports[0], J)
+        if out.report[0] == Status.SOLVED:
+            return out._replace(J=parameter_columns(engine, request.mechanism, (x, u), out.A, request.plan))
+        if int(out.report[0]) not in DIVISIBLE:
+            return out
+    else:
+        unsolved = np.zeros(REPORT)
+        unsolved[0] = Status.NO_PROGRESS
+        out = Slopes(np.zeros((engine.ndx, engine.ndx)), np.zeros((engine.ndx, engine.nu)), x, unsolved, J)
+    divided = engine.divide(x, u, external, kappa, derivatives=True)
+    return out if divided is None else _divided_slopes(engine, request, (x, u, external), divided, kappa)
+
+
+def _divided_slopes(
+    engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], divided: Divided, kappa: float | None
+) -> Slopes:
+    """Of a divided step: the products of those of its parts and of the conversions at both ends."""
+    x, u, external = step
+    parts, h = divided.parts, divided.engine.settings.time_step
+    first, last = divided.rolled.xs[0], divided.rolled.xs[-1]
+    path = first, np.repeat(u[None], parts, axis=0), np.repeat(external, parts, axis=0)
+    level = None if kappa is None else kappa / parts
+    rolled, Js = roll_parameters(divided.engine, request.of_parts(parts), path, level)
+    ahead, back = engine.conversions(x, divided)
+    A, B, J = ahead, np.zeros((engine.ndx, engine.nu)), request.change(x, engine.interval(x), h)
+    for dx, du, dp in zip(rolled.A, rolled.B, Js, strict=True):
+        A, B, J = dx @ A, dx @ B + du, dx @ J + dp
+    J = back @ J + request.change(last, h, engine.interval(divided.x))
+    return Slopes(back @ A, back @ B, divided.x, divided.report(), J)
+
+
 def roll_parameters(
-    engine: Engine,
-    mech: Mechanism,
-    path: tuple[Vector, Floats, Floats | None],
-    plan: ParameterPlan,
-    kappa: float | None,
+    engine: Engine, request: Request, path: tuple[Vector, Floats, Floats], kappa: float | None
 ) -> tuple[Rolled, Floats]:
-    """A rollout with its derivatives, and d(next state)/d(parameters) (T, ndx, n); path: state, inputs, wrenches."""
+    """A rollout with its derivatives, and d(next state)/d(parameters) (T, ndx, n).
+
+    path: state, inputs, external wrenches (T or 0, nbody, 6).
+    """
     x, us, wrenches = path
     n = len(us)
     xs, reports = np.zeros((n + 1, engine.nx)), np.zeros((n, REPORT))
     A, B = np.zeros((n, engine.ndx, engine.ndx)), np.zeros((n, engine.ndx, engine.nu))
-    J = np.zeros((n, engine.ndx, plan.size))
+    J = np.zeros((n, engine.ndx, request.plan.size))
     xs[0], knot = x, n
     for t, u in enumerate(us):
-        external = None if wrenches is None else wrenches[t : t + 1]
-        A[t], B[t], xs[t + 1], reports[t] = engine.linearize_one(xs[t], u, kappa, external)
-        if reports[t, 0] == Status.SOLVED:
-            J[t] = parameter_columns(engine, mech, (xs[t], u), A[t], plan)
-            if not np.isfinite(J[t]).all():
-                reports[t, 0] = Status.NOT_FINITE
+        A[t], B[t], xs[t + 1], reports[t], J[t] = step_slopes(engine, request, (xs[t], u, wrenches[t : t + 1]), kappa)
+        if reports[t, 0] == Status.SOLVED and not np.isfinite(J[t]).all():
+            reports[t, 0] = Status.NOT_FINITE
         if reports[t, 0] != Status.SOLVED:
             knot = t
             break
-    return Rolled(knot, xs, reports, np.zeros((0, engine.sizes.ncontact, CONTACT)), A, B), J
+    contacts, substeps = np.zeros((0, engine.sizes.ncontact, CONTACT)), np.ones(n, dtype=np.int64)
+    return Rolled(knot, xs, reports, contacts, A, B, substeps), J
 
 
 def _add_heights(mech: Mechanism, plan: ParameterPlan, coefficients: Floats, out: Floats) -> None:
@@ -99,10 +166,9 @@ def _add_heights(mech: Mechanism, plan: ParameterPlan, coefficients: Floats, out
 
 def adjoint_sweep(
     engine: Engine,
-    mech: Mechanism,
+    request: Request,
     path: tuple[Floats, Floats, Floats | None],
     loss: Floats,
-    plan: ParameterPlan,
     kappa: float | None,
 ) -> tuple[int, Sweep]:
     """(the step that was not solved or -1, gradients) of a loss with the gradient `loss` by the states of the path.
@@ -110,7 +176,7 @@ def adjoint_sweep(
     path: states, inputs, external wrenches.
     """
     xs, us, wrenches = path
-    sizes = engine.sizes
+    sizes, plan = engine.sizes, request.plan
     line = Sweep(
         xs=xs,
         us=us,
@@ -136,10 +202,30 @@ def adjoint_sweep(
     model, data = engine.tables(*needs[: 2 if plan.size else 0])
     settings, left = engine.settings.array(kappa), len(us)
     line.costate[0] = loss[-1]
-    for _ in pieces(settings, left):
-        left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left))
-        if left == 0 or line.report[0, 0] != Status.SOLVED:
+    while left:
+        for _ in pieces(settings, left):
+            left = int(sweep(model, data, settings, line, plan.terms, plan.weights, left))
+            if left == 0 or line.report[0, 0] != Status.SOLVED:
+                break
+        if left == 0 or not _sweep_divided(engine, request, line, kappa, left - 1):
             break
+        left -= 1
     if len(plan.heights):
-        _add_heights(mech, plan, line.heights, line.parameters[None])
+        _add_heights(request.mechanism, plan, line.heights, line.parameters[None])
     return left - 1, line
+
+
+def _sweep_divided(engine: Engine, request: Request, line: Sweep, kappa: float | None, t: int) -> bool:
+    """The sweep over step t, which could not be solved as a whole; False where division does not solve it."""
+    if int(line.report[0, 0]) not in DIVISIBLE:
+        return False
+    step = line.xs[t], line.us[t], line.wrenches[t : t + 1]
+    slopes = step_slopes(engine, request, step, kappa, whole=False)
+    if slopes.report[0] != Status.SOLVED:
+        return False
+    line.report[0] = 0.0
+    costate = line.costate[0].copy()
+    line.inputs[t] = slopes.B.T @ costate
+    line.parameters[:] += slopes.J.T @ costate
+    line.costate[0] = slopes.A.T @ costate + line.loss[t]
+    return True

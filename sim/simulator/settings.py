@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD
+from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
 __all__ = ["Settings", "default_kappa", "free_parts"]
@@ -25,13 +27,17 @@ class Settings(NamedTuple):
     tolerance: float
     max_iterations: int
     order: int = 2  # of a step
+    divide: bool = True  # whether steps that cannot be solved are divided
+    gain: float = LARGEST_GAIN  # largest gain of energy of a solved step, of the energies that change in it
+    loss: float = inf  # largest loss where nothing dissipates, likewise
 
     def array(self, kappa: float | None = None) -> Vector:
-        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without the order,
-        which chooses the kernels.
+        """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without those
+        that choose an engine.
         """
         level = self.kappa if kappa is None else kappa
-        return np.array((self.time_step, level, self.tolerance, self.max_iterations, np.inf), dtype=np.float64)
+        limits = self.max_iterations, inf, self.gain, self.loss
+        return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

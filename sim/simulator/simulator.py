@@ -49,7 +49,7 @@ Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 Feedback = Callable[[float, Floats], ArrayLike]
 
-_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order")
+_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide")
 _ORDERS = (2, 4, 6, 8)
 
 
@@ -64,6 +64,8 @@ class Simulator(StateSpace):
     order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum
                     is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
                     grows. Steps that would omit impulses kappa / gap beyond the tolerance are of order 2
+    divide          whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps,
+                    as few as it needs; `substeps` of results says where. Momentum is handed on exactly
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
     With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
@@ -82,28 +84,32 @@ class Simulator(StateSpace):
         tolerance: float = 1e-8,
         max_iterations: int = 500,
         order: int = 2,
+        divide: bool = True,
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
         if not isinstance(max_iterations, int | np.integer) or max_iterations < 1:
             raise ValueError(f"Simulator(max_iterations=...): expected a whole number >= 1, got {max_iterations!r}")
+        if not isinstance(divide, bool | np.bool_):
+            raise TypeError(f"Simulator(divide=...): expected True or False, got {divide!r}")
         if order not in _ORDERS:
             raise ValueError(f"Simulator(order=...): expected one of {_ORDERS}, got {order!r}")
         h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
         level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
         accuracy = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
-        super().__init__(mechanism, Settings(h, level, accuracy, int(max_iterations), int(order)))
+        super().__init__(mechanism, Settings(h, level, accuracy, int(max_iterations), int(order), bool(divide)))
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._given().values())
 
     def _given(self) -> dict[str, Any]:
         """The settings as given: kappa None for the default."""
-        return {**self._engine.settings._asdict(), "kappa": self._kappa}
+        given = {name: getattr(self._engine.settings, name) for name in _SETTINGS}
+        return {**given, "kappa": self._kappa}
 
     def __repr__(self) -> str:
-        numbers = ", ".join(f"{name}={value:g}" for name, value in self._engine.settings._asdict().items())
+        numbers = ", ".join(f"{name}={value:g}" for name, value in zip(_SETTINGS, self._engine.settings, strict=False))
         return f"Simulator({self.mechanism.name}, {numbers})"
 
     def replace(self, **settings: Any) -> Simulator:
@@ -157,7 +163,8 @@ class Simulator(StateSpace):
         detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], rolled.xs[0])
         scene = (self.mechanism, self.time_step, rolled.contacts[0])
         end = rolled.xs[1 if rolled.knot else 0]
-        found = StepResult(end, STATUSES[int(status)], int(iterations), residual, violation, scene, detail)
+        parts = int(rolled.substeps[0])
+        found = StepResult(end, STATUSES[int(status)], int(iterations), residual, violation, scene, parts, detail)
         return ended(found, throw) if throw else found
 
     def rollout(
@@ -207,6 +214,7 @@ class Simulator(StateSpace):
         us = np.zeros((count, self.nu))
         xs, reports = np.zeros((count + 1, self.nx)), np.zeros((count, REPORT))
         contacts: list[Floats] = []
+        substeps = np.ones(count, dtype=np.int64)
         xs[0], knot = x, 0
         try:
             for k in range(count):
@@ -215,14 +223,17 @@ class Simulator(StateSpace):
                 one = self._engine.roll(xs[k], us[k : k + 1], None if wrenches is None else wrenches[k : k + 1])
                 reports[k], xs[k + 1] = one.reports[0], one.xs[1]
                 contacts.append(one.contacts[0])
+                substeps[k] = one.substeps[0]
                 if one.knot == 0:
                     break
                 knot = k + 1
         except KeyboardInterrupt:
             reports = interrupted(reports, knot)
-            done = Rolled(knot, xs, reports, np.array(contacts), *self._engine.unknown[:2])
+            A, B = self._engine.unknown[:2]
+            done = Rolled(knot, xs, reports, np.array(contacts), A, B, substeps)
             raise Interrupted((us, done) if knot else None) from None
-        return us, Rolled(knot, xs, reports, np.array(contacts), *self._engine.unknown[:2])
+        A, B = self._engine.unknown[:2]
+        return us, Rolled(knot, xs, reports, np.array(contacts), A, B, substeps)
 
     def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
         """A rollout under the inputs (T, nu)."""
@@ -239,6 +250,7 @@ class Simulator(StateSpace):
             residual=float(last[2]),
             iterations=reports[:knot, 1].astype(np.int64),
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
+            substeps=rolled.substeps[:knot],
             detail="" if status == Status.SOLVED else self._sentence(f"Simulator.rollout: step {knot}", last, xs[knot]),
             wrenches=None if wrenches is None else wrenches[:knot],
         )
@@ -399,14 +411,15 @@ class Simulator(StateSpace):
         level = self._arguments.kappa("linearize", kappa)
         external = self._arguments.wrenches("linearize", wrenches, 1)
         selected = None if wrt is None else self._by_parameters.select(f"{call}(wrt=...)", wrt)
-        A, B, x_next, report = self._engine.linearize_one(state, us, level, external)
-        blocks = {"state": A, "input": B}
+        if selected is None or not selected[1].names:
+            A, B, x_next, report = self._engine.linearize_one(state, us, level, external)
+            blocks = {"state": A, "input": B}
+        else:
+            rolled, J = self._by_parameters.roll(state, us[None], selected[1:], level, external)
+            (A,), (B,), x_next, report = rolled.A, rolled.B, rolled.xs[1], rolled.reports[0]
+            blocks = {"state": A, "input": B} | {name: J[0][:, rows] for name, rows in selected[1].rows.items()}
         if selected is not None and report[0] == Status.SOLVED:
-            asked, found, plan = selected
-            J = self._by_parameters.columns((state, us), A, plan)
-            if not np.isfinite(J).all():
-                report[0] = Status.NOT_FINITE
-            blocks = {name: blocks[name] if name in blocks else J[:, found.rows[name]] for name in asked}
+            blocks = {name: blocks[name] for name in selected[0]}
         detail = "" if report[0] == Status.SOLVED else sentence(self.mechanism, call, report, self.tolerance)
         status, accuracy = Status(int(report[0])), float(report[5])
         return ended(Jacobian(blocks, x_next, status, accuracy, detail, wrt is not None), throw)
@@ -439,9 +452,8 @@ class Simulator(StateSpace):
         level, external = self._arguments.kappa(call, kappa), self._arguments.wrenches(call, wrenches, len(inputs))
         blocks: dict[str, Floats] = {}
         if wrt and (selected := self._by_parameters.select(f"Simulator.{call}(wrt=...)", wrt))[1].names:
-            _, found, plan = selected
-            rolled, J = self._by_parameters.roll(state, inputs, plan, level, external)
-            blocks = {name: J[:, :, rows] for name, rows in found.rows.items()}
+            rolled, J = self._by_parameters.roll(state, inputs, selected[1:], level, external)
+            blocks = {name: J[:, :, rows] for name, rows in selected[1].rows.items()}
         else:
             rolled = self._engine.roll(state, inputs, external, kappa=level, derivatives=True)
         knot, reports, detail = rolled.knot, rolled.reports, ""
@@ -548,7 +560,7 @@ class Simulator(StateSpace):
         path = (self._arguments.states(f"{call}(trajectory)", rows), inputs)
         external = self._arguments.wrenches("vjp", wrenches, len(inputs))
         level = self._arguments.kappa("vjp", kappa)
-        knot, line = self._by_parameters.sweep(path, loss, plan, level, external)
+        knot, line = self._by_parameters.sweep(path, loss, (found, plan), level, external)
         blocks = {"state": line.costate[0], "input": line.inputs}
         blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
         if knot >= 0:

@@ -13,6 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.model.model import Model
 from sim.simulator.arguments import Arguments, shaped
+from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
 from sim.simulator.settings import Settings
@@ -23,7 +24,7 @@ Floats = NDArray[np.float64]
 def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine:
     """The engine of an order; the modules of higher orders are imported by simulators that have one."""
     if settings.order == 2:
-        return Engine(model, settings)
+        return DividingEngine(model, settings) if settings.divide else Engine(model, settings)
     from sim.simulator.high_order_engine import HighOrderEngine, check
 
     check(mechanism, settings)
@@ -41,7 +42,7 @@ class StateSpace:
 
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
-        self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order = settings
+        self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order, self.divide = settings[:6]
         self.model = pack(mechanism)
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)

@@ -1,7 +1,12 @@
-"""States from a velocity at a node: the mean velocity of the interval before it that has the node's momentum."""
+"""States from a velocity at a node: the mean velocity of the interval before it that has the node's momentum.
+
+Where a body turns by half a turn or more in a step, poses cannot tell a mean velocity: velocities of such states are
+those of the node, M(q)^-1 p, means over next to no time.
+"""
 
 from __future__ import annotations
 
+from sim.dynamics.coordinates import node_poses
 from sim.dynamics.elimination import factor, project, solve, subtree_sums
 from sim.dynamics.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.dynamics.kinematics import velocity_columns
@@ -12,8 +17,11 @@ from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.solve.residual import rounding
 from solvers.compiler import Table, kernel
+from solvers.dense import copy_vector
 from solvers.status import Status
-from solvers.types import Vector
+from solvers.types import Matrix, Vector
+
+SHORTEST = 1e-6  # interval of velocities of nodes, in steps
 
 
 @kernel
@@ -82,22 +90,12 @@ def newton_direction(model: Model, data: Data, h: float, v: Vector) -> bool:
 
 
 @kernel
-def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector) -> int:
-    """Solve p(q, v15) = M(q) velocity for v15 by Newton's method with backtracking.
+def _meet_momentum(model: Model, data: Data, h: float, scale: float, x: Vector) -> int:
+    """Solve p(q, v15) = target, which is in data.nu, for the v15 of x by Newton's method with backtracking.
 
-    x: [q; first guess of v15], its velocities are overwritten; velocity: (nv,).
+    scale: size of the momenta [N s], by which the error is judged.   x: [q; first guess of v15].
     """
-    nv = velocity.shape[0]
-    nq = x.shape[0] - nv
-    v = x[nq:]
-    momentum_error(model, data, h, x, velocity, data.residual)  # for the poses
-    momentum_of_velocity(model, data, velocity, data.nu)
-    for d in range(nv):
-        data.rhs[d] = 0.0
-    add_spring_momentum(model, h, x[:nq], v, data.rhs)
-    scale = 1.0
-    for d in range(nv):  # a stiff spring is rounded like its own half impulse
-        scale = max(scale, abs(data.nu[d]), abs(data.rhs[d]))
+    v = x[data.theta1.shape[0] :]
     error = momentum_error(model, data, h, x, data.nu, data.residual)
     for _ in range(50):
         _turn_back(data)
@@ -109,28 +107,85 @@ def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector)
             return Status.SOLVED.value
         if not newton_direction(model, data, h, v):
             return Status.SINGULAR.value
-        for d in range(nv):
-            data.nu_trial[d] = v[d]
-        alpha = 1.0
-        while alpha > 1e-6:
-            for d in range(nv):
-                v[d] = data.nu_trial[d] + alpha * data.dnu[d]
-            trial = momentum_error(model, data, h, x, data.nu, data.residual)
-            _turn_back(data)
-            if trial < error and turns_below_half(model, data, h, v):
-                break
-            alpha *= 0.5
-        if alpha <= 1e-6:
-            for d in range(nv):
-                v[d] = data.nu_trial[d]
-            return (
-                Status.SOLVED.value if error <= 1e-11 * scale + rounding(model, data, h) else Status.NO_PROGRESS.value
-            )
+        trial = _backtrack(model, data, h, error, x)
+        if not trial < error:
+            rounded = error <= 1e-11 * scale + rounding(model, data, h)
+            return Status.SOLVED.value if rounded else Status.NO_PROGRESS.value
         error = trial
     return Status.MAX_ITERATIONS.value
+
+
+@kernel
+def _backtrack(model: Model, data: Data, h: float, error: float, x: Vector) -> float:
+    """The error after the longest step v15 + alpha dnu that lowers it; v15 and `error` as before where none does."""
+    v = x[data.theta1.shape[0] :]
+    copy_vector(v, data.nu_trial)
+    alpha = 1.0
+    while alpha > 1e-6:
+        for d in range(v.shape[0]):
+            v[d] = data.nu_trial[d] + alpha * data.dnu[d]
+        trial = momentum_error(model, data, h, x, data.nu, data.residual)
+        _turn_back(data)
+        if trial < error and turns_below_half(model, data, h, v):
+            return trial
+        alpha *= 0.5
+    copy_vector(data.nu_trial, v)
+    return error
+
+
+@kernel
+def _momentum_scale(model: Model, data: Data, h: float, x: Vector) -> float:
+    """Size of the target in data.nu, at least 1; a stiff spring is rounded like its own half impulse."""
+    nq = data.theta1.shape[0]
+    for d in range(data.rhs.shape[0]):
+        data.rhs[d] = 0.0
+    add_spring_momentum(model, h, x[:nq], x[nq:], data.rhs)
+    scale = 1.0
+    for d in range(data.rhs.shape[0]):
+        scale = max(scale, abs(data.nu[d]), abs(data.rhs[d]))
+    return scale
+
+
+@kernel
+def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector) -> int:
+    """Solve p(q, v15) = M(q) velocity for v15.
+
+    x: [q; first guess of v15], its velocities are overwritten; velocity: (nv,).
+    """
+    momentum_error(model, data, h, x, velocity, data.residual)  # for the poses
+    momentum_of_velocity(model, data, velocity, data.nu)
+    return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
 
 
 @kernel
 def start_at(model_at: Table, data_at: Table, h: float, velocity: Vector, x: Vector) -> int:
     """`start_state` from tables."""
     return start_state(model_view(model_at), data_view(data_at), h, velocity, x)
+
+
+@kernel
+def change_interval(model_at: Table, data_at: Table, h: float, other: float, x: Vector) -> int:
+    """Solve p(q, v'; other) = p(q, v15; h): the mean velocity over another interval that has the node's momentum.
+
+    x: [q; v15], its velocities are overwritten.
+    """
+    model = model_view(model_at)
+    data = data_view(data_at)
+    for d in range(data.nu.shape[0]):
+        data.rhs[d] = 0.0
+    momentum_error(model, data, h, x, data.rhs, data.nu)
+    return _meet_momentum(model, data, other, _momentum_scale(model, data, other, x), x)
+
+
+@kernel
+def intervals(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Vector) -> None:
+    """out[t] = interval of the velocity of the state xs[t]: h, or SHORTEST h if a body would turn by half a turn in h.
+
+    xs: (n, nx); out: (n,) [s].
+    """
+    model = model_view(model_at)
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
+    for t in range(xs.shape[0]):
+        node_poses(model, data, h, xs[t])
+        out[t] = h if turns_below_half(model, data, h, xs[t, nq:]) else SHORTEST * h

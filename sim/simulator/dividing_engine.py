@@ -1,0 +1,326 @@
+"""Engine that divides steps: one that cannot be solved, or turns a body too far, becomes 2, 4, ... steps of order 2.
+
+The parts are steps of h/n at kappa/n, so contacts press with the same force kappa/(n h/n gap) at the same gap. The
+momentum of the node is handed on at both ends, to rounding (intervals.py): the mean velocity of a state over its
+interval becomes that over h/n which has the same momentum, and after n steps the other way round.
+
+A divided step depends on its state and input alone, never on the steps before it, and neither does the next one. Its
+derivatives are the products of those of its parts and of both conversions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from sim.integrators.feedback import Path
+from sim.integrators.rollout import MotionBuffers
+from sim.model.layout import CARRY
+from sim.model.model import Model
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Engine, Floats, Law
+from sim.simulator.intervals import Intervals
+from sim.simulator.link import link_step
+from sim.simulator.results import Interrupted
+from sim.simulator.settings import Settings
+from sim.solve.start_velocity import SHORTEST
+from solvers.compiler import Table
+from solvers.status import Status
+from solvers.types import Cube, Integers, Vector
+
+__all__ = ["LARGEST_DIVISION", "DividingEngine"]
+
+LARGEST_DIVISION = 1024  # parts of a step
+
+_PART = 0.01  # largest gain or loss of energy in a part, of the energies that change
+_PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
+
+
+def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
+    """Steps `first` to first + count of a motion, as a motion of their own; reports that were not kept stay so."""
+    last = first + count
+    reports = motion.reports[first:last] if len(motion.reports) == len(motion.us) else motion.reports
+    return MotionBuffers(
+        motion.xs[first : last + 1],
+        motion.us[first:last],
+        motion.wrenches[first:last],
+        reports,
+        motion.contacts[first:last],
+        motion.A[first:last],
+        motion.B[first:last],
+    )
+
+
+class DividingEngine(Engine):
+    """The kernels of one packed mechanism, with steps of order 2 that are divided where that is necessary."""
+
+    def __init__(self, model: Model, settings: Settings) -> None:
+        super().__init__(model, settings._replace(loss=settings.gain))
+        self.intervals = Intervals(self)
+        self._engines: dict[int, Engine] = {}  # of parts, by their number
+
+    def part(self, parts: int) -> Engine:
+        """The engine of the parts of a step."""
+        if parts not in self._engines:
+            s = self.settings
+            short = s._replace(time_step=s.time_step / parts, kappa=s.kappa / parts, gain=_PART, loss=_PART)
+            self._engines[parts] = Engine(self.model, short)
+        return self._engines[parts]
+
+    # -- one step ------------------------------------------------------------------------------------------------------
+
+    def divide(
+        self,
+        start: tuple[Vector, float] | Vector,
+        u: Vector,
+        wrench: Cube,
+        kappa: float | None = None,
+        *,
+        derivatives: bool = False,
+    ) -> Divided | None:
+        """The step under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
+
+        start: a state (nx,), or one of parts with their time step. None where LARGEST_DIVISION parts are not enough.
+        """
+        parts = 2
+        while parts <= LARGEST_DIVISION:
+            found = self._in_parts(parts, start, (u, wrench), kappa, derivatives)
+            if found is not None:
+                return found
+            parts *= 2
+        return None
+
+    def _in_parts(
+        self,
+        parts: int,
+        start: tuple[Vector, float] | Vector,
+        given: tuple[Vector, Cube],
+        kappa: float | None,
+        derivatives: bool,
+    ) -> Divided | None:
+        engine = self.part(parts)
+        part, (u, wrench) = engine.settings.time_step, given
+        x, interval = start if isinstance(start, tuple) else (start, self.intervals.of_one(start))
+        first = self.intervals.changed(interval, part, x)
+        if first is None:
+            return None
+        us, wrenches = np.repeat(u[None], parts, axis=0), np.repeat(wrench, parts, axis=0)
+        level = None if kappa is None else kappa / parts
+        rolled = engine.roll(first, us, wrenches, kappa=level, derivatives=derivatives)
+        if rolled.knot < parts:
+            return None
+        last = rolled.xs[-1]
+        end = self.intervals.from_part(last, part)
+        if end is None and derivatives:  # a state that is not exact has none
+            return None
+        return Divided(engine, rolled, last if end is None else end, end is not None)
+
+    def interval(self, x: Vector) -> float:
+        """That of the velocity of the state x [s]."""
+        return self.intervals.of_one(x)
+
+    def conversions(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+        """Derivatives of the conversions at both ends of a divided step from x, (ndx, ndx)."""
+        xs, part = divided.rolled.xs, divided.engine.settings.time_step
+        return self.intervals.slopes(x, part, xs[0]), self.intervals.slopes_back(xs[-1], part, divided.x)
+
+    def slopes(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
+        """(A, B) of a divided step from x: the product of the derivatives of its parts and of both conversions."""
+        A, back = self.conversions(x, divided)
+        B = np.zeros((self.ndx, self.nu))
+        for dx, du in zip(divided.rolled.A, divided.rolled.B, strict=True):
+            A, B = dx @ A, dx @ B + du
+        return back @ A, back @ B
+
+    # -- motions -------------------------------------------------------------------------------------------------------
+
+    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers) -> int:
+        """As Engine.take_steps, with division."""
+        return self._march_on(model, motion, kappa, substeps, super().take_steps(model, motion, kappa, substeps))
+
+    def _march_on(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers, knot: int) -> int:
+        """Go on from the step `knot`, which was not solved."""
+        steps, piece = len(motion.us), _PIECE
+        try:
+            while knot < steps:
+                divided = self._divide_row(motion, knot, kappa, substeps, None)
+                while divided is not None:
+                    knot += 1
+                    if divided.exact or knot == steps:
+                        break
+                    start = divided.rolled.xs[-1], divided.engine.settings.time_step
+                    divided = self._divide_row(motion, knot, kappa, substeps, start)
+                if divided is None or knot == steps:
+                    break
+                done = count = 0
+                while knot < steps and done == count:
+                    rest = _rows(motion, knot, min(piece, steps - knot))
+                    count = len(rest.us)
+                    done = super().take_steps(model, rest, kappa, substeps[knot : knot + count])
+                    knot, piece = knot + done, (min(2 * piece, _LARGEST_PIECE) if done == count else _PIECE)
+                if done == count:
+                    break
+        except KeyboardInterrupt as stop:
+            raise Interrupted(knot + (stop.result if isinstance(stop, Interrupted) else 0)) from None
+        return knot
+
+    def _divide_row(
+        self,
+        motion: MotionBuffers,
+        knot: int,
+        kappa: float | None,
+        substeps: Integers,
+        start: tuple[Vector, float] | None,
+    ) -> Divided | None:
+        """Divide the step `knot` of a motion, which was not solved, or begins at the parts' state `start`."""
+        report = motion.reports[min(knot, len(motion.reports) - 1)]
+        if start is None and int(report[0]) not in DIVISIBLE:
+            return None
+        derivatives = len(motion.A) > 0
+        x, wrench = motion.xs[knot], motion.wrenches[knot : knot + 1]
+        divided = self.divide(start or x, motion.us[knot], wrench, kappa, derivatives=derivatives)
+        if divided is None:
+            if start is not None:
+                report[:] = Status.ANGULAR_STEP, 0.0, 0.0, 0.0, -1.0, 0.0
+            return None
+        motion.xs[knot + 1] = divided.x
+        report[:] = divided.report()
+        substeps[knot] = divided.parts
+        if len(motion.contacts):
+            motion.contacts[knot] = divided.contacts()
+        if derivatives:
+            motion.A[knot], motion.B[knot] = self.slopes(x, divided)
+        return divided
+
+    def _follow(self, law: Law, settings: Vector, substeps: int, path: Path, first: int) -> int:
+        """As Engine._follow, with division."""
+        steps = len(path.us) * substeps
+        done = super()._follow(law, settings, substeps, path, first)
+        while (
+            done < steps and int(path.report[0]) in DIVISIBLE and self._divide_shot(law, settings, substeps, path, done)
+        ):
+            done += 1
+            if done < steps:
+                done = super()._follow(law, settings, substeps, path, done)
+        return done
+
+    def _divide_shot(self, law: Law, settings: Vector, substeps: int, path: Path, done: int) -> bool:
+        """Divide the unsolved step of a closed loop after `done` solved ones; False where that does not solve it."""
+        policy, alpha, _ = law
+        t, s = divmod(done, substeps)
+        data = self.last()
+        x, total = data.step_x[0].copy(), path.report[REPORT]
+        divided = self.divide(x, path.us[t], policy.wrenches[t : t + 1], settings[1])
+        if divided is None:
+            return False
+        path.xs[t + 1] = divided.x
+        path.report[:REPORT] = divided.report()
+        path.report[REPORT] = total + path.report[1]
+        for name in CARRY:  # the next step does not continue the attempt that failed
+            getattr(data, name)[...] = 0
+        if s + 1 == substeps:
+            parts = divided.engine.last()
+            data.cone[...], data.bound[...] = parts.cone, parts.bound
+            if len(path.cones):
+                path.cones[t], path.bounds[t] = parts.cone, parts.bound
+            if alpha < 1.0:
+                path.xs[t + 1] = self.integrate(path.xs[t + 1 : t + 2], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+        if done + 1 == len(path.us) * substeps:
+            path.report[1] = path.report[REPORT]
+        return True
+
+    def roll_batch(self, x0s: Floats, us: Floats) -> tuple[Floats, Integers, Integers]:
+        """As Engine.roll_batch; rollouts with divided steps end on one core."""
+        xs, status, knots = super().roll_batch(x0s, us)
+        model = self.linked(link_step)
+        for i in np.flatnonzero(np.isin(status, list(DIVISIBLE))):
+            report = np.zeros((1, REPORT))
+            report[0, 0] = status[i]
+            motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.unknown[:2])
+            try:
+                knots[i] = self._march_on(model, motion, None, np.ones(len(us[i]), dtype=np.int64), int(knots[i]))
+            except Interrupted as stop:
+                knots[i], status[i] = stop.result, Status.INTERRUPTED
+                raise Interrupted((xs, status, knots)) from None
+            status[i] = int(report[0, 0])
+        return xs, status, knots
+
+    def linearize(
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
+    ) -> tuple[Floats, ...]:
+        """As Engine.linearize, with division."""
+        A, B, x_next, reports = super().linearize(xs, us, substeps, kappa, guess, wrenches)
+        external = self.external(wrenches)
+        for t in np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE))):
+            held = np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(external[t : t + 1], substeps, axis=0)
+            rolled = self.roll(xs[t], *held, kappa=kappa, derivatives=True)
+            reports[t] = rolled.reports[min(rolled.knot, substeps - 1)]
+            if rolled.knot < substeps:
+                continue
+            A[t], B[t], x_next[t] = np.eye(self.ndx), 0.0, rolled.xs[-1]
+            reports[t, 5] = rolled.reports[:, 5].max()
+            for dx, du in zip(rolled.A, rolled.B, strict=True):
+                A[t], B[t] = dx @ A[t], dx @ B[t] + du
+        return A, B, x_next, reports
+
+    # -- single states -------------------------------------------------------------------------------------------------
+
+    def start(self, q: Vector, v: Vector, h: float | None = None) -> tuple[int, Vector]:
+        """As Engine.start; where a body turns by half a turn in a step, v is the velocity of the state."""
+        x = np.concatenate([q, v])
+        if h is None and self.intervals.of_one(x) < self.settings.time_step:
+            return int(Status.SOLVED), x
+        return super().start(q, v, h)
+
+    def _at_intervals(self, xs: Floats, call: Callable[..., Floats], *sizes: int) -> Floats:
+        """A call for every row at its own interval."""
+        out = call(xs, *sizes)
+        taus = self.intervals.of(xs)
+        for t in np.flatnonzero(taus < self.settings.time_step):
+            out[t] = call(xs[t : t + 1], *sizes, taus[t])[0]
+        return out
+
+    def node_velocities(self, xs: Floats, h: float | None = None) -> Floats:
+        """As Engine.node_velocities, rows at their own intervals."""
+        call = super().node_velocities
+        return call(xs, h) if h else self._at_intervals(xs, call)
+
+    def energies(self, xs: Floats, h: float | None = None) -> Floats:
+        """As Engine.energies, rows at their own intervals."""
+        call = super().energies
+        return call(xs, h) if h else self._at_intervals(xs, call)
+
+    def momenta(self, xs: Floats, h: float | None = None) -> Floats:
+        """As Engine.momenta, rows at their own intervals."""
+        call = super().momenta
+        return call(xs, h) if h else self._at_intervals(xs, call)
+
+    def maximal(self, xs: Floats, nbody: int, h: float | None = None) -> Floats:
+        """As Engine.maximal, rows at their own intervals."""
+        call = super().maximal
+        return call(xs, nbody, h) if h else self._at_intervals(xs, call, nbody)
+
+    def minimal(self, zs: Floats, h: float | None = None) -> Floats:
+        """As Engine.minimal, rows at their own intervals."""
+        if h:
+            return super().minimal(zs, h)
+        out, step = super().minimal(zs), self.settings.time_step
+        spins = np.linalg.norm(zs[..., 10:], axis=-1).max(axis=1)
+        for t in np.flatnonzero(step * spins >= math.pi):
+            out[t] = super().minimal(zs[t : t + 1], SHORTEST * step)[0]
+        return out
+
+    def maximal_jacobian(self, x: Vector, nbody: int, h: float | None = None) -> Floats:
+        """As Engine.maximal_jacobian, at the interval of the state."""
+        return super().maximal_jacobian(x, nbody, h or self.intervals.of_one(x))
+
+    def minimal_jacobian(self, z: Floats, h: float | None = None) -> Floats:
+        """As Engine.minimal_jacobian, at the interval of the state."""
+        return super().minimal_jacobian(z, h or self.intervals.of_one(self.minimal(z[None])[0]))
