@@ -33,7 +33,7 @@ __all__ = ["LARGEST_DIVISION", "DividingEngine"]
 
 LARGEST_DIVISION = 1024  # parts of a step
 
-_PART = 0.01  # largest gain or loss of energy in a part, of the energies that change
+_PART = 1e-3  # largest gain or loss of energy in a part, of the energies that change
 _PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
 
 
