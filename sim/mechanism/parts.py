@@ -130,6 +130,11 @@ class Joint:
         return KINDS[self.kind][1]
 
     @property
+    def lead(self) -> float:
+        """Displacement along the axis per radian of the rotation about it [m/rad]; 0 of a hinge."""
+        return 0.0
+
+    @property
     def nv(self) -> int:
         """Number of degrees of freedom."""
         return self.ntrans + self.nrot

@@ -41,7 +41,7 @@ def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: M
 
     o: joint point on the child; t: from that on the parent to it.
     """
-    if 0 < model.joint_ntrans[i] < 3:
+    if 0 < model.joint_ntrans[i] < 3 or model.joint_lead[i] != 0.0:
         x = cross(a[0], a[1], a[2], t[0], t[1], t[2])
         for k in range(3):
             out[0, k] = x[k]
@@ -97,6 +97,10 @@ def _joint_twist(
         s0 += y * x[0]
         s1 += y * x[1]
         s2 += y * x[2]
+    if model.joint_lead[i] != 0.0:
+        y = q[model.body_qadr[i + 1] - 1] * model.joint_lead[i]
+        x = model.joint_axis[i]
+        s0, s1, s2 = s0 + y * x[0], s1 + y * x[1], s2 + y * x[2]
     t = (Q[0] * s0 + Q[1] * s1 + Q[2] * s2, Q[3] * s0 + Q[4] * s1 + Q[5] * s2, Q[6] * s0 + Q[7] * s1 + Q[8] * s2)
     c = model.joint_child_point[i]
     c0, c1, c2 = rotate(rot, i, c[0], c[1], c[2])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics.coordinates import joint_frame, translation_axis
+from sim.dynamics.joints.coordinates import joint_frame, translation_axis
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import (
