@@ -37,7 +37,7 @@ def test_spinning_body_keeps_its_angular_momentum(time_step):
 
 
 @pytest.mark.parametrize("tolerance", [1e-13, 1e-8])
-@pytest.mark.parametrize("kind", ["revolute", "spherical", "free_orbital", "planar"])
+@pytest.mark.parametrize("kind", ["revolute", "spherical", "free_orbital", "planar", "screw"])
 def test_neither_rounding_nor_tolerance_add_up(kind, tolerance, rng):
     """Five thousand steps of 0.1 ms, ten metres from the origin: momentum as good as one step is solved."""
     sim = dojo.Simulator(chain(kind, 2), time_step=1e-4, tolerance=tolerance)
