@@ -9,7 +9,8 @@ from support.scenes import KINDS, chain, free_body, random_state, run
 
 def rest(kind):
     """A rest position that is not the neutral one."""
-    ntrans, nrot = dojo.Joint(kind, None, "b").ntrans, dojo.Joint(kind, None, "b").nrot
+    joint = chain(kind, 1).joints[-1]
+    ntrans, nrot = joint.ntrans, joint.nrot
     return [0.1, -0.05, 0.07][:ntrans] + [0.3, -0.2, 0.1][:nrot]
 
 

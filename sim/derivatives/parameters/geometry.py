@@ -82,6 +82,16 @@ def _point_twist(model: Model, effect: int, i: int, k: int, at: Configuration, o
 
 
 @kernel
+def _lead_twist(model: Model, i: int, at: Configuration, out: Matrix) -> None:
+    """The body of joint i moves along the axis, by the angle about it; to its column `_add_lead` adds the axis."""
+    t = model.joint_axis[i]
+    a = rotate(at.rot, i, t[0], t[1], t[2])
+    y = at.q[model.body_qadr[i + 1] - 1]
+    for j in range(3):
+        out[0, j] = y * a[j]
+
+
+@kernel
 def _turn_twist(model: Model, O: Vector, effect: int, i: int, k: int, at: Configuration, out: Matrix) -> None:
     """The joint frame, or the directions of motion in it, turn about axis k of that frame; O: the common point."""
     e = unit_vector(k)
@@ -108,6 +118,8 @@ def _joint_twist(model: Model, data: Data, effect: int, i: int, k: int, at: Conf
             out[r, j] = 0.0
     if effect == Effect.PARENT_POINT or effect == Effect.CHILD_POINT:
         _point_twist(model, effect, i, k, at, out)
+    elif effect == Effect.LEAD:
+        _lead_twist(model, i, at, out)
     else:
         _turn_twist(model, data.origin, effect, i, k, at, out)
 
@@ -123,6 +135,16 @@ def _mark_below(model: Model, i: int, below: Vector) -> None:
     for b in range(below.shape[0]):
         p = model.body_parent[b]
         below[b] = 1.0 if b == i or (p >= 0 and below[p] > 0.0) else 0.0
+
+
+@kernel
+def _add_lead(model: Model, data: Data, at: At, i: int, w: float, col: int) -> None:
+    """a . f of the column (a, 0) that a lead adds to that of the rotation; f: residual force on the subtree of i."""
+    d = model.body_vadr[i + 1] - 1
+    s = data.S2[d]
+    for b in range(i, at.below.shape[0]):
+        f = data.wrench[b]
+        data.columns[d, col] -= w * at.below[b] * (s[3] * f[0] + s[4] * f[1] + s[5] * f[2])
 
 
 @kernel
@@ -147,6 +169,8 @@ def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, 
             X[d, col] -= w * _dot(data.S2[d], F)
         p = model.body_parent[p]
     _mark_below(model, i, at.below)
+    if effect == Effect.LEAD:
+        _add_lead(model, data, at, i, w, col)
     for b in range(i + 1, at.below.shape[0]):
         if at.below[b] > 0.0:
             for d in range(model.body_vadr[b], model.body_vadr[b + 1]):
