@@ -11,12 +11,12 @@ displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
 from __future__ import annotations
 
-from sim.dynamics.joints.motion import Increment, joint_turn, lead_on, slide, swing_columns, turned_columns
+from sim.dynamics.joints.motion import Increment, lead_on, moved_columns, slide, turn_on
 from sim.dynamics.kinematics import displace
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
-from solvers.rotation import Mat3, Quat, quat_mul, rows_of, times
+from solvers.rotation import Mat3, Quat, Vec3, quat_mul, rows_of, times
 from solvers.types import Matrix, Vector
 
 
@@ -29,6 +29,18 @@ def turn_matrix(T: Quat) -> Mat3:
         2.0 * (x * y + c * z), -2.0 * (x * x + z * z), 2.0 * (y * z - c * x),
         2.0 * (x * z - c * y), 2.0 * (y * z + c * x), -2.0 * (x * x + y * y),
     )  # fmt: skip
+
+
+@kernel
+def parent_move(data: Data, i: int, p: int, move: Matrix, turn: Matrix) -> tuple[Quat, Mat3, Vec3]:
+    """Turn T and E = R(T) - I of the parent p of body i, and the displacement of the joint frame; none of the world."""
+    if p < 0:
+        return (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    arm = data.arm[i]
+    E = rows_of(data.turn_matrix, p)
+    x, y, z = times(E, arm[0], arm[1], arm[2])
+    t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
+    return t, E, (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
 
 
 @kernel
@@ -52,14 +64,7 @@ def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
         arm = data.arm[i]
-        t = (1.0, 0.0, 0.0, 0.0)
-        E = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        dx = (0.0, 0.0, 0.0)
-        if p >= 0:
-            t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
-            E = rows_of(data.turn_matrix, p)
-            x, y, z = times(E, arm[0], arm[1], arm[2])
-            dx = (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
+        t, E, dx = parent_move(data, i, p, move, turn)
         if model.joint_ntrans[i] > 0:
             dx = slide(model, data, by, i, E, dx, S)
         dx = lead_on(model, data, by, i, E, dx)
@@ -68,17 +73,11 @@ def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
             data.pos2[i, 1] - O[1] + arm[4] + dx[1],
             data.pos2[i, 2] - O[2] + arm[5] + dx[2],
         )
-        n = model.joint_nrot[i]
-        if n > 0:
-            e = joint_turn(model, data, by, i)
-            t = quat_mul(t[0], t[1], t[2], t[3], e[0], e[1], e[2], e[3])
-            if t[0] < 0.0:
-                t = (-t[0], -t[1], -t[2], -t[3])
-            if n != 2:
-                turned_columns(model, data, i, E, o, S)
-            E = turn_matrix(t)
-            if n == 2:
-                swing_columns(model, data, theta, i, E, o, S)
+        if model.joint_nrot[i] > 0:
+            t = turn_on(model, data, by, i, t)
+            F = turn_matrix(t)
+            moved_columns(model, data, theta, i, E, F, o, S)
+            E = F
         x, y, z = times(E, arm[3], arm[4], arm[5])
         dx = (dx[0] - x, dx[1] - y, dx[2] - z)
         for k in range(9):

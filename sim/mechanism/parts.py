@@ -89,8 +89,8 @@ class Joint:
 
     kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
     prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating, screw. The
-    plane of the planar kinds is across the axis; orbital kinds turn about all but the axis, the last four but the screw
-    about all.
+    plane of the planar kinds is across the axis; orbital kinds turn about all but the axis, those from spherical to
+    floating about all, a screw about the axis that it moves along.
     """
 
     kind: str

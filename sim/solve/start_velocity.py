@@ -82,6 +82,27 @@ def newton_direction(model: Model, data: Data, h: float, v: Vector) -> bool:
 
 
 @kernel
+def _backtrack(model: Model, data: Data, h: float, x: Vector, error: float) -> float:
+    """The error after the longest of dnu, dnu/2, ... that makes it less; 1e300 and x as it was without one."""
+    nv = data.nu.shape[0]
+    v = x[x.shape[0] - nv :]
+    for d in range(nv):
+        data.nu_trial[d] = v[d]
+    alpha = 1.0
+    while alpha > 1e-6:
+        for d in range(nv):
+            v[d] = data.nu_trial[d] + alpha * data.dnu[d]
+        trial = momentum_error(model, data, h, x, data.nu, data.residual)
+        _turn_back(data)
+        if trial < error and turns_below_half(model, data, h, v):
+            return trial
+        alpha *= 0.5
+    for d in range(nv):
+        v[d] = data.nu_trial[d]
+    return 1e300
+
+
+@kernel
 def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector) -> int:
     """Solve p(q, v15) = M(q) velocity for v15 by Newton's method with backtracking.
 
@@ -109,20 +130,8 @@ def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector)
             return Status.SOLVED.value
         if not newton_direction(model, data, h, v):
             return Status.SINGULAR.value
-        for d in range(nv):
-            data.nu_trial[d] = v[d]
-        alpha = 1.0
-        while alpha > 1e-6:
-            for d in range(nv):
-                v[d] = data.nu_trial[d] + alpha * data.dnu[d]
-            trial = momentum_error(model, data, h, x, data.nu, data.residual)
-            _turn_back(data)
-            if trial < error and turns_below_half(model, data, h, v):
-                break
-            alpha *= 0.5
-        if alpha <= 1e-6:
-            for d in range(nv):
-                v[d] = data.nu_trial[d]
+        trial = _backtrack(model, data, h, x, error)
+        if not trial < error:
             return (
                 Status.SOLVED.value if error <= 1e-11 * scale + rounding(model, data, h) else Status.NO_PROGRESS.value
             )

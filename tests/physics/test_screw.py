@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,23 @@ def test_a_screw_is_a_hinge_on_a_slide_in_gear(rng) -> None:
     np.testing.assert_allclose(a[:, :7], b[:, :7], atol=1e-8)
     np.testing.assert_allclose(a[:, 7], b[:, 8], atol=1e-8)
     assert a[:, 7].min() < -0.39, "it meets the stop"
+
+
+def test_a_hinge_and_a_slide_that_an_mjcf_file_couples_are_a_screw(tmp_path: Path) -> None:
+    """MJCF has no screw, but a linear <joint> equality, which becomes a gear."""
+    pytest.importorskip("mujoco")
+    path = tmp_path / "nut.xml"
+    path.write_text(f"""
+    <mujoco><worldbody><body name="nut">
+      <joint name="slide" type="slide" axis="0 0 1"/><joint name="turn" type="hinge" axis="0 0 1"/>
+      <geom type="box" contype="0" conaffinity="0" size="0.1 0.12 0.05" mass="2"/>
+    </body></worldbody>
+    <equality><joint joint1="slide" joint2="turn" polycoef="0 {LEAD} 0 0 0"/></equality></mujoco>
+    """)
+    loaded = dojo.load_mjcf(path)
+    screw = dojo.Mechanism(loaded.bodies, [dojo.Joint("screw", None, "nut", pitch=PITCH)])
+    a, b = (
+        sim.rollout(sim.neutral(), steps=200, throw=True).x[-1]
+        for sim in (dojo.Simulator(mech, time_step=1e-3, tolerance=1e-12) for mech in (loaded, screw))
+    )
+    np.testing.assert_allclose(a, [LEAD * b[0], b[0], LEAD * b[1], b[1]], rtol=1e-9)

@@ -10,7 +10,7 @@ radian, as a screw does; that of a hinge is zero. With Q the joint frame and o t
                translation, lead    dx + q E t + h v (t + E t)
                rotation             turn exp(h sum_k v_k a_k)
 
-Everything else in `sim` sees poses and columns only, whatever the kind of a joint.
+The walks down the tree (kinematics.py, displacements.py) see poses and columns only, whatever the kind of a joint.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.dynamics.joints.swing import swing_pose, swing_turn
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import inlined, kernel
-from solvers.rotation import Mat3, Quat, Vec3, cross, quat_exp, quat_matrix, rotate, times
+from solvers.rotation import Mat3, Quat, Vec3, cross, quat_exp, quat_matrix, quat_mul, rotate, times
 from solvers.types import Matrix, Vector
 
 
@@ -145,6 +145,16 @@ def joint_turn(model: Model, data: Data, by: Increment, i: int) -> Quat:
 
 
 @kernel
+def turn_on(model: Model, data: Data, by: Increment, i: int, t: Quat) -> Quat:
+    """The turn t of the parent, then that of joint i; with a scalar part that is not negative."""
+    e = joint_turn(model, data, by, i)
+    r = quat_mul(t[0], t[1], t[2], t[3], e[0], e[1], e[2], e[3])
+    if r[0] < 0.0:
+        return -r[0], -r[1], -r[2], -r[3]
+    return r
+
+
+@kernel
 def slide(model: Model, data: Data, by: Increment, i: int, E: Mat3, dx: Vec3, S: Matrix) -> Vec3:
     """dx + sum_k q_k E t_k + h v_k (t_k + E t_k) over the translations of joint i; E of the parent, S their columns."""
     x, y, z = dx
@@ -200,3 +210,12 @@ def swing_columns(model: Model, data: Data, theta: Vector, i: int, E: Mat3, o: V
     x, y, z = rotate(data.rot2, i, second[0], second[1], second[2])
     e = times(E, x, y, z)
     axis_column(S, d + 1, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
+
+
+@inlined
+def moved_columns(model: Model, data: Data, theta: Vector, i: int, E: Mat3, F: Mat3, o: Vec3, S: Matrix) -> None:
+    """Columns of the rotations of joint i at theta, through o from O; E: of the parent, F: of its body."""
+    if model.joint_nrot[i] == 2:
+        swing_columns(model, data, theta, i, F, o, S)
+    else:
+        turned_columns(model, data, i, E, o, S)
