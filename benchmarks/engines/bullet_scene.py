@@ -42,6 +42,8 @@ def check(model: Model) -> None:
         raise ValueError("PyBullet: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("PyBullet: terrain and restitution are not represented")
+    if np.any(model.joint_lead):
+        raise ValueError("PyBullet: joints that turn and slide in one are not represented")
     several = (model.joint_ntrans > 0) & (model.joint_ntrans + model.joint_nrot > 1)
     if np.any(several & ~np.array([is_free(model, i) for i in range(len(several))])):
         raise ValueError("PyBullet: joints with several translations are not represented")

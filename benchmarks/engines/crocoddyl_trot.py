@@ -102,7 +102,8 @@ def pinocchio_model(model: Model) -> tuple[Any, list[int]]:
     """
     import pinocchio as pin
 
-    if model.joint_nrot[0] != 3 or model.joint_ntrans[0] != 3 or np.any(model.joint_nrot[1:] != 1):
+    others = np.any(model.joint_nrot[1:] != 1) or np.any(model.joint_lead)
+    if model.joint_nrot[0] != 3 or model.joint_ntrans[0] != 3 or others:
         raise ValueError("pinocchio_model(model): expected a floating base, and hinges")
     robot = pin.Model()
     robot.gravity.linear = np.array(model.gravity)

@@ -139,6 +139,8 @@ def _joints(model: Model, body: int, hinges: bool) -> list[str]:
     axes = model.joint_trans_axes[body].reshape(3, 3)
     if nrot == 2 and not hinges:
         raise ValueError(f"mjcf: MuJoCo has no joint that turns across an axis and not about it (body {body})")
+    if model.joint_lead[body] != 0.0:
+        raise ValueError(f"mjcf: MuJoCo has no joint that turns and slides in one (body {body})")
     if np.any(model.limit_cone[(model.limit_dof >= first) & (model.limit_dof < first + ntrans + nrot)]):
         raise ValueError(f"mjcf: MuJoCo has no cone limit (body {body})")
     lines = [_scalar(model, first + k, "slide", axes[k], {}) for k in range(ntrans)]

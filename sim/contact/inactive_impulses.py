@@ -16,7 +16,8 @@ from sim.model.columns import Cluster, Cone, Inactive, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from solvers.compiler import inlined, kernel
-from solvers.rotation import cross, put_three, rotate, three, transposed_times
+from solvers.rotation import Vec3, cross, put_three, rotate, three, transposed_times
+from solvers.types import Vector
 
 
 @kernel
@@ -92,6 +93,25 @@ def turn_arms(model: Model, data: Data, c: int) -> None:
 
 
 @kernel
+def _slip_coefficients(row: Vector, R: Vector, f: Vector, k: int) -> tuple[float, float, Vec3]:
+    """t.v, (t x omega).n and R^T (t x omega), t at k in the frame f of a contact."""
+    x, y, z = cross(f[k], f[k + 1], f[k + 2], *three(row, Inactive.ANGULAR))
+    v = f[k] * row[Inactive.VELOCITY] + f[k + 1] * row[Inactive.VELOCITY + 1] + f[k + 2] * row[Inactive.VELOCITY + 2]
+    return v, f[0] * x + f[1] * y + f[2] * z, transposed_times(R, x, y, z)
+
+
+@kernel
+def _keep_arms(row: Vector, n: Vec3, x: Vec3, y: Vec3) -> None:
+    """Inactive.ARMS = sums of p times the impulses along n, t1 and t2; they turn with the body: Inactive.BY_TURN."""
+    turning = abs(n[0]) + abs(n[1]) + abs(n[2]) + abs(x[0]) + abs(x[1]) + abs(x[2])
+    turning = turning + abs(y[0]) + abs(y[1]) + abs(y[2])
+    row[Inactive.BY_TURN] = turning / (1.0 - NEARER)
+    put_three(n, Inactive.ARMS, row)
+    put_three(x, Inactive.ARMS + 3, row)
+    put_three(y, Inactive.ARMS + 6, row)
+
+
+@kernel
 def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     """The row of `inactive` and the cone variables of a cluster at configuration 3: affine in p and the radius rho,
 
@@ -100,18 +120,11 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
     i = model.contact_body[c]
     row = data.inactive[c]
     keep_motion(data, h, i, row)
-    f = model.contact_frame[c]
-    R = data.rot3
-    x, y, z = cross(f[3], f[4], f[5], *three(row, Inactive.ANGULAR))
-    a0, a1, a2 = transposed_times(R[i], x, y, z)
-    ra = f[0] * x + f[1] * y + f[2] * z
-    x, y, z = cross(f[6], f[7], f[8], *three(row, Inactive.ANGULAR))
-    b0, b1, b2 = transposed_times(R[i], x, y, z)
-    rb = f[0] * x + f[1] * y + f[2] * z
-    n0, n1, n2 = transposed_times(R[i], f[0], f[1], f[2])
+    f, R = model.contact_frame[c], data.rot3[i]
+    va, ra, (a0, a1, a2) = _slip_coefficients(row, R, f, 3)
+    vb, rb, (b0, b1, b2) = _slip_coefficients(row, R, f, 6)
+    n0, n1, n2 = transposed_times(R, f[0], f[1], f[2])
     D = f[0] * row[Inactive.POSITION] + f[1] * row[Inactive.POSITION + 1] + f[2] * row[Inactive.POSITION + 2]
-    va = f[3] * row[Inactive.VELOCITY] + f[4] * row[Inactive.VELOCITY + 1] + f[5] * row[Inactive.VELOCITY + 2]
-    vb = f[6] * row[Inactive.VELOCITY] + f[7] * row[Inactive.VELOCITY + 1] + f[8] * row[Inactive.VELOCITY + 2]
     N, X, Y, rX, rY = 0.0, 0.0, 0.0, 0.0, 0.0
     N0, N1, N2, X0, X1, X2, Y0, Y1, Y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     kappa = data.inactive_kappa[0]
@@ -139,13 +152,9 @@ def _evaluate(model: Model, data: Data, h: float, c: int) -> None:
         Y0, Y1, Y2 = Y0 + fy * p[0], Y1 + fy * p[1], Y2 + fy * p[2]
     row[Inactive.LEAST_GAP] = least
     bound_changes(model, data, c, (1.0 - NEARER) * least)
-    turning = abs(N0) + abs(N1) + abs(N2) + abs(X0) + abs(X1) + abs(X2) + abs(Y0) + abs(Y1) + abs(Y2)
-    row[Inactive.BY_TURN] = turning / (1.0 - NEARER)  # the arms of the impulses turn with the body
+    _keep_arms(row, (N0, N1, N2), (X0, X1, X2), (Y0, Y1, Y2))
     for k in range(3):
         row[Inactive.FORCE + k] = N * f[k] + X * f[3 + k] + Y * f[6 + k]
-    put_three((N0, N1, N2), Inactive.ARMS, row)
-    put_three((X0, X1, X2), Inactive.ARMS + 3, row)
-    put_three((Y0, Y1, Y2), Inactive.ARMS + 6, row)
     row[Inactive.RADIUS_ARMS], row[Inactive.RADIUS_ARMS + 1], row[Inactive.TURNED] = rX, rY, 0.0
     turn_arms(model, data, c)
 

@@ -47,24 +47,37 @@ def loop_stiffness(model: Model, data: Data, m: int, K2: Matrix) -> Vec3:
 @kernel
 def _torque_rate(model: Model, data: Data, m: int, a: int, row: int, e: Vec3, side: int) -> Vec3:
     """Change of the constraint torque of loop m when a (side 0) or b (side 1) turns by e at configuration 2."""
-    Q = data.loop_frame[m]
     if model.loop_nrot[m] == 1:
-        s = model.loop_axis[m]
-        r = rotate(data.rot2, a, s[6], s[7], s[8])
-        x, y, z = 0.0, 0.0, 0.0
-        for i in range(2):
-            g = data.couple_force[row + i]
-            t = times(Q, g * s[3 * i], g * s[3 * i + 1], g * s[3 * i + 2])
-            x += t[0]
-            y += t[1]
-            z += t[2]
-        if side == 0:
-            d = cross(e[0], e[1], e[2], r[0], r[1], r[2])
-            return cross(d[0], d[1], d[2], x, y, z)
-        d = cross(e[0], e[1], e[2], x, y, z)
-        return cross(r[0], r[1], r[2], d[0], d[1], d[2])
-    if model.loop_nrot[m] != 0:
-        return 0.0, 0.0, 0.0
+        return _axis_torque_rate(model, data, m, a, row, e, side)
+    if model.loop_nrot[m] == 0:
+        return _weld_torque_rate(data, m, a, row, e, side)
+    return 0.0, 0.0, 0.0
+
+
+@kernel
+def _axis_torque_rate(model: Model, data: Data, m: int, a: int, row: int, e: Vec3, side: int) -> Vec3:
+    """`_torque_rate` of a loop about one axis: r x t turns with a by its axis r, with b by t, the rows times forces."""
+    Q = data.loop_frame[m]
+    s = model.loop_axis[m]
+    r = rotate(data.rot2, a, s[6], s[7], s[8])
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(2):
+        g = data.couple_force[row + i]
+        t = times(Q, g * s[3 * i], g * s[3 * i + 1], g * s[3 * i + 2])
+        x += t[0]
+        y += t[1]
+        z += t[2]
+    if side == 0:
+        d = cross(e[0], e[1], e[2], r[0], r[1], r[2])
+        return cross(d[0], d[1], d[2], x, y, z)
+    d = cross(e[0], e[1], e[2], x, y, z)
+    return cross(r[0], r[1], r[2], d[0], d[1], d[2])
+
+
+@kernel
+def _weld_torque_rate(data: Data, m: int, a: int, row: int, e: Vec3, side: int) -> Vec3:
+    """`_torque_rate` of a loop without rotations: M = Q (tr E - E^T) f / 2 turns with b, and E changes by [p] E."""
+    Q = data.loop_frame[m]
     E = data.loop_turn[m]
     relative_rotation(Q, data.rot2, a, E)
     f = (data.couple_force[row], data.couple_force[row + 1], data.couple_force[row + 2])
@@ -74,7 +87,6 @@ def _torque_rate(model: Model, data: Data, m: int, a: int, row: int, e: Vec3, si
         sign * (Q[1] * e[0] + Q[4] * e[1] + Q[7] * e[2]),
         sign * (Q[2] * e[0] + Q[5] * e[1] + Q[8] * e[2]),
     )
-    # M = Q (tr E - E^T) f / 2 turns with b, and E changes by [p] E
     dtrace = -(p[0] * (E[7] - E[5]) + p[1] * (E[2] - E[6]) + p[2] * (E[3] - E[1]))
     c = cross(p[0], p[1], p[2], f[0], f[1], f[2])
     x, y, z = times(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from sim.dynamics.displacements import third_quaternion
-from sim.dynamics.kinematics import axis_column, tree_poses
+from sim.dynamics.joints.motion import axis_column
+from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel

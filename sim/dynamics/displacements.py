@@ -3,7 +3,7 @@
 A velocity is a displacement over h. As a difference of two poses it would carry their rounding, eps |x|/h; here every
 displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
-    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  of a swing see joints/swing.py
+    turn       T = T_parent exp(h sum_k v_k a_k),  a_k the axes of the joint at 2;  see joints/motion.py
     rotation   R = R2 + E R2,   E = R(T) - I
     joint      dx = dx_parent + E_parent (R_parent p_parent) + sum_k q_k E_parent t_k + h v_k (t_k + E_parent t_k)
     body       dx - E (R2 p_child)
@@ -11,41 +11,13 @@ displacement is that of the parent plus that of the joint, rounded to eps |h v|:
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from sim.dynamics.joints.swing import swing_pose, swing_turn
-from sim.dynamics.kinematics import axis_column, displace
+from sim.dynamics.joints.motion import Increment, lead_on, moved_columns, slide, turn_on
+from sim.dynamics.kinematics import displace
 from sim.model.data import Data
 from sim.model.model import Model
-from solvers.compiler import inlined, kernel
-from solvers.rotation import Mat3, Quat, Vec3, quat_exp, quat_mul, rotate, rows_of, times
+from solvers.compiler import kernel
+from solvers.rotation import Mat3, Quat, Vec3, quat_mul, rows_of, times
 from solvers.types import Matrix, Vector
-
-
-class Increment(NamedTuple):
-    """Coordinates at configuration 2, and h v, by which they change."""
-
-    q: Vector  # (nq,)
-    v: Vector  # (nv,)
-    h: float  # time step [s], negative for the way back to configuration 1
-
-
-@kernel
-def joint_turn(model: Model, data: Data, by: Increment, i: int) -> Quat:
-    """Rotation of joint i by its increment, world axes at configuration 2."""
-    n = model.joint_nrot[i]
-    d = model.body_vadr[i + 1] - n
-    if n == 2:
-        a = model.body_qadr[i + 1] - 2
-        c, x, y, z = swing_turn(model, i, by.q[a], by.q[a + 1], by.h * by.v[d], by.h * by.v[d + 1])
-        x, y, z = rotate(data.rot2, i, x, y, z)
-        return c, x, y, z
-    x, y, z = 0.0, 0.0, 0.0
-    for e in range(d, d + n):
-        s = data.S2[e]
-        a = by.h * by.v[e]
-        x, y, z = x + a * s[3], y + a * s[4], z + a * s[5]
-    return quat_exp(x, y, z)
 
 
 @kernel
@@ -60,46 +32,15 @@ def turn_matrix(T: Quat) -> Mat3:
 
 
 @kernel
-def slide(model: Model, data: Data, by: Increment, i: int, E: Mat3, dx: Vec3, S: Matrix) -> Vec3:
-    """dx + sum_k q_k E t_k + h v_k (t_k + E t_k) over the translations of joint i; E of the parent, S their columns."""
-    x, y, z = dx
-    for k in range(model.joint_ntrans[i]):
-        d = model.body_vadr[i] + k
-        t = data.S2[d]
-        s = S[d]
-        g0, g1, g2 = times(E, t[0], t[1], t[2])
-        s[0], s[1], s[2] = t[0] + g0, t[1] + g1, t[2] + g2
-        s[3], s[4], s[5] = 0.0, 0.0, 0.0
-        a = by.q[model.body_qadr[i] + k]
-        b = by.h * by.v[d]
-        x, y, z = x + a * g0 + b * s[0], y + a * g1 + b * s[1], z + a * g2 + b * s[2]
-    return x, y, z
-
-
-@inlined
-def turned_columns(model: Model, data: Data, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
-    """Columns of the rotations of joint i: their axes at 2 turned with the parent, through o from O; E: of the parent.
-
-    Not those of a joint with two rotations.
-    """
-    for d in range(model.body_vadr[i + 1] - model.joint_nrot[i], model.body_vadr[i + 1]):
-        s = data.S2[d]
-        x, y, z = times(E, s[3], s[4], s[5])
-        axis_column(S, d, s[3] + x, s[4] + y, s[5] + z, o[0], o[1], o[2])
-
-
-@kernel
-def swing_columns(model: Model, data: Data, theta: Vector, i: int, E: Mat3, o: Vec3, S: Matrix) -> None:
-    """Columns of a joint with two rotations at the coordinates theta, through o from O; E: of its body."""
-    a = model.body_qadr[i + 1] - 2
-    d = model.body_vadr[i + 1] - 2
-    _, first, second = swing_pose(model, i, theta[a], theta[a + 1])
-    x, y, z = rotate(data.rot2, i, first[0], first[1], first[2])
-    e = times(E, x, y, z)
-    axis_column(S, d, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
-    x, y, z = rotate(data.rot2, i, second[0], second[1], second[2])
-    e = times(E, x, y, z)
-    axis_column(S, d + 1, x + e[0], y + e[1], z + e[2], o[0], o[1], o[2])
+def parent_move(data: Data, i: int, p: int, move: Matrix, turn: Matrix) -> tuple[Quat, Mat3, Vec3]:
+    """Turn T and E = R(T) - I of the parent p of body i, and the displacement of the joint frame; none of the world."""
+    if p < 0:
+        return (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    arm = data.arm[i]
+    E = rows_of(data.turn_matrix, p)
+    x, y, z = times(E, arm[0], arm[1], arm[2])
+    t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
+    return t, E, (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
 
 
 @kernel
@@ -123,32 +64,20 @@ def tree_moves(model: Model, data: Data, by: Increment, third: bool) -> None:
     for i in range(model.body_parent.shape[0]):
         p = model.body_parent[i]
         arm = data.arm[i]
-        t = (1.0, 0.0, 0.0, 0.0)
-        E = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        dx = (0.0, 0.0, 0.0)
-        if p >= 0:
-            t = (turn[p, 0], turn[p, 1], turn[p, 2], turn[p, 3])
-            E = rows_of(data.turn_matrix, p)
-            x, y, z = times(E, arm[0], arm[1], arm[2])
-            dx = (move[p, 0] + x, move[p, 1] + y, move[p, 2] + z)
+        t, E, dx = parent_move(data, i, p, move, turn)
         if model.joint_ntrans[i] > 0:
             dx = slide(model, data, by, i, E, dx, S)
+        dx = lead_on(model, data, by, i, E, dx)
         o = (
             data.pos2[i, 0] - O[0] + arm[3] + dx[0],
             data.pos2[i, 1] - O[1] + arm[4] + dx[1],
             data.pos2[i, 2] - O[2] + arm[5] + dx[2],
         )
-        n = model.joint_nrot[i]
-        if n > 0:
-            e = joint_turn(model, data, by, i)
-            t = quat_mul(t[0], t[1], t[2], t[3], e[0], e[1], e[2], e[3])
-            if t[0] < 0.0:
-                t = (-t[0], -t[1], -t[2], -t[3])
-            if n != 2:
-                turned_columns(model, data, i, E, o, S)
-            E = turn_matrix(t)
-            if n == 2:
-                swing_columns(model, data, theta, i, E, o, S)
+        if model.joint_nrot[i] > 0:
+            t = turn_on(model, data, by, i, t)
+            F = turn_matrix(t)
+            moved_columns(model, data, theta, i, E, F, o, S)
+            E = F
         x, y, z = times(E, arm[3], arm[4], arm[5])
         dx = (dx[0] - x, dx[1] - y, dx[2] - z)
         for k in range(9):

@@ -6,13 +6,11 @@ ancestors times their rates, and the wrench on a subtree the plain sum of the wr
 
 from __future__ import annotations
 
-from math import cos, sin
-
-from sim.dynamics.joints.swing import swing_pose
+from sim.dynamics.joints.motion import joint_rotation, lead_along, rotation_columns, translate
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
-from solvers.rotation import Mat3, Quat, Vec3, cross, left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
+from solvers.rotation import left_jacobian, quat_exp, quat_matrix, quat_mul, rotate, times
 from solvers.types import Matrix, Vector
 
 
@@ -43,77 +41,12 @@ def displace(model: Model, q: Vector, v: Vector, h: float, out: Vector) -> None:
 
 
 @kernel
-def axis_column(S: Matrix, d: int, a0: float, a1: float, a2: float, x: float, y: float, z: float) -> None:
-    """S[d] = (r x a, a): rotation about the axis a through the point r from O."""
-    v0, v1, v2 = cross(x, y, z, a0, a1, a2)
-    S[d, 0] = v0
-    S[d, 1] = v1
-    S[d, 2] = v2
-    S[d, 3] = a0
-    S[d, 4] = a1
-    S[d, 5] = a2
-
-
-@kernel
-def translate(model: Model, q: Vector, i: int, o: Vec3, Q: Quat, S: Matrix) -> Vec3:
-    """o + sum_k q_k R(Q) t_k over the translations of joint i; S: their columns (R(Q) t_k, 0)."""
-    x, y, z = o
-    R = quat_matrix(Q[0], Q[1], Q[2], Q[3])
-    for k in range(model.joint_ntrans[i]):
-        a = q[model.body_qadr[i] + k]
-        s = S[model.body_vadr[i] + k]
-        t = model.joint_trans_axes[i, 3 * k : 3 * k + 3]
-        s[0], s[1], s[2] = times(R, t[0], t[1], t[2])
-        s[3], s[4], s[5] = 0.0, 0.0, 0.0
-        x, y, z = x + a * s[0], y + a * s[1], z + a * s[2]
-    return x, y, z
-
-
-@kernel
-def joint_rotation(model: Model, q: Vector, i: int) -> Quat:
-    """Rotation of joint i at the coordinates q, in its frame on the parent."""
-    a = model.body_qadr[i] + model.joint_ntrans[i]
-    if model.joint_nrot[i] == 1:
-        c = cos(0.5 * q[a])
-        s = sin(0.5 * q[a])
-        t = model.joint_axis[i]
-        return c, s * t[0], s * t[1], s * t[2]
-    if model.joint_nrot[i] == 3:
-        return q[a], q[a + 1], q[a + 2], q[a + 3]
-    if model.joint_nrot[i] == 2:
-        return swing_pose(model, i, q[a], q[a + 1])[0]
-    return 1.0, 0.0, 0.0, 0.0
-
-
-@kernel
-def rotation_columns(model: Model, q: Vector, i: int, R: Mat3, o: Vec3, S: Matrix) -> None:
-    """Columns of the rotations of joint i, through o from O, in axes of its body, whose rotation is R."""
-    n = model.joint_nrot[i]
-    d = model.body_vadr[i + 1] - n
-    if n == 1:  # the axis is the same before and after the rotation
-        t = model.joint_axis[i]
-        x, y, z = times(R, t[0], t[1], t[2])
-        axis_column(S, d, x, y, z, o[0], o[1], o[2])
-    elif n == 2:
-        a = model.body_qadr[i + 1] - 2
-        _, first, second = swing_pose(model, i, q[a], q[a + 1])
-        x, y, z = times(R, first[0], first[1], first[2])
-        axis_column(S, d, x, y, z, o[0], o[1], o[2])
-        x, y, z = times(R, second[0], second[1], second[2])
-        axis_column(S, d + 1, x, y, z, o[0], o[1], o[2])
-    elif n == 3:
-        for k in range(3):
-            axis_column(S, d + k, R[k], R[3 + k], R[6 + k], o[0], o[1], o[2])
-
-
-@kernel
 def tree_poses(model: Model, data: Data, q: Vector) -> None:
     """Poses of all bodies at configuration 2, whose coordinates are q, and unit joint columns about O.
 
-        joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + sum_k q_k R(Q) t_k
+        joint frame   Q = quat_parent offset,   o = pos_parent + R_parent p_parent + displacement of the joint
         body          quat = Q quat_joint(q),   pos = o - R p_child
-        columns       translation (R(Q) t_k, 0);  axis ((o - O) x a, a), a = R(Q) axis, of a swing see joints/swing.py;
-                      quaternion: the axes of the body
+        columns       see joints/motion.py
 
     Fills pos2, quat2, rot2, S2, and arm = (R_parent p_parent, R p_child), without R_parent where that is the world.
     """
@@ -136,6 +69,7 @@ def tree_poses(model: Model, data: Data, q: Vector) -> None:
             t = joint_rotation(model, q, i)
             g = quat_mul(Q[0], Q[1], Q[2], Q[3], t[0], t[1], t[2], t[3])
         R = quat_matrix(g[0], g[1], g[2], g[3])
+        o = lead_along(model, q, i, o, R)
         for k in range(4):
             quat[i, k] = g[k]
         for k in range(9):

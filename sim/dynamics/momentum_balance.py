@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.carry_over import advance, follows_on
-from sim.dynamics.displacements import Increment, move_back, tree_moves
+from sim.dynamics.displacements import move_back, tree_moves
+from sim.dynamics.joints.motion import Increment
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
 from sim.model.model import InputKind, Model

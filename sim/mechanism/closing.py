@@ -1,5 +1,6 @@
-"""Joints that close a loop and do more than constrain: with springs, dampers, armature, limits or inputs; and those
-with two rotations, whose twist-free swing is not an equation between two poses.
+"""Joints that close a loop and do more than constrain: with springs, dampers, armature, limits or inputs; those with
+two rotations, whose twist-free swing is not an equation between two poses; and screws, whose turns two poses do not
+count.
 
 Such a joint becomes one of the tree. It carries a share of the mass and inertia of its child, as a body of its own,
 "child.joint", which is welded to the rest of the child. The discrete Lagrangian of a body is linear in its mass and
@@ -24,14 +25,14 @@ def carried(
 
     driven: names of the joints with an input.   ValueError: a child without a mass to share.
     """
-    acting = [j for j in loops if acts(j) or j.nrot == 2 or (j.name in driven and j.nv > 0)]
+    acting = [j for j in loops if acts(j) or j.nrot == 2 or j.lead != 0.0 or (j.name in driven and j.nv > 0)]
     shares = {name: 1.0 / (1 + n) for name in {j.child for j in acting} if (n := sum(j.child == name for j in acting))}
     whole = {b.name: b for b in bodies}
     for j in acting:
         if j.child in whole and whole[j.child].mass == 0.0:
             raise ValueError(
-                f"{call}: joint {j.name!r} closes a loop with a spring, damper, limit, input or two rotations, for "
-                f"which its child {j.child!r} needs a mass; let a body with a mass be the child"
+                f"{call}: joint {j.name!r} closes a loop with a spring, damper, limit, input, pitch or two "
+                f"rotations, for which its child {j.child!r} needs a mass; let a body with a mass be the child"
             )
     out = [_part(b, b.name, shares[b.name]) if b.name in shares else b for b in bodies]
     out += [replace(_part(whole[j.child], _share(j), shares[j.child]), shape=None) for j in acting if j.child in whole]

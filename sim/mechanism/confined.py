@@ -86,9 +86,10 @@ def _heights(model: Model, body: int, n: Floats, p: Floats) -> Range:
         o = o + R @ model.joint_parent_point[i]
         R = R @ rotation_matrix(model.joint_offset[i])
         count, turns = int(model.joint_ntrans[i]), int(model.joint_nrot[i])
-        if np.any(np.abs(model.joint_trans_axes[i].reshape(3, 3)[:count] @ R.T @ n) > _STILL):
-            return Range(-np.inf, np.inf)
         axis = R @ model.joint_axis[i]
+        slides = [*model.joint_trans_axes[i].reshape(3, 3)[:count] @ R.T, model.joint_lead[i] * axis]
+        if np.any(np.abs(slides @ n) > _STILL):
+            return Range(-np.inf, np.inf)
         if turns > 1 or (turns == 1 and np.linalg.norm(np.cross(axis, n)) > _STILL):
             return _about(model, path[k:], (n, o, R, axis), p, not moved and count == 0)
         moved = moved or count + turns > 0
@@ -117,7 +118,7 @@ def _about(model: Model, path: list[int], at: tuple[Floats, Floats, Floats, Floa
     for i in path[1:]:
         r = r + Q @ model.joint_parent_point[i]
         Q = Q @ rotation_matrix(model.joint_offset[i])
-        if model.joint_ntrans[i] > 0:
+        if model.joint_ntrans[i] > 0 or model.joint_lead[i] != 0.0:
             return Range(-np.inf, np.inf)
         if model.joint_nrot[i] > 0:
             loose = True

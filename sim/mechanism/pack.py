@@ -117,6 +117,7 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
         model.joint_child_point[i] = np.asarray(joint.child_point)
         model.joint_offset[i] = np.asarray(joint.orientation)
         model.joint_axis[i] = np.asarray(joint.axis)
+        model.joint_lead[i] = joint.lead
         model.joint_trans_axes[i] = translation_axes(joint.ntrans, joint.axis).ravel()
         model.joint_swing_axes[i] = translation_axes(2, joint.axis)[:2].ravel()
         model.dof_body[dofs] = i

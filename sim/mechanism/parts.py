@@ -33,6 +33,7 @@ KINDS: dict[str, tuple[int, int]] = {
     "cylindrical_free": (1, 3),
     "planar_free": (2, 3),
     "floating": (3, 3),
+    "screw": (0, 1),  # about the axis, which it moves along by its pitch in every turn
 }
 LAWS = ("impact", "linear", "nonlinear")
 
@@ -79,13 +80,17 @@ class Joint:
     the child's axis from the parent's, for kinds with three rotations [rad]. armature [kg, kg m^2]: inertia that moves
     with a coordinate and with nothing else, as a geared rotor's; none on the rotations of a quaternion.
 
+    pitch: of a screw, the way along the axis per turn [m/rev]: positive for a right-handed thread, negative for a
+    left-handed one. Its coordinate is the angle.
+
     close: the child hangs on another joint already, and this one closes a loop. With a spring, a damper, limits,
-    armature, an input or two rotations it has coordinates of its own, and the child is cut there: a second part of it,
-    the body "child.name", hangs on this joint and is welded to the first (sim/mechanism/closing.py).
+    armature, an input, a pitch or two rotations it has coordinates of its own, and the child is cut there: a second
+    part of it, the body "child.name", hangs on this joint and is welded to the first (sim/mechanism/closing.py).
 
     kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
-    prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating. The plane of
-    the planar kinds is across the axis; orbital kinds turn about all but the axis, the other three about all.
+    prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating, screw. The
+    plane of the planar kinds is across the axis; orbital kinds turn about all but the axis, those from spherical to
+    floating about all, a screw about the axis that it moves along.
     """
 
     kind: str
@@ -103,6 +108,7 @@ class Joint:
     cone: float | None = None
     armature: ArrayLike = 0.0
     close: bool = False
+    pitch: float = 0.0  # [m/rev]
 
     def __post_init__(self) -> None:
         checks.name("Joint(child=...)", self.child)
@@ -118,6 +124,7 @@ class Joint:
             object.__setattr__(self, field, per_dof(call, self, field))
         object.__setattr__(self, "limits", limits_of(f"{call}, limits=...)", self))
         object.__setattr__(self, "cone", cone_of(f"{call}, cone=...)", self))
+        object.__setattr__(self, "pitch", pitch_of(f"{call}, pitch=...)", self))
 
     @property
     def ntrans(self) -> int:
@@ -128,6 +135,11 @@ class Joint:
     def nrot(self) -> int:
         """Number of free rotations."""
         return KINDS[self.kind][1]
+
+    @property
+    def lead(self) -> float:
+        """Displacement along the axis per radian of the rotation about it [m/rad]; 0 of a hinge."""
+        return self.pitch / (2.0 * np.pi)
 
     @property
     def nv(self) -> int:
@@ -315,6 +327,16 @@ def cone_of(call: str, joint: Joint) -> float | None:
     if angle > 3.1:
         raise ValueError(f"{call}: expected an angle below 3.1 rad, got {angle:g}")
     return angle
+
+
+def pitch_of(call: str, joint: Joint) -> float:
+    """The pitch, other than zero, of a screw; zero of other kinds."""
+    pitch = checks.number(call, joint.pitch)
+    if joint.kind == "screw" and pitch == 0.0:
+        raise ValueError(f"{call}: a screw needs the way along its axis per turn [m/rev]; without one it is a revolute")
+    if joint.kind != "screw" and pitch != 0.0:
+        raise ValueError(f"{call}: a {joint.kind} joint has none, got {pitch:g}")
+    return pitch
 
 
 def bounds(call: str, pair: Any) -> tuple[float, float]:

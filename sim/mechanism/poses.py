@@ -36,5 +36,5 @@ def _motion(joint: Joint, q: Floats) -> Pose:
         angle = float(np.linalg.norm(t))
         return Pose(turn(t / angle, angle) if angle > 0.0 else np.eye(3), shift)
     if joint.nrot == 1:
-        return Pose(turn(joint.axis, float(q[-1])), shift)
+        return Pose(turn(joint.axis, float(q[-1])), shift + joint.lead * float(q[-1]) * np.asarray(joint.axis))
     return Pose(rotation_matrix(q[-4:]) if joint.nrot == 3 else np.eye(3), shift)

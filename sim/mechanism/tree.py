@@ -92,14 +92,13 @@ def check_axes(call: str, bodies: Sequence[Body], joints: Sequence[Joint]) -> No
     massless = {b.name for b in bodies if not b.mass > 0.0}
     for joint in joints:
         before = above[joint.parent] if joint.parent in massless and below[joint.parent] == 1 else joint
-        kinds = {before.kind, joint.kind}
-        if before is joint or kinds not in ({"revolute"}, {"prismatic"}):
+        if before is joint or joint.nv != 1 or (before.kind, before.lead) != (joint.kind, joint.lead):
             continue
         if any(np.any(getattr(j, held)) for j in (before, joint) for held in ("spring", "damper", "armature")):
             continue
         axis = rotation_matrix(joint.orientation) @ np.asarray(joint.axis, float)
         apart = np.asarray(joint.parent_point, float) - np.asarray(before.child_point, float)
-        along = (axis, apart) if joint.kind == "revolute" else (axis,)
+        along = (axis, apart) if joint.nrot == 1 else (axis,)
         if max(np.linalg.norm(np.cross(np.asarray(before.axis, float), d)) for d in along) < _ALONG:
             raise ValueError(
                 f"{call}: joints {before.name!r} and {joint.name!r} move along one axis, and body {joint.parent!r} "

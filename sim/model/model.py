@@ -81,6 +81,7 @@ class Model(NamedTuple):
     joint_offset: Matrix  # (nbody, 4) orientation of the joint frame in the parent body, quaternion
     joint_trans_axes: Matrix  # (nbody, 9) free translation directions in the joint frame, one per row
     joint_axis: Matrix  # (nbody, 3) rotation axis of a one-axis joint, axis of a cone limit; joint frame
+    joint_lead: Vector  # (nbody,) displacement along joint_axis per radian about it [m/rad]; 0 of a hinge
     joint_swing_axes: Matrix  # (nbody, 6) the two directions across the axis of a swing, joint frame
     dof_spring: Vector  # (nv,) [N/m, N m/rad]
     dof_damper: Vector  # (nv,) [N s/m, N m s/rad]

@@ -38,8 +38,42 @@ def test_accelerations_are_those_of_mujoco(kind: str) -> None:
     np.testing.assert_allclose(TreeReference(model).accelerations(q, v, u), data.qacc, rtol=1e-7, atol=1e-7)
 
 
-def test_ball_springs_and_dampers_are_those_of_the_simulator() -> None:
-    mech = chain_with("spherical", True)
+@pytest.mark.parametrize("base", ["floating", "screw"])
+def test_accelerations_of_screws_are_those_of_pinocchio(base: str) -> None:
+    """In its coordinates: a quaternion with its scalar last, and velocities of the base in its own axes."""
+    pin = pytest.importorskip("pinocchio")
+    mech = replace(chain_with("screw", False), contacts=())
+    joints = [replace(j, spring=0.0, damper=0.0, rest=0.0) for j in mech.joints if j.child in "abc"]
+    if base == "screw":
+        joints[0] = replace(joints[1], parent=None, child="a", name="a", pitch=0.6)
+    mech = dojo.Mechanism([b for b in mech.bodies if b.name in "abc"], joints)
+    q, v = random_state(np.random.default_rng(8), mech, speed=2.0)
+    robot, ids = pin.Model(), {"world": 0}
+    robot.gravity.linear = np.array(mech.gravity)
+    for body, joint in zip(mech.bodies, mech.joints, strict=True):
+        parent = next((j for j in mech.joints if j.child == joint.parent), None)
+        point = np.asarray(joint.parent_point) - (np.asarray(parent.child_point) if parent else 0.0)
+        place = pin.SE3(pin.Quaternion(*joint.orientation).toRotationMatrix(), point)
+        kinds = {
+            "floating": pin.JointModelComposite(pin.JointModelTranslation()),
+            "revolute": pin.JointModelRevoluteUnaligned(np.array(joint.axis)),
+            "screw": pin.JointModelHelicalUnaligned(np.array(joint.axis), joint.lead),
+        }
+        if joint.kind == "floating":
+            kinds["floating"].addJoint(pin.JointModelSpherical())
+        ids[body.name] = robot.addJoint(ids[joint.parent or "world"], kinds[joint.kind], place, joint.name)
+        inertia = pin.Inertia(body.mass, -np.asarray(joint.child_point), np.array(body.inertia))
+        robot.appendBodyToJoint(ids[body.name], inertia, pin.SE3.Identity())
+    theirs = q.copy()
+    if base == "floating":
+        theirs[3:7] = np.roll(q[3:7], -1)
+    exact = pin.aba(robot, robot.createData(), theirs, v, np.zeros(mech.nv))
+    np.testing.assert_allclose(TreeReference(pack(mech)).accelerations(q, v), exact, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["spherical", "screw"])
+def test_springs_and_dampers_are_those_of_the_simulator(kind: str) -> None:
+    mech = chain_with(kind, True)
     mech = dojo.Mechanism(mech.bodies, [replace(j, damper=0.05) for j in mech.joints])
     q, v = random_state(np.random.default_rng(3), mech)
     sim = dojo.Simulator(mech, time_step=0.005, order=8, tolerance=1e-13)

@@ -20,7 +20,7 @@ from support import parameter_errors as parameters
 from support.situations import CASES
 
 
-@pytest.mark.parametrize("kind", ["fixed", "revolute", "planar_orbital", "spherical"])
+@pytest.mark.parametrize("kind", ["fixed", "revolute", "planar_orbital", "spherical", "screw"])
 def test_joints_keep_their_bars(kind: str) -> None:
     for name, value in joints.check(kind).items():
         if sum(KINDS[kind]) == 0 and name not in ("momentum", "energy", "derivatives"):
@@ -86,7 +86,7 @@ def test_the_study_by_its_name() -> None:
     assert report.met(), [row.name for row in report.rows if row.met is False]
     kinds, pairs, by_parameters = report.tables
     assert kinds.header[1:] == tuple(joints.BARS)
-    assert len(kinds.rows) == 4
+    assert len(kinds.rows) == 5
     assert len(pairs.header) == 10
     assert [row[0] for row in pairs.rows] == list(QUICK_PAIRS)
     assert by_parameters.header[1:] == QUICK_CASES

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from benchmarks.engines import Ours, Run
+from benchmarks.engines import Ours, Run, mujoco_scene
 from support.scenes import chain
 
 drake = pytest.mark.skipif(find_spec("pydrake") is None, reason="needs drake")
@@ -95,3 +95,15 @@ def test_bullet_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
 def test_what_a_peer_cannot_say_is_refused(engine: str) -> None:
     with pytest.raises(ValueError, match="not represented|has no spring"):
         motion(make(engine), chain("spherical", 1, base=None, spring=3.0), 1e-2)
+
+
+@pytest.mark.parametrize("engine", [pytest.param("lagged", marks=drake), pytest.param("bullet", marks=bullet)])
+def test_screws_are_refused(engine: str) -> None:
+    with pytest.raises(ValueError, match="joints that turn and slide in one are not represented"):
+        motion(make(engine), chain("screw", 1, base=None), 1e-2)
+
+
+def test_mujoco_has_no_screw() -> None:
+    pytest.importorskip("mujoco")
+    with pytest.raises(ValueError, match="no joint that turns and slides in one \\(body 1\\)"):
+        mujoco_scene.load(dojo.Simulator(chain("screw", 1)).model, 0.01)

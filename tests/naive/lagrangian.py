@@ -84,6 +84,10 @@ def constraint(joint: Joint, child: int, z: Poses) -> Array:
     """What a joint forbids: 3 - ntrans translations and 3 - nrot components of the relative rotation."""
     d, q = separation(joint, child, z)
     rows = [d @ complement(joint.trans_axes).T]
+    if joint.lead:  # the two translations across the axis, and the one along it for every radian about it
+        ahead = d @ joint.axis[:, None] / joint.lead - rot.log(q) @ joint.axis[:, None]
+        ahead = ahead - 2.0 * np.pi * np.round(np.real(ahead) / (2.0 * np.pi))
+        rows = [d @ complement(joint.axis[None]).T, joint.lead * ahead]
     if joint.nrot == 1:
         rows.append(q[..., 1:] @ complement(joint.axis[None]).T)
     elif joint.nrot == 2:

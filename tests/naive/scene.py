@@ -2,6 +2,7 @@
 
 Joint i carries body i. With parent pose (x_a, q_a), translations t and relative rotation q_J the child is at
     q_b = q_a offset q_J,     x_b = x_a + R_a (parent_point + R_offset (trans_axes^T t)) - R_b child_point.
+Of a screw that turns by q, t is lead q axis instead.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ class Joint:
     rest: Array | float = 0.0
     armature: Array | float = 0.0  # inertia of a coordinate alone
     swing_axes: Array = field(default_factory=lambda: np.eye(3)[:2])
+    lead: float = 0.0  # of a screw: along the axis per radian about it
 
     @property
     def ntrans(self) -> int:
@@ -119,6 +121,8 @@ def poses(scene: Scene, q: Array) -> tuple[Array, Array]:
         frame = rot.mul(qa, joint.offset)
         qb = rot.mul(frame, turned)
         slide = joint.trans_axes.T @ qj[: joint.ntrans]
+        if joint.lead:
+            slide = joint.lead * qj[-1] * joint.axis
         xb = xa + rot.rotate(qa, joint.parent_point) + rot.rotate(frame, slide) - rot.rotate(qb, joint.child_point)
         pos.append(xb)
         quat.append(qb)
@@ -181,6 +185,7 @@ def from_mechanism(mech: Any) -> Scene:
                 *points,
                 *(np.array(value) for value in (j.spring, j.damper, j.rest, j.armature)),
                 plane_axes(np.array(j.axis)),
+                j.pitch / (2.0 * np.pi),
             )
         )
         if j.cone is not None:

@@ -40,7 +40,7 @@ def test_start_has_the_energy_of_its_velocity():
     assert abs(sum_energy(sim, x) - (0.5 * inertia * 0.25 - 9.81 * 0.5 * np.cos(1.0))) < 1e-10
 
 
-@pytest.mark.parametrize("kind", ["revolute", "prismatic", "spherical", "planar_axis", "cylindrical_free"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "spherical", "planar_axis", "cylindrical_free", "screw"])
 def test_error_is_of_second_order_for_floating_chains(kind, rng):
     mech, errors = chain(kind, 2, spring=4.0), []
     state = random_state(dojo.Simulator(mech, time_step=0.01), rng, spread=0.3)

@@ -9,7 +9,8 @@ from support.scenes import KINDS, chain, free_body, random_state, run
 
 def rest(kind):
     """A rest position that is not the neutral one."""
-    ntrans, nrot = dojo.Joint(kind, None, "b").ntrans, dojo.Joint(kind, None, "b").nrot
+    joint = chain(kind, 1).joints[-1]
+    ntrans, nrot = joint.ntrans, joint.nrot
     return [0.1, -0.05, 0.07][:ntrans] + [0.3, -0.2, 0.1][:nrot]
 
 
@@ -37,7 +38,7 @@ def test_spinning_body_keeps_its_angular_momentum(time_step):
 
 
 @pytest.mark.parametrize("tolerance", [1e-13, 1e-8])
-@pytest.mark.parametrize("kind", ["revolute", "spherical", "free_orbital", "planar"])
+@pytest.mark.parametrize("kind", ["revolute", "spherical", "free_orbital", "planar", "screw"])
 def test_neither_rounding_nor_tolerance_add_up(kind, tolerance, rng):
     """Five thousand steps of 0.1 ms, ten metres from the origin: momentum as good as one step is solved."""
     sim = dojo.Simulator(chain(kind, 2), time_step=1e-4, tolerance=tolerance)

@@ -108,15 +108,16 @@ def test_the_angle_that_lifts_most_is_found(rng: np.random.Generator) -> None:
 def test_reach_bounds_what_a_chain_can_do(seed: int) -> None:
     """Random arms: no pose has a gap above that of a contact called sunk, and idle ones keep theirs."""
     rng = np.random.default_rng(seed)
-    kinds = ("fixed", "revolute", "revolute", "spherical", "orbital", "prismatic", "planar")
+    kinds = ("fixed", "revolute", "revolute", "spherical", "orbital", "prismatic", "planar", "screw")
     up = np.array([0.0, 0.0, 1.0])
     bodies, joints = [], []
     for i in range(3):
-        kind = str(rng.choice(kinds)) if i else str(rng.choice(["fixed", "revolute", "prismatic", "planar"]))
+        kind = str(rng.choice(kinds)) if i else str(rng.choice(["fixed", "revolute", "prismatic", "planar", "screw"]))
         axis = up if rng.random() < 0.6 else np.array([1.0, 0.0, 0.0])
         bodies.append(dojo.Body(f"b{i}", 1.0, (0.1, 0.1, 0.1)))
         points = {"parent_point": rng.normal(size=3) * 0.3, "child_point": rng.normal(size=3) * 0.3}
-        joints.append(dojo.Joint(kind, f"b{i - 1}" if i else None, f"b{i}", axis=axis, **points))
+        pitch = 3.0 if kind == "screw" else 0.0
+        joints.append(dojo.Joint(kind, f"b{i - 1}" if i else None, f"b{i}", axis=axis, pitch=pitch, **points))
     bodies.append(dojo.Body("last", 1.0, (0.1, 0.1, 0.1)))
     joints.append(dojo.Joint("revolute", "b2", "last", axis=(0, 1, 0)))
     contacts = [dojo.Contact(f"b{i}", rng.normal(size=3) * 0.3, height=rng.normal()) for i in range(3)]

@@ -162,6 +162,13 @@ def test_angle_comes_back_within_half_a_turn() -> None:
     assert maps.minimal(maps.maximal(x))[0] == pytest.approx(3.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("turns", [-3.0, 0.0, 0.5, 40.0])
+def test_a_screw_counts_its_turns(turns: float) -> None:
+    maps, x = setup("screw", True)
+    x[0] += 2 * np.pi * turns
+    assert maps.minimal(maps.maximal(x))[0] == pytest.approx(x[0], abs=1e-10)
+
+
 def test_turn_of_almost_half_a_turn_per_step() -> None:
     maps, x = setup("floating", True)
     x[maps.mech.nq + 3 : maps.mech.nq + 6] = np.array([0.6, -0.8, 0.0]) * 0.9999 * np.pi / H

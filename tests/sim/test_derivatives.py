@@ -89,7 +89,7 @@ def test_joints_to_the_world(kind, rng):
 
 
 def test_armature(rng):
-    for kind in ("revolute", "orbital", "planar_axis"):
+    for kind in ("revolute", "orbital", "planar_axis", "screw"):
         mech = chain(kind, 2, gravity=(0.0, 0.0, -9.81), spring=3.0, damper=0.2, armature=0.3)
         sim = simulator(mech, 1e-6)
         check(mech, random_state(sim, rng, 2.0), rng.normal(size=sim.nu), 1e-6)

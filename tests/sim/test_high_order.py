@@ -17,7 +17,9 @@ from support.branches import ORDERS, apart, branch, end
 from support.mechanisms import random_state
 
 
-@pytest.mark.parametrize("kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "prismatic", "fixed"])
+@pytest.mark.parametrize(
+    "kind", ["floating", "spherical", "cylindrical_free", "planar_axis", "prismatic", "fixed", "screw"]
+)
 @pytest.mark.parametrize("on_world", [True, False])
 def test_fourth_order_with_springs_dampers_and_inputs(kind: str, on_world: bool) -> None:
     mech = branch(kind, on_world, damper=0.1)
@@ -37,7 +39,7 @@ def test_higher_orders(order: int, h: float) -> None:
     assert np.log2(errors[0] / errors[1]) > order - 1.0, errors
 
 
-@pytest.mark.parametrize("kind", ["spherical", "orbital", "planar_axis"])
+@pytest.mark.parametrize("kind", ["spherical", "orbital", "planar_axis", "screw"])
 @pytest.mark.parametrize("on_world", [True, False])
 def test_it_is_the_same_motion_as_that_of_second_order(kind: str, on_world: bool) -> None:
     mech = branch(kind, on_world, damper=0.1)
@@ -53,7 +55,7 @@ def test_it_is_the_same_motion_as_that_of_second_order(kind: str, on_world: bool
     np.testing.assert_allclose(2.0 * fine - coarse, exact[: sim.nq], atol=1e-6)  # dampers are of first order there
 
 
-@pytest.mark.parametrize("kind", ["spherical", "revolute", "prismatic"])
+@pytest.mark.parametrize("kind", ["spherical", "revolute", "prismatic", "screw"])
 def test_momentum_stays_to_rounding(kind: str) -> None:
     mech = replace(branch(kind, False, spring=2.0), gravity=(0.0, 0.0, 0.0))
     sim = dojo.Simulator(mech, time_step=0.02, order=6)

@@ -11,7 +11,7 @@ from support.mechanisms import random_state
 
 
 @pytest.mark.parametrize(
-    "kind", ["floating", "spherical", "revolute", "cylindrical_free", "planar_axis", "prismatic", "fixed"]
+    "kind", ["floating", "spherical", "revolute", "cylindrical_free", "planar_axis", "prismatic", "fixed", "screw"]
 )
 @pytest.mark.parametrize("on_world", [True, False])
 def test_derivatives_are_those_of_central_differences(kind: str, on_world: bool) -> None:

@@ -123,7 +123,7 @@ def arm_by_hand(kind: str, damper: float) -> dojo.Mechanism:
     return dojo.Mechanism([dojo.Body(name, 1.0, inertia) for name in "abc"], joints, inputs=[])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "screw"])  # no file gives its pitch
 def test_every_kind_closes_a_loop(tmp_path: Path, kind: str) -> None:
     damper = 0.3 if kind in DAMPED else 0.0
     given = END.format("planarfixed" if kind == "planar" else kind, damper)

@@ -85,6 +85,7 @@ RINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "spherical": ("spherical", {"spring": 2.0, "damper": 0.1, "cone": 0.6}),
     "cylindrical": ("cylindrical", {"spring": (50.0, 2.0), "damper": 0.1, "limits": ((-0.1, 0.1), None)}),
     "orbital": ("orbital", {}),
+    "screw": ("screw", {"pitch": 0.7, "spring": 2.0, "damper": 0.1, "armature": 0.05}),
     "bushing": ("floating", {"spring": 200.0, "damper": 0.5}),
 }
 

@@ -40,7 +40,8 @@ def test_any_order_of_a_tree_packs_with_parents_first(data: st.DataObject) -> No
     kinds = data.draw(st.lists(st.sampled_from([k for k in KINDS if k != "fixed"]), min_size=n, max_size=n))
     parents = [data.draw(st.integers(-1, i - 1)) for i in range(n)]
     joints = [
-        Joint(k, f"b{p}" if p >= 0 else None, f"b{i}") for i, (k, p) in enumerate(zip(kinds, parents, strict=True))
+        Joint(k, f"b{p}" if p >= 0 else None, f"b{i}", pitch=0.1 if k == "screw" else 0.0)
+        for i, (k, p) in enumerate(zip(kinds, parents, strict=True))
     ]
     mech = Mechanism([Body(f"b{i}", shape=BALL) for i in range(n)], data.draw(st.permutations(joints)))
     model = pack(mech)

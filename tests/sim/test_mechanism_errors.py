@@ -15,6 +15,19 @@ from support.mechanisms import BALL, INF, hip, two
 ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("", shape=BALL), r"Body\(name=\.\.\.\): expected a name"),
     (lambda: Joint("revolute", None, "x", cone=0.5), r"Joint\('x', cone=\.\.\.\): a revolute joint has no three rot"),
+    (lambda: Joint("screw", None, "x"), r"Joint\('x', pitch=\.\.\.\): a screw needs the way along its axis per turn"),
+    (
+        lambda: Joint("revolute", None, "x", pitch=0.1),
+        r"Joint\('x', pitch=\.\.\.\): a revolute joint has none, got 0.1",
+    ),
+    (lambda: Joint("screw", None, "x", pitch=INF), r"Joint\('x', pitch=\.\.\.\): expected finite numbers, got inf"),
+    (
+        lambda: Mechanism(
+            [Body("x", 0.0), Body("y", shape=BALL)],
+            [Joint("screw", None, "x", pitch=0.1), Joint("screw", "x", "y", pitch=0.1)],
+        ),
+        r"joints 'x' and 'y' move along one axis, and body 'x' between them has no mass",
+    ),
     (lambda: Joint("spherical", None, "x", cone=0.0), r"Joint\('x', cone=\.\.\.\): expected a number > 0, got 0"),
     (lambda: Joint("spherical", None, "x", cone=3.2), r"Joint\('x', cone=\.\.\.\): expected an angle below 3.1 rad"),
     (

@@ -22,7 +22,7 @@ def test_mean_velocities_over_a_tiny_interval(kind: str, on_world: bool) -> None
 
 
 @pytest.mark.parametrize("speed", [1.0, 30.0, 150.0])
-@pytest.mark.parametrize("kind", ["orbital", "free_orbital", "spherical", "floating", "planar_axis"])
+@pytest.mark.parametrize("kind", ["orbital", "free_orbital", "spherical", "floating", "planar_axis", "screw"])
 def test_increments_end_at_the_poses_of_the_coordinates(kind: str, speed: float) -> None:
     """Also over large turns: the bodies go back to where the coordinates before the interval put them."""
     h = 0.01

@@ -194,7 +194,7 @@ def test_cone_limit(kind, rng):
 
 
 @pytest.mark.parametrize("base", ["floating", None])
-@pytest.mark.parametrize("kind", ["revolute", "planar_axis", "orbital", "fixed_orientation"])
+@pytest.mark.parametrize("kind", ["revolute", "planar_axis", "orbital", "fixed_orientation", "screw"])
 def test_armature(kind, base, rng):
     mech = chain(kind, 2, gravity=(0.0, 1.0, -9.81), base=base, spring=3.0, damper=0.2, armature=0.4)
     sim = make(mech, 0.02)

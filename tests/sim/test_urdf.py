@@ -39,7 +39,13 @@ KINDS = {  # type in the file: (kind, nq, nv)
 
 
 def test_no_kind_of_joint_is_without_a_type() -> None:
-    assert {"fixed"} | {kind for kind, *_ in KINDS.values()} == set(parts.KINDS)
+    assert {"fixed", "screw"} | {kind for kind, *_ in KINDS.values()} == set(parts.KINDS)
+
+
+def test_a_screw_is_refused(tmp_path: Path) -> None:
+    """URDF has no attribute for its pitch."""
+    with pytest.raises(dojo.UrdfError, match="type 'screw' is not one of: fixed, revolute"):
+        dojo.load_urdf(arm(tmp_path, kind="screw", inside=(AXIS,)), floating=False)
 
 
 # -- poses -------------------------------------------------------------------------------------------------------------

@@ -27,6 +27,7 @@ def branch(kind: str, on_world: bool, *, spring: float = 3.0, damper: float = 0.
             kinds[k], None if k == 0 else "a", names[k], parent_point=0.3 * rng.normal(size=3),
             child_point=0.3 * rng.normal(size=3), axis=rng.normal(size=3), orientation=unit_quaternion(rng),
             spring=0.0 if loose else spring, damper=0.0 if loose else damper, rest=0.2 * rng.normal(size=n),
+            pitch=1.2 if kinds[k] == "screw" else 0.0,
         )  # fmt: skip
 
     inputs = [

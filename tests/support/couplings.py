@@ -32,7 +32,8 @@ def loop(kind: str, tree: str = "spherical") -> Case:
         ends = (at - centres[k - 1], at - centres[k])
         joints.append(Joint(tree if k == 1 else "spherical", f"b{k - 1}", f"b{k}", "", *ends, damper=0.1))
     ends = (corners[0] - centres[3], corners[0] - centres[0])
-    joints.append(Joint(kind, "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True))
+    pitch = 0.7 if kind == "screw" else 0.0
+    joints.append(Joint(kind, "b3", "b0", "last", *ends, axis=(0.6, 0.0, 0.8), close=True, pitch=pitch))
     sim = Simulator(Mechanism(bodies, joints), time_step=0.01, tolerance=1e-12)
     x = sim.neutral()
     x[sim.nq :] = np.random.default_rng(1).normal(size=sim.nv)

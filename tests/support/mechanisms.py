@@ -41,6 +41,7 @@ def random_joint(rng: np.random.Generator, kind: str, parent: str | None, child:
         spring=k if kind != "floating" else 0.0,
         damper=rng.uniform(0.0, 0.5),
         rest=0.2 * rng.normal(size=sum(KINDS[kind])),
+        pitch=-0.9 if kind == "screw" else 0.0,
     )
 
 

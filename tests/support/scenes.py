@@ -26,7 +26,9 @@ KINDS = (
     "cylindrical_free",
     "planar_free",
     "floating",
+    "screw",
 )
+PITCH = {"screw": 1.5}  # [m/rev]
 LAWS = ("impact", "linear", "nonlinear")
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
@@ -89,6 +91,7 @@ def chain(kind: str, links: int = 1, gravity=(0.0, 0.0, 0.0), base="floating", *
                 child_point=rng.normal(size=3) / 4,
                 axis=axis,
                 orientation=offset,
+                pitch=PITCH.get(kind, 0.0),
                 **options,
             )
         )
@@ -98,7 +101,8 @@ def chain(kind: str, links: int = 1, gravity=(0.0, 0.0, 0.0), base="floating", *
 
 def limited(kind: str) -> dojo.Mechanism:
     """Two joints of a kind, each plain coordinate between -0.3 and 0.3 and each quaternion within a cone of 0.6."""
-    ntrans, nrot = dojo.Joint(kind, None, "b").ntrans, dojo.Joint(kind, None, "b").nrot
+    joint = dojo.Joint(kind, None, "b", pitch=PITCH.get(kind, 0.0))
+    ntrans, nrot = joint.ntrans, joint.nrot
     plain = ntrans + (nrot if nrot < 3 else 0)
     limits = [(-0.3, 0.3)] * plain + [None] * (ntrans + nrot - plain)
     return chain(kind, 1, base=None, damper=0.1, limits=limits or None, cone=0.6 if nrot == 3 else None)

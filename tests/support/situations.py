@@ -50,6 +50,7 @@ def _pair(kind: str, base: str | None, gravity: ArrayLike, **options: Any) -> Me
                 axis=rng.normal(size=3),
                 parent_point=rng.normal(size=3) / 4.0,
                 child_point=rng.normal(size=3) / 4.0,
+                pitch=1.5 if kind == "screw" else 0.0,
                 **options,
             )
         )
@@ -138,6 +139,8 @@ def _limited(kind: str) -> Case:
 
 CASES: dict[str, Callable[[], Case]] = {
     "flying": lambda: _resting("planar_axis", 0.3, 0.5, 2.0),
+    "flying, screw": lambda: _resting("screw", 0.3, 0.5, 2.0),
+    "sliding, screw": lambda: _resting("screw", -0.01, 0.1, 2.0),
     "touching": lambda: _resting("prismatic_orbital", 0.0, 0.5, 0.3),
     "sliding": lambda: _resting("cylindrical_free", -0.01, 0.1, 2.0),
     "sticking": lambda: _resting("revolute", -0.01, 0.7, 0.02, 1e-3),
@@ -150,6 +153,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "in a loop": lambda: loop("revolute"),
     "in a loop, orbital": lambda: loop("spherical", "orbital"),
     "in a loop, fixed": lambda: loop("fixed"),
+    "in a loop, screw": lambda: loop("screw"),
     "geared": geared,
     "colliding, box and sphere": lambda: colliding(Sphere(0.2)),
     "colliding, bouncing": lambda: colliding(Sphere(0.2), 0.5),

@@ -5,7 +5,7 @@ energy       order in h of the energy error of the same without dampers
 limits       largest excess over the stops, or the cone, of a body pushed against them; 1 if it gets to none [m, rad]
 spring       k (q - rest) = u at rest under an input u; k sin(angle) = u for a quaternion; relative error
 damper       a body thrown with momentum p stops after p / d; relative error
-input        momentum after an input u for a time T is u T; relative error
+input        momentum after an input u for a time T is u T, of a screw its share; relative error
 derivatives  of a step of the first with stops, with respect to state and input, against central differences, relative
 """
 
@@ -33,6 +33,7 @@ BARS = {
     "derivatives": 1e-6,
 }
 SPRING, DAMPER, INERTIA = 20.0, 5.0, 0.4
+PITCH = {"screw": 1.5}  # [m/rev]
 STOP = 0.3  # [m, rad] either side; a cone has twice that
 
 
@@ -69,6 +70,7 @@ def pair(kind: str, *, damper: float = 0.3, stops: bool = False) -> Mechanism:
         damper=damper,
         limits=[(-STOP, STOP)] * plain + [None] * (3 if quaternion else 0) if stops and plain else None,
         cone=2.0 * STOP if stops and quaternion else None,
+        pitch=PITCH.get(kind, 0.0),
     )
     skewed = np.array([[0.2, 0.02, 0.01], [0.02, 0.3, 0.03], [0.01, 0.03, 0.4]])
     bodies = [Body("base", 2.0, skewed), Body("tip", 1.0, 0.5 * skewed)]
@@ -79,6 +81,7 @@ def pair(kind: str, *, damper: float = 0.3, stops: bool = False) -> Mechanism:
 def alone(kind: str, **options: float) -> Mechanism:
     """A ball of 1 kg on a joint at its centre, an input on every coordinate; no gravity."""
     inputs = [Input("joint", dof=d) for d in range(sum(KINDS[kind]))]
+    options["pitch"] = PITCH.get(kind, 0.0)
     joint = Joint(kind, None, "ball", "joint", axis=(1.0, 2.0, -0.5), **options)  # type: ignore[arg-type]
     return Mechanism([Body("ball", 1.0, np.full(3, INERTIA))], [joint], inputs=inputs, gravity=(0, 0, 0))
 
@@ -168,7 +171,7 @@ def damper(kind: str) -> float:
         v = 0.7 * np.eye(sim.nv)[d]
         x = sim.rollout(sim.start(sim.neutral()[: sim.nq], v), np.zeros((400, sim.nu)), throw=True).x[-1]
         way = np.linalg.norm(sim.difference(x, sim.neutral())[: sim.nv])
-        mass = 1.0 if d < ntrans else INERTIA
+        mass = 1.0 if d < ntrans else INERTIA + sim.mechanism.joints[0].lead ** 2
         worst = max(worst, abs(float(way) * DAMPER / (0.7 * mass) - 1.0))
     return worst
 
@@ -182,7 +185,8 @@ def push(kind: str) -> float:
         linear, angular = sim.momentum(sim.rollout(sim.neutral(), us, throw=True).x[-1])
         gained = np.linalg.norm(linear if d < KINDS[kind][0] else angular)
         start = np.linalg.norm(sim.momentum(sim.neutral())[1])
-        worst = max(worst, abs((float(gained) - float(start)) / 0.5 - 1.0))
+        share = INERTIA / (INERTIA + sim.mechanism.joints[0].lead ** 2)  # a screw spends the rest on the way ahead
+        worst = max(worst, abs((float(gained) - float(start)) / (0.5 * share) - 1.0))
     return worst
 
 

@@ -68,6 +68,11 @@ class TreeReference:
             if model.joint_nrot[i] == 1:
                 axis = Q @ model.joint_axis[i]
                 R[i] = Q @ _turn(model.joint_axis[i], q[a])
+                s, t = model.joint_lead[i] * q[a] * axis, model.joint_lead[i] * axis
+                o = o + s
+                ap = ap + _cross(alp, s) + _cross(wp, _cross(wp, s)) + 2.0 * v[d] * _cross(wp, t)
+                lin[i] -= _skew(s) @ ang[i]
+                lin[i, :, d] += t
                 w[i], alpha[i] = wp + v[d] * axis, alp + v[d] * _cross(wp, axis)
                 ang[i, :, d] = axis
             elif model.joint_nrot[i] == 3:

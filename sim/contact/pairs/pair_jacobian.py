@@ -81,6 +81,42 @@ def _slip_rows(data: Data, h: float, i: int, sign: float, r: Vec3, t: Vec3, row:
 
 
 @kernel
+def _arm(data: Data, i: int, F: Vector) -> Vec3:
+    """The contact point of a pair from the centre of mass of body i."""
+    p, x = three(F, Frame.POINT), data.pos3[i]
+    return p[0] - x[0], p[1] - x[1], p[2] - x[2]
+
+
+@kernel
+def _pair_slip(data: Data, h: float, j: int, a: int, b: int, e: int, w: Vec3, v: Vec3) -> None:
+    """Row e of pair_C, slip along t_e: at a fixed point and direction, and as both move by M and Omega.
+
+    w, v: relative angular velocity and velocity of a against b at the point.
+    """
+    Omega, M, F, Ca, Cb = data.pair_turn[j], data.pair_shift[j], data.pair_frame[j], data.pair_Ca[j], data.pair_Cb[j]
+    o, rows = data.origin, data.pair_rows
+    t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
+    _slip_rows(data, h, a, 1.0, _arm(data, a, F), t, rows[0])
+    for k in range(6):
+        rows[1, k] = 0.0
+    if b >= 0:
+        _slip_rows(data, h, b, -1.0, _arm(data, b, F), t, rows[1])
+    gp = cross(t[0], t[1], t[2], w[0], w[1], w[2])
+    px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
+    gm = cross(px, py, pz, gp[0], gp[1], gp[2])
+    ge = cross(t[0], t[1], t[2], v[0], v[1], v[2])
+    for k in range(6):
+        rel = 0.0
+        for r in range(3):
+            rel += M[6 * r + k] * gp[r] + Omega[6 * r + k] * ge[r]
+        Ca[6 * e + k] = rows[0, k] + rel
+        Cb[6 * e + k] = rows[1, k] - rel
+    for k in range(3):
+        Cb[6 * e + k] += gp[k]
+        Cb[6 * e + 3 + k] += gm[k] + ge[k]
+
+
+@kernel
 def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
     """pair_turn, pair_shift: Omega and M about O;  pair_C: d(gap, slip) by the twists of a, then of b."""
     a = model.coupling_body[model.pair_coupling[j], 0]
@@ -92,8 +128,6 @@ def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
     frame_turn(g, data.pair_scratch)
     shape_to_world(data.pair_scratch, 0, data, s, x, y, z, data.pair_turn[j])
     shape_to_world(g, 25, data, s, x, y, z, data.pair_shift[j])
-    Omega = data.pair_turn[j]
-    M = data.pair_shift[j]
     F = data.pair_frame[j]
     px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
     Ca = data.pair_Ca[j]
@@ -113,32 +147,9 @@ def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
         wx -= q * data.turn[b, 1]
         wy -= q * data.turn[b, 2]
         wz -= q * data.turn[b, 3]
-    ra = (F[Frame.POINT] - data.pos3[a, 0], F[Frame.POINT + 1] - data.pos3[a, 1], F[Frame.POINT + 2] - data.pos3[a, 2])
+    v = (va[0] - vb[0], va[1] - vb[1], va[2] - vb[2])
     for e in range(1, 3):
-        t = (F[3 * e], F[3 * e + 1], F[3 * e + 2])
-        rows = data.pair_rows
-        _slip_rows(data, h, a, 1.0, ra, t, rows[0])
-        for k in range(6):
-            rows[1, k] = 0.0
-        if b >= 0:
-            rb = (
-                F[Frame.POINT] - data.pos3[b, 0],
-                F[Frame.POINT + 1] - data.pos3[b, 1],
-                F[Frame.POINT + 2] - data.pos3[b, 2],
-            )
-            _slip_rows(data, h, b, -1.0, rb, t, rows[1])
-        gp = cross(t[0], t[1], t[2], wx, wy, wz)
-        gm = cross(px, py, pz, gp[0], gp[1], gp[2])
-        ge = cross(t[0], t[1], t[2], va[0] - vb[0], va[1] - vb[1], va[2] - vb[2])
-        for k in range(6):
-            rel = 0.0
-            for r in range(3):
-                rel += M[6 * r + k] * gp[r] + Omega[6 * r + k] * ge[r]
-            Ca[6 * e + k] = rows[0, k] + rel
-            Cb[6 * e + k] = rows[1, k] - rel
-        for k in range(3):
-            Cb[6 * e + k] += gp[k]
-            Cb[6 * e + 3 + k] += gm[k] + ge[k]
+        _pair_slip(data, h, j, a, b, e, (wx, wy, wz), v)
 
 
 @optional(Slot.PAIR_RATE, default=(0.0, 0.0, 0.0))

@@ -12,18 +12,30 @@ The coordinates of the joint stay constant.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.body_columns import add_wrench
 from sim.derivatives.parameters.directions import At, Effect
 from sim.derivatives.restitution_gradient import gap_wrench
+from sim.dynamics.joints.coordinates import joint_frame
 from sim.model.columns import Bounce
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
-from solvers.rotation import Vec3, cross, quat_matrix, quat_mul, rotate
+from solvers.rotation import Vec3, cross, quat_matrix, rotate, times
 from solvers.types import Matrix, Vector
 
 _PRODUCT = 9  # row of At.twists with F
+
+
+class Configuration(NamedTuple):
+    """Coordinates, and poses of the bodies."""
+
+    q: Vector  # (nq,)
+    pos: Matrix  # (nbody, 3)
+    quat: Matrix  # (nbody, 4)
+    rot: Matrix  # (nbody, 9)
 
 
 @kernel
@@ -41,7 +53,7 @@ def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: M
 
     o: joint point on the child; t: from that on the parent to it.
     """
-    if 0 < model.joint_ntrans[i] < 3:
+    if 0 < model.joint_ntrans[i] < 3 or model.joint_lead[i] != 0.0:
         x = cross(a[0], a[1], a[2], t[0], t[1], t[2])
         for k in range(3):
             out[0, k] = x[k]
@@ -53,60 +65,63 @@ def _axis_twist(model: Model, i: int, a: Vec3, b: Vec3, o: Vec3, t: Vec3, out: M
 
 
 @kernel
-def _joint_twist(
-    model: Model,
-    data: Data,
-    effect: int,
-    i: int,
-    k: int,
-    q: Vector,
-    pos: Matrix,
-    quat: Matrix,
-    rot: Matrix,
-    out: Matrix,
-) -> None:
+def _point_twist(model: Model, effect: int, i: int, k: int, at: Configuration, out: Matrix) -> None:
+    """A joint point moves along axis k: that on the child, and its body the other way; or that on the parent."""
+    p = model.body_parent[i]
+    e = unit_vector(k)
+    if effect == Effect.CHILD_POINT:
+        b = rotate(at.rot, i, e[0], e[1], e[2])
+        for j in range(3):
+            out[0, j] = -b[j]
+        return
+    if p >= 0:
+        e = rotate(at.rot, p, e[0], e[1], e[2])
+    for r in range(3):
+        for j in range(3):
+            out[r, j] = e[j]
+
+
+@kernel
+def _lead_twist(model: Model, i: int, at: Configuration, out: Matrix) -> None:
+    """The body of joint i moves along the axis, by the angle about it; to its column `_add_lead` adds the axis."""
+    t = model.joint_axis[i]
+    a = rotate(at.rot, i, t[0], t[1], t[2])
+    y = at.q[model.body_qadr[i + 1] - 1]
+    for j in range(3):
+        out[0, j] = y * a[j]
+
+
+@kernel
+def _turn_twist(model: Model, O: Vector, effect: int, i: int, k: int, at: Configuration, out: Matrix) -> None:
+    """The joint frame, or the directions of motion in it, turn about axis k of that frame; O: the common point."""
+    e = unit_vector(k)
+    b = rotate(at.rot, i, e[0], e[1], e[2])
+    x, f = joint_frame(model, i, at.pos, at.quat, at.rot)
+    Q = quat_matrix(f[0], f[1], f[2], f[3])
+    a = times(Q, e[0], e[1], e[2])
+    c = model.joint_child_point[i]
+    c0, c1, c2 = rotate(at.rot, i, c[0], c[1], c[2])
+    y = (at.pos[i, 0] + c0, at.pos[i, 1] + c1, at.pos[i, 2] + c2)
+    if effect == Effect.ORIENTATION:
+        for r in range(3):
+            _add_rotation(out[r], (x[0] - O[0], x[1] - O[1], x[2] - O[2]), a)
+    else:
+        t = (y[0] - x[0], y[1] - x[1], y[2] - x[2])
+        _axis_twist(model, i, a, b, (y[0] - O[0], y[1] - O[1], y[2] - O[2]), t, out)
+
+
+@kernel
+def _joint_twist(model: Model, data: Data, effect: int, i: int, k: int, at: Configuration, out: Matrix) -> None:
     """out[0] = T at one configuration, out[1], out[2] = B of the translation and the rotation columns of joint i."""
     for r in range(3):
         for j in range(6):
             out[r, j] = 0.0
-    p = model.body_parent[i]
-    e = unit_vector(k)
-    b = rotate(rot, i, e[0], e[1], e[2])
-    if effect == Effect.CHILD_POINT:
-        for j in range(3):
-            out[0, j] = -b[j]
-        return
-    if effect == Effect.PARENT_POINT:
-        if p >= 0:
-            e = rotate(rot, p, e[0], e[1], e[2])
-        for r in range(3):
-            for j in range(3):
-                out[r, j] = e[j]
-        return
-    f = model.joint_offset[i]
-    g0, g1, g2, g3 = f[0], f[1], f[2], f[3]
-    if p >= 0:
-        g0, g1, g2, g3 = quat_mul(quat[p, 0], quat[p, 1], quat[p, 2], quat[p, 3], f[0], f[1], f[2], f[3])
-    Q = quat_matrix(g0, g1, g2, g3)
-    a = (Q[0] * e[0] + Q[1] * e[1] + Q[2] * e[2], Q[3] * e[0] + Q[4] * e[1] + Q[5] * e[2],
-         Q[6] * e[0] + Q[7] * e[1] + Q[8] * e[2])  # fmt: skip
-    s0, s1, s2 = 0.0, 0.0, 0.0
-    for j in range(model.joint_ntrans[i]):
-        y = q[model.body_qadr[i] + j]
-        x = model.joint_trans_axes[i, 3 * j : 3 * j + 3]
-        s0 += y * x[0]
-        s1 += y * x[1]
-        s2 += y * x[2]
-    t = (Q[0] * s0 + Q[1] * s1 + Q[2] * s2, Q[3] * s0 + Q[4] * s1 + Q[5] * s2, Q[6] * s0 + Q[7] * s1 + Q[8] * s2)
-    c = model.joint_child_point[i]
-    c0, c1, c2 = rotate(rot, i, c[0], c[1], c[2])
-    O = data.origin
-    o = (pos[i, 0] + c0 - O[0], pos[i, 1] + c1 - O[1], pos[i, 2] + c2 - O[2])
-    if effect == Effect.ORIENTATION:
-        for r in range(3):
-            _add_rotation(out[r], (o[0] - t[0], o[1] - t[1], o[2] - t[2]), a)
+    if effect == Effect.PARENT_POINT or effect == Effect.CHILD_POINT:
+        _point_twist(model, effect, i, k, at, out)
+    elif effect == Effect.LEAD:
+        _lead_twist(model, i, at, out)
     else:
-        _axis_twist(model, i, a, b, o, t, out)
+        _turn_twist(model, data.origin, effect, i, k, at, out)
 
 
 @kernel
@@ -123,12 +138,22 @@ def _mark_below(model: Model, i: int, below: Vector) -> None:
 
 
 @kernel
+def _add_lead(model: Model, data: Data, at: At, i: int, w: float, col: int) -> None:
+    """a . f of the column (a, 0) that a lead adds to that of the rotation; f: residual force on the subtree of i."""
+    d = model.body_vadr[i + 1] - 1
+    s = data.S2[d]
+    for b in range(i, at.below.shape[0]):
+        f = data.wrench[b]
+        data.columns[d, col] -= w * at.below[b] * (s[3] * f[0] + s[4] * f[1] + s[5] * f[2])
+
+
+@kernel
 def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, w: float, col: int) -> None:
     """The column of a change of the geometry of joint i."""
     T = at.twists
-    _joint_twist(model, data, effect, i, k, data.theta1, data.pos1, data.quat1, data.rot1, T[0:3])
-    _joint_twist(model, data, effect, i, k, data.theta3, data.pos3, data.quat3, data.rot3, T[6:9])
-    _joint_twist(model, data, effect, i, k, at.q, data.pos2, data.quat2, data.rot2, T[3:6])
+    _joint_twist(model, data, effect, i, k, Configuration(data.theta1, data.pos1, data.quat1, data.rot1), T[0:3])
+    _joint_twist(model, data, effect, i, k, Configuration(at.q, data.pos2, data.quat2, data.rot2), T[3:6])
+    _joint_twist(model, data, effect, i, k, Configuration(data.theta3, data.pos3, data.quat3, data.rot3), T[6:9])
     T1, T2, T3, F = T[0], T[3], T[6], T[_PRODUCT]
     for r in range(6):
         A1, A2, A3 = data.A1[i, 6 * r : 6 * r + 6], data.A2[i, 6 * r : 6 * r + 6], data.A3[i, 6 * r : 6 * r + 6]
@@ -144,6 +169,8 @@ def add_geometry(model: Model, data: Data, at: At, effect: int, i: int, k: int, 
             X[d, col] -= w * _dot(data.S2[d], F)
         p = model.body_parent[p]
     _mark_below(model, i, at.below)
+    if effect == Effect.LEAD:
+        _add_lead(model, data, at, i, w, col)
     for b in range(i + 1, at.below.shape[0]):
         if at.below[b] > 0.0:
             for d in range(model.body_vadr[b], model.body_vadr[b + 1]):

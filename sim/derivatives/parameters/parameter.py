@@ -14,7 +14,8 @@ Term = tuple[Effect, int, int, float]  # effect, index, component, weight
 
 UNITS = {
     "mass": "kg", "inertia": "kg m^2", "com": "m", "parent_point": "m", "child_point": "m", "orientation": "rad",
-    "axis": "1", "spring": "N/m, N m/rad", "damper": "N s/m, N m s/rad", "rest": "m, rad", "armature": "kg, kg m^2",
+    "axis": "1", "pitch": "m/rev", "spring": "N/m, N m/rad", "damper": "N s/m, N m s/rad", "rest": "m, rad",
+    "armature": "kg, kg m^2",
     "lower": "m, rad", "upper": "m, rad", "cone": "rad", "gear_ratio": "rad/rad, m/rad", "gear_offset": "m, rad",
     "input_force": "1", "input_torque": "m", "friction": "1", "restitution": "1",
     "contact_point": "m", "contact_radius": "m", "contact_height": "m", "contact_normal": "1", "terrain": "m",

@@ -61,7 +61,7 @@ def _on_body(mech: Mechanism, i: int, k: int) -> Iterator[Term]:
 
 
 def geometry_parameters(joint: Joint, i: int, loop: bool) -> list[Parameter]:
-    """parent_point, child_point, orientation, axis of a joint of the tree, or of one that closes a loop."""
+    """parent_point, child_point, orientation, axis, pitch of a joint of the tree, or of one that closes a loop."""
     parent, child, turn = (
         (Effect.LOOP_PARENT, Effect.LOOP_CHILD, Effect.LOOP_TURN)
         if loop
@@ -79,6 +79,8 @@ def geometry_parameters(joint: Joint, i: int, loop: bool) -> list[Parameter]:
         found += vector(
             "axis", joint.name, joint.axis, lambda k: [(Effect.AXIS, i, j, float(turns[j, k])) for j in range(3)]
         )
+    if joint.lead != 0.0:
+        found.append(Parameter("pitch", joint.name, "", joint.pitch, ((Effect.LEAD, i, 0, joint.lead / joint.pitch),)))
     return found
 
 

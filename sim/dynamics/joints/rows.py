@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics.coordinates import joint_frame, translation_axis
+from sim.dynamics.joints.coordinates import joint_frame, translation_axis
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import (
@@ -16,7 +16,7 @@ from solvers.rotation import (
     rotate,
     times,
 )
-from solvers.types import Matrix
+from solvers.types import Matrix, Vector
 
 
 @kernel
@@ -52,10 +52,7 @@ def joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, out
         d += 1
     if model.joint_nrot[i] == 1:
         t = model.joint_axis[i]
-        a = rotate(rot, i, t[0], t[1], t[2])
-        for j in range(3):
-            out[d, 3 + j] = a[j]
-            out[d, 9 + j] = -a[j]
+        _turn_row(rotate(rot, i, t[0], t[1], t[2]), out[d])
     elif model.joint_nrot[i] == 2:
         t = joint_swing(i, Q, quat)
         J = inverse_right_jacobian(t[0], t[1], t[2])
@@ -63,15 +60,18 @@ def joint_rows(model: Model, i: int, pos: Matrix, quat: Matrix, rot: Matrix, out
         for k in range(2):
             V = model.joint_swing_axes[i, 3 * k : 3 * k + 3]
             b = times(J, V[0], V[1], V[2])
-            a = times(R, b[0], b[1], b[2])
-            for j in range(3):
-                out[d + k, 3 + j] = a[j]
-                out[d + k, 9 + j] = -a[j]
+            _turn_row(times(R, b[0], b[1], b[2]), out[d + k])
     elif model.joint_nrot[i] == 3:
         for k in range(3):
-            for j in range(3):
-                out[d + k, 3 + j] = rot[i, 3 * j + k]
-                out[d + k, 9 + j] = -rot[i, 3 * j + k]
+            _turn_row((rot[i, k], rot[i, 3 + k], rot[i, 6 + k]), out[d + k])
+
+
+@kernel
+def _turn_row(a: Vec3, out: Vector) -> None:
+    """a . (phi_c - phi_p)"""
+    for j in range(3):
+        out[3 + j] = a[j]
+        out[9 + j] = -a[j]
 
 
 @kernel

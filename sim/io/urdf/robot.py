@@ -19,7 +19,8 @@ Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
 
 # URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
-# of Joint without a standard word. A kind's own name is read, too, except for "planar", which may turn in URDF.
+# of Joint without a standard word. A kind's own name is read, too, except for "planar", which may turn in URDF, and
+# for "screw", whose pitch URDF has no attribute for.
 KINDS = {
     "fixed": "fixed",
     "revolute": "revolute",
@@ -41,7 +42,7 @@ KINDS = {
     "planarorbital": "planar_orbital",
     "freeorbital": "free_orbital",
 }
-KINDS |= {kind: kind for kind in parts.KINDS if kind not in KINDS}
+KINDS |= {kind: kind for kind in parts.KINDS if kind not in (*KINDS, "screw")}
 SIZES = {"sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length")}
 # elements without effect on the motion of bodies, or without use in a step
 READ = {"link", "joint", "loop_joint"}
