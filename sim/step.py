@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.contact_report import worst_contact
 from sim.dynamics.loops.closure import start_loops
 from sim.dynamics.loops.loop_work import loops_gained
-from sim.dynamics.momentum_balance import begin_step
+from sim.dynamics.momentum_balance import begin_step, ends_below_half
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import Guess, Outcome, StepOptions
@@ -55,15 +55,18 @@ def step(
 def _checked(
     model: Model, data: Data, options: StepOptions, inputs: tuple[Vector, Vector, Vector], r: Outcome
 ) -> Outcome:
-    """The outcome of a step, refused where the forces of loops gave energy (loop_work.py), or it gained some.
+    """The outcome of a step, refused where the forces of loops gave energy (loop_work.py), it gained some, or it ends
+    so fast that no other step could begin there.
 
-    inputs: (q, v, u). The interior point checks the latter for every solution.
+    inputs: (q, v, u). The interior point checks the gain for every solution.
     """
     if r.status == Status.SOLVED and loops_gained(model, data, options, inputs[1]):
         return Outcome(Status.LOOP_STEP.value, r.iterations, r.residual, r.violation)
     smooth = model.contact_body.shape[0] + model.limit_dof.shape[0] == 0
     if r.status == Status.SOLVED and smooth and step_gained(model, data, options, inputs):
         return Outcome(Status.ENERGY_STEP.value, r.iterations, r.residual, r.violation)
+    if r.status == Status.SOLVED and not ends_below_half(model, data, options.h):
+        return Outcome(Status.ANGULAR_STEP.value, r.iterations, r.residual, r.violation)
     return r
 
 

@@ -19,7 +19,7 @@ from sim.integrators.feedback import Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.layout import CARRY
 from sim.model.model import Model
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Engine, Floats, Law
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Law
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted
@@ -71,38 +71,33 @@ class DividingEngine(Engine):
     # -- one step ------------------------------------------------------------------------------------------------------
 
     def divide(
-        self,
-        start: tuple[Vector, float] | Vector,
-        u: Vector,
-        wrench: Cube,
-        kappa: float | None = None,
-        *,
-        derivatives: bool = False,
+        self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, *, derivatives: bool = False
     ) -> Divided | None:
-        """The step under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
+        """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6) in as few parts as possible.
 
-        start: a state (nx,), or one of parts with their time step. None where LARGEST_DIVISION parts are not enough.
+        None where LARGEST_DIVISION parts are not enough.
         """
         parts = 2
         while parts <= LARGEST_DIVISION:
-            found = self._in_parts(parts, start, (u, wrench), kappa, derivatives)
+            found = self.in_parts(parts, x, (u, wrench), kappa, derivatives=derivatives)
             if found is not None:
                 return found
             parts *= 2
         return None
 
-    def _in_parts(
+    def in_parts(
         self,
         parts: int,
-        start: tuple[Vector, float] | Vector,
+        x: Vector,
         given: tuple[Vector, Cube],
-        kappa: float | None,
-        derivatives: bool,
+        kappa: float | None = None,
+        *,
+        derivatives: bool = False,
     ) -> Divided | None:
+        """The step in so many parts; None where one of them is not solved. given: input, external wrenches."""
         engine = self.part(parts)
         part, (u, wrench) = engine.settings.time_step, given
-        x, interval = start if isinstance(start, tuple) else (start, self.intervals.of_one(start))
-        first = self.intervals.changed(interval, part, x)
+        first = self.intervals.to_part(x, part)
         if first is None:
             return None
         us, wrenches = np.repeat(u[None], parts, axis=0), np.repeat(wrench, parts, axis=0)
@@ -112,9 +107,9 @@ class DividingEngine(Engine):
             return None
         last = rolled.xs[-1]
         end = self.intervals.from_part(last, part)
-        if end is None and derivatives:  # a state that is not exact has none
-            return None
-        return Divided(engine, rolled, last if end is None else end, end is not None)
+        if end is not None:
+            return Divided(engine, rolled, end, 1.0)
+        return None if derivatives else Divided(engine, rolled, *self.intervals.slowed(last, part))
 
     def interval(self, x: Vector) -> float:
         """That of the velocity of the state x [s]."""
@@ -135,63 +130,43 @@ class DividingEngine(Engine):
 
     # -- motions -------------------------------------------------------------------------------------------------------
 
-    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers) -> int:
+    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division) -> int:
         """As Engine.take_steps, with division."""
-        return self._march_on(model, motion, kappa, substeps, super().take_steps(model, motion, kappa, substeps))
+        return self._go_on(model, motion, kappa, division, super().take_steps(model, motion, kappa, division))
 
-    def _march_on(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers, knot: int) -> int:
+    def _go_on(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int) -> int:
         """Go on from the step `knot`, which was not solved."""
         steps, piece = len(motion.us), _PIECE
         try:
-            while knot < steps:
-                divided = self._divide_row(motion, knot, kappa, substeps, None)
-                while divided is not None:
-                    knot += 1
-                    if divided.exact or knot == steps:
-                        break
-                    start = divided.rolled.xs[-1], divided.engine.settings.time_step
-                    divided = self._divide_row(motion, knot, kappa, substeps, start)
-                if divided is None or knot == steps:
-                    break
-                done = count = 0
-                while knot < steps and done == count:
+            while knot < steps and self._divide_row(motion, knot, kappa, division):
+                knot, whole = knot + 1, True
+                while knot < steps and whole:
                     rest = _rows(motion, knot, min(piece, steps - knot))
-                    count = len(rest.us)
-                    done = super().take_steps(model, rest, kappa, substeps[knot : knot + count])
-                    knot, piece = knot + done, (min(2 * piece, _LARGEST_PIECE) if done == count else _PIECE)
-                if done == count:
-                    break
+                    done = super().take_steps(model, rest, kappa, division)
+                    knot, whole = knot + done, done == len(rest.us)
+                    piece = min(2 * piece, _LARGEST_PIECE) if whole else _PIECE
         except KeyboardInterrupt as stop:
             raise Interrupted(knot + (stop.result if isinstance(stop, Interrupted) else 0)) from None
         return knot
 
-    def _divide_row(
-        self,
-        motion: MotionBuffers,
-        knot: int,
-        kappa: float | None,
-        substeps: Integers,
-        start: tuple[Vector, float] | None,
-    ) -> Divided | None:
-        """Divide the step `knot` of a motion, which was not solved, or begins at the parts' state `start`."""
+    def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None, division: Division) -> bool:
+        """Divide the step `knot` of a motion, which was not solved; False where that does not solve it."""
         report = motion.reports[min(knot, len(motion.reports) - 1)]
-        if start is None and int(report[0]) not in DIVISIBLE:
-            return None
+        if int(report[0]) not in DIVISIBLE:
+            return False
         derivatives = len(motion.A) > 0
         x, wrench = motion.xs[knot], motion.wrenches[knot : knot + 1]
-        divided = self.divide(start or x, motion.us[knot], wrench, kappa, derivatives=derivatives)
+        divided = self.divide(x, motion.us[knot], wrench, kappa, derivatives=derivatives)
         if divided is None:
-            if start is not None:
-                report[:] = Status.ANGULAR_STEP, 0.0, 0.0, 0.0, -1.0, 0.0
-            return None
+            return False
         motion.xs[knot + 1] = divided.x
         report[:] = divided.report()
-        substeps[knot] = divided.parts
+        division.substeps[knot], division.shares[knot] = divided.parts, divided.share
         if len(motion.contacts):
             motion.contacts[knot] = divided.contacts()
         if derivatives:
             motion.A[knot], motion.B[knot] = self.slopes(x, divided)
-        return divided
+        return True
 
     def _follow(self, law: Law, settings: Vector, substeps: int, path: Path, first: int) -> int:
         """As Engine._follow, with division."""
@@ -239,7 +214,7 @@ class DividingEngine(Engine):
             report[0, 0] = status[i]
             motion = MotionBuffers(xs[i], us[i], self.no_wrenches, report, self._no_contacts, *self.unknown[:2])
             try:
-                knots[i] = self._march_on(model, motion, None, np.ones(len(us[i]), dtype=np.int64), int(knots[i]))
+                knots[i] = self._go_on(model, motion, None, Division.none(len(us[i])), int(knots[i]))
             except Interrupted as stop:
                 knots[i], status[i] = stop.result, Status.INTERRUPTED
                 raise Interrupted((xs, status, knots)) from None

@@ -63,7 +63,7 @@ class Divided(NamedTuple):
     engine: Engine  # that of its parts
     rolled: Rolled  # its parts
     x: Vector  # (nx,) the state after it
-    exact: bool  # whether that has the momentum of the last part
+    share: float  # of the momentum of bodies against each other at the end of the parts that it has, nearly always 1
 
     @property
     def parts(self) -> int:
@@ -89,6 +89,18 @@ class Divided(NamedTuple):
         return np.asarray(out)
 
 
+class Division(NamedTuple):
+    """Where a motion has divided steps, and how much of their momentum they handed on."""
+
+    substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
+    shares: Floats  # (T,) of the momentum of bodies against each other, 1 where all was handed on
+
+    @classmethod
+    def none(cls, steps: int) -> Division:
+        """That of so many whole steps."""
+        return cls(np.ones(steps, dtype=np.int64), np.ones(steps))
+
+
 class Rolled(NamedTuple):
     """A rollout; rows after the solved steps are undefined."""
 
@@ -98,7 +110,7 @@ class Rolled(NamedTuple):
     contacts: Floats  # (T, ncontact, 11), or (0, ncontact, 11) beside derivatives
     A: Floats  # (T, ndx, ndx) derivatives, or (0, ndx, ndx)
     B: Floats  # (T, ndx, nu)
-    substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
+    division: Division
 
 
 Law = tuple[FeedbackLaw, float, tuple[Floats, Floats]]  # with the share of its steps that is taken, and limits of u
@@ -225,24 +237,24 @@ class Engine:
             contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
             model = self.linked(link_step)
         motion = MotionBuffers(xs, us, self.external(wrenches), reports, contacts, A, B)
-        substeps = np.ones(steps, dtype=np.int64)
+        division = Division.none(steps)
         try:
-            knot = self.take_steps(model, motion, kappa, substeps)
+            knot = self.take_steps(model, motion, kappa, division)
         except Interrupted as stop:
             if derivatives:  # calls that differentiate have no partial result
                 raise KeyboardInterrupt from None
             knot = stop.result
-            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, substeps)) from None
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
         if derivatives:
             knot = refuse(reports, knot, A[:knot], B[:knot])
         if knot < steps:
             np.nan_to_num(reports[knot], copy=False, nan=np.inf, posinf=np.inf)
-        return Rolled(knot, xs, reports, contacts, A, B, substeps)
+        return Rolled(knot, xs, reports, contacts, A, B, division)
 
-    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, substeps: Integers) -> int:
+    def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division) -> int:
         """Steps until the end or the first unsolved one: their number, which Interrupted carries, too.
 
-        substeps: (T,) ones, where a divided step leaves the number of its parts.
+        division: of whole steps, where a divided step leaves its numbers.
         """
         steps, knot = len(motion.us), 0
         data = self._scratch.table()
@@ -257,13 +269,7 @@ class Engine:
         return knot
 
     def divide(
-        self,
-        start: tuple[Vector, float] | Vector,
-        u: Vector,
-        wrench: Cube,
-        kappa: float | None = None,
-        *,
-        derivatives: bool = False,
+        self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, *, derivatives: bool = False
     ) -> Divided | None:
         """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
         return None

@@ -16,7 +16,7 @@ from sim.integrators.tangents import Tangents
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind, Model
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, follow, interrupted
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, follow, interrupted
 from sim.simulator.link import link_smooth
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -59,7 +59,7 @@ class HighOrderEngine(Engine):
         """As Engine.roll; without contacts and without a kappa; derivatives take a second pass."""
         steps = len(us)
         xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
-        xs[0], whole = x, np.ones(steps, dtype=np.int64)
+        xs[0], whole = x, Division.none(steps)
         external = self.external(wrenches)
         A, B = self.unknown[:2]
         contacts = np.zeros((steps, 0, CONTACT))

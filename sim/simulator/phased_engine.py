@@ -22,7 +22,7 @@ from sim.integrators.hamilton_gradient import Slopes
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import CONTACT, REPORT, Engine, Floats, Rolled, interrupted
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
 from sim.simulator.high_order_engine import HighOrderEngine
 from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
@@ -129,7 +129,7 @@ class PhasedEngine(HighOrderEngine):
                 means, us[rows], external[rows], out.reports[rows], out.contacts[rows], *self.unknown[:2]
             )
             try:
-                solved = self._second.take_steps(model, line, kappa, np.ones(count, dtype=np.int64))
+                solved = self._second.take_steps(model, line, kappa, Division.none(count))
             except Interrupted:
                 raise KeyboardInterrupt from None
             nodes = means[1 : solved + 1].copy()
@@ -159,12 +159,12 @@ class PhasedEngine(HighOrderEngine):
             m = self.march(x, us, wrenches, kappa)
         except Interrupted as stop:
             knot, xs, reports, contacts = stop.result
-            none, whole = self.unknown[:2], np.ones(len(us), dtype=np.int64)
+            none, whole = self.unknown[:2], Division.none(len(us))
             raise Interrupted(Rolled(knot, xs, reports, contacts, none[0], none[1], whole)) from None
         A, B = self.unknown[:2]
         if derivatives:
             A, B, *_ = self.linearize(m.xs[:-1], us, 1, kappa, None, wrenches)
-        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, np.ones(len(us), dtype=np.int64))
+        return Rolled(m.knot, m.xs, m.reports, m.contacts, A, B, Division.none(len(us)))
 
     def far(self) -> NDArray[np.bool_]:
         """As Engine.far; all of them where the step was of higher order."""

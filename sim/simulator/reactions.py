@@ -122,7 +122,7 @@ def reactions(
             if status == Status.SOLVED:
                 status, detail = Status(int(rolled.reports[0, 0])), explain(call, rolled.reports[0], state)
             continue
-        if rolled.substeps[0] == 1:
+        if rolled.division.substeps[0] == 1:
             out[:, k] = _rows(mech, engine, loops, frame)
         else:
             external = engine.external(wrenches)[k : k + 1]

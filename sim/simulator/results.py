@@ -135,6 +135,7 @@ class StepResult(Result):
     violation: float  # largest |product - kappa| of the complementary pairs
     scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
     substeps: int = 1  # that it was divided into
+    share: float = 1.0  # of the momentum of bodies against each other that a divided step handed on
     detail: str = ""
 
     @cached_property
@@ -159,6 +160,7 @@ class Trajectory(Result):
     iterations: Integers  # (T,)
     contacts: Contacts
     substeps: Integers  # (T,) that each step was divided into
+    shares: Floats  # (T,) of the momentum of bodies against each other that each step handed on: 1, but in whips
     detail: str = ""
     wrenches: Floats | None = None  # (T, nbody, 6) external ones, if there were any [N, N m]
 

@@ -16,7 +16,7 @@ from sim.derivatives.parameters.terrain_parameters import height_gradients
 from sim.integrators.adjoint import Sweep, sweep
 from sim.mechanism.mechanism import Mechanism
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Engine, Rolled
+from sim.simulator.engine import CONTACT, DIVISIBLE, REPORT, Divided, Division, Engine, Rolled
 from sim.simulator.link import link_heights, link_parameters
 from solvers.status import Status
 from solvers.types import Vector
@@ -153,8 +153,8 @@ def roll_parameters(
         if reports[t, 0] != Status.SOLVED:
             knot = t
             break
-    contacts, substeps = np.zeros((0, engine.sizes.ncontact, CONTACT)), np.ones(n, dtype=np.int64)
-    return Rolled(knot, xs, reports, contacts, A, B, substeps), J
+    contacts = np.zeros((0, engine.sizes.ncontact, CONTACT))
+    return Rolled(knot, xs, reports, contacts, A, B, Division.none(n)), J
 
 
 def _add_heights(mech: Mechanism, plan: ParameterPlan, coefficients: Floats, out: Floats) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace as changed
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,14 +17,14 @@ from sim.mechanism.mechanism import Mechanism
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
 from sim.simulator.describe import describe
-from sim.simulator.engine import REPORT, Rolled, interrupted
+from sim.simulator.engine import REPORT, Rolled
+from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
 from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
     STATUSES,
     Batch,
     Gradient,
-    Interrupted,
     Jacobian,
     Linearization,
     Shot,
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
-Feedback = Callable[[float, Floats], ArrayLike]
 
 _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide")
 _ORDERS = (2, 4, 6, 8)
@@ -65,7 +64,8 @@ class Simulator(StateSpace):
                     is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
                     grows. Steps that would omit impulses kappa / gap beyond the tolerance are of order 2
     divide          whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps,
-                    as few as it needs; `substeps` of results says where. Momentum is handed on exactly
+                    as few as it needs: see `substeps` of results. Momentum is handed on exactly, but where no poses a
+                    step apart have it: there, bodies lose momentum against each other, see `shares`
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
     With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
@@ -163,8 +163,9 @@ class Simulator(StateSpace):
         detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], rolled.xs[0])
         scene = (self.mechanism, self.time_step, rolled.contacts[0])
         end = rolled.xs[1 if rolled.knot else 0]
-        parts = int(rolled.substeps[0])
-        found = StepResult(end, STATUSES[int(status)], int(iterations), residual, violation, scene, parts, detail)
+        parts, share = (float(column[0]) for column in rolled.division)
+        end_status = STATUSES[int(status)]
+        found = StepResult(end, end_status, int(iterations), residual, violation, scene, int(parts), share, detail)
         return ended(found, throw) if throw else found
 
     def rollout(
@@ -194,7 +195,7 @@ class Simulator(StateSpace):
             external = self._arguments.wrenches("rollout", wrenches, count)
             policy = us
             asked = carried(
-                lambda: self._roll_policy(state, policy, count, external),
+                lambda: roll_policy(self._engine, state, policy, count, external),
                 lambda found: self._trajectory(found[0], found[1], external),
             )
             return ended(asked, throw)
@@ -208,32 +209,6 @@ class Simulator(StateSpace):
             lambda rolled: self._trajectory(inputs, rolled, external),
         )
         return ended(found, throw)
-
-    def _roll_policy(self, x: Floats, policy: Feedback, count: int, wrenches: Floats | None) -> tuple[Floats, Rolled]:
-        """Inputs of a policy and their rollout; every step is solved afresh, so it equals others to the tolerance."""
-        us = np.zeros((count, self.nu))
-        xs, reports = np.zeros((count + 1, self.nx)), np.zeros((count, REPORT))
-        contacts: list[Floats] = []
-        substeps = np.ones(count, dtype=np.int64)
-        xs[0], knot = x, 0
-        try:
-            for k in range(count):
-                name = f"Simulator.rollout: u of the policy at step {k}"
-                us[k] = checks.array(name, policy(k * self.time_step, xs[k].copy()), (self.nu,))
-                one = self._engine.roll(xs[k], us[k : k + 1], None if wrenches is None else wrenches[k : k + 1])
-                reports[k], xs[k + 1] = one.reports[0], one.xs[1]
-                contacts.append(one.contacts[0])
-                substeps[k] = one.substeps[0]
-                if one.knot == 0:
-                    break
-                knot = k + 1
-        except KeyboardInterrupt:
-            reports = interrupted(reports, knot)
-            A, B = self._engine.unknown[:2]
-            done = Rolled(knot, xs, reports, np.array(contacts), A, B, substeps)
-            raise Interrupted((us, done) if knot else None) from None
-        A, B = self._engine.unknown[:2]
-        return us, Rolled(knot, xs, reports, np.array(contacts), A, B, substeps)
 
     def _trajectory(self, inputs: Floats, rolled: Rolled, wrenches: Floats | None) -> Trajectory:
         """A rollout under the inputs (T, nu)."""
@@ -250,7 +225,8 @@ class Simulator(StateSpace):
             residual=float(last[2]),
             iterations=reports[:knot, 1].astype(np.int64),
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
-            substeps=rolled.substeps[:knot],
+            substeps=rolled.division.substeps[:knot],
+            shares=rolled.division.shares[:knot],
             detail="" if status == Status.SOLVED else self._sentence(f"Simulator.rollout: step {knot}", last, xs[knot]),
             wrenches=None if wrenches is None else wrenches[:knot],
         )

@@ -10,7 +10,7 @@ from sim.dynamics.coordinates import node_poses
 from sim.dynamics.elimination import factor, project, solve, subtree_sums
 from sim.dynamics.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
 from sim.dynamics.kinematics import velocity_columns
-from sim.dynamics.momentum_balance import momentum_balance_jacobian, turns_below_half
+from sim.dynamics.momentum_balance import momentum_balance_jacobian, turns_below_half, world_inertia
 from sim.dynamics.velocity import joint_twists
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
@@ -164,17 +164,33 @@ def start_at(model_at: Table, data_at: Table, h: float, velocity: Vector, x: Vec
 
 
 @kernel
-def change_interval(model_at: Table, data_at: Table, h: float, other: float, x: Vector) -> int:
-    """Solve p(q, v'; other) = p(q, v15; h): the mean velocity over another interval that has the node's momentum.
-
-    x: [q; v15], its velocities are overwritten.
-    """
+def momentum_at(model_at: Table, data_at: Table, h: float, x: Vector, out: Vector) -> None:
+    """out = p(q, v15; h), the momentum of the node of a state in joint coordinates.   out: (nv,)."""
     model = model_view(model_at)
     data = data_view(data_at)
-    for d in range(data.nu.shape[0]):
+    for d in range(out.shape[0]):
         data.rhs[d] = 0.0
-    momentum_error(model, data, h, x, data.rhs, data.nu)
-    return _meet_momentum(model, data, other, _momentum_scale(model, data, other, x), x)
+    momentum_error(model, data, h, x, data.rhs, out)
+
+
+@kernel
+def state_of_momentum(model_at: Table, data_at: Table, h: float, p: Vector, x: Vector) -> int:
+    """Solve p(q, v15; h) = p for v15.   x: [q; first guess of v15], its velocities are overwritten; p: (nv,)."""
+    model = model_view(model_at)
+    data = data_view(data_at)
+    copy_vector(p, data.nu)
+    return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
+
+
+@kernel
+def momenta_of_velocities(model_at: Table, data_at: Table, x: Vector, vs: Matrix, out: Matrix) -> None:
+    """out[k] = M(q) vs[k].   x: [q; v]; vs, out: (n, nv)."""
+    model = model_view(model_at)
+    data = data_view(data_at)
+    node_poses(model, data, 1.0, x)
+    world_inertia(model, data.rot2, data.inertia_world)
+    for k in range(vs.shape[0]):
+        momentum_of_velocity(model, data, vs[k], out[k])
 
 
 @kernel

@@ -1,0 +1,242 @@
+"""Division of steps: what cannot be solved as a whole is solved in parts, and everything follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import dojo_opt as dojo
+from dojo_opt import models
+from sim.simulator.dividing_engine import DividingEngine
+
+Floats = NDArray[np.float64]
+
+
+def links(count: int, length: float = 2.0, mass: float = 2.0) -> dojo.Mechanism:
+    """An undamped chain of rods, hanging from the world."""
+    size, m = length / count, mass / count
+    inertia = m / 12.0 * size * size
+    bodies = [dojo.Body(f"rod{k}", m, (inertia, inertia, 1e-2 * inertia)) for k in range(count)]
+    joints = [
+        dojo.Joint(
+            "revolute",
+            f"rod{k - 1}" if k else None,
+            f"rod{k}",
+            parent_point=(0.0, 0.0, -0.5 * size if k else 0.0),
+            child_point=(0.0, 0.0, 0.5 * size),
+            axis=(0.0, -1.0, 0.0),
+        )
+        for k in range(count)
+    ]
+    return dojo.Mechanism(bodies, joints)
+
+
+def engine(sim: dojo.Simulator) -> DividingEngine:
+    """That of a simulator which divides steps."""
+    assert isinstance(sim._engine, DividingEngine)
+    return sim._engine
+
+
+def forced(sim: dojo.Simulator, x: Floats, u: Floats, parts: int) -> Floats:
+    """The state after a step in so many parts."""
+    found = engine(sim).in_parts(parts, x, (u, engine(sim).no_wrenches))
+    assert found is not None and found.share == 1.0
+    return np.asarray(found.x)
+
+
+def moving(name: str, time_step: float, steps: int = 0) -> tuple[dojo.Simulator, Floats, Floats]:
+    """A simulator, a random state or the one that it leads to, and a random input."""
+    rng = np.random.default_rng(3)
+    sim = dojo.Simulator(getattr(models, name)(), time_step=time_step, kappa=1e-4, tolerance=1e-12)
+    x = sim.integrate(sim.neutral(), np.r_[0.05 * rng.normal(size=sim.nv), 0.5 * rng.normal(size=sim.nv)])
+    if steps:
+        x = sim.rollout(x, steps=steps, throw=True).x[-1]
+    return sim, x, rng.normal(size=sim.nu)
+
+
+@pytest.fixture(scope="module")
+def whip() -> tuple[dojo.Simulator, Floats]:
+    """Three links, a step before they turn against each other too far for a step of 10 ms."""
+    rng = np.random.default_rng(4)
+    sim = dojo.Simulator(links(3), time_step=0.01, tolerance=1e-12)
+    x = np.r_[rng.uniform(-3.0, 3.0, 3), 20.0 * rng.normal(size=3)]
+    motion = sim.replace(divide=False).rollout(x, steps=100)
+    assert not motion.success
+    return sim, motion.x[-2]
+
+
+def test_a_refused_step_is_divided(whip: tuple[dojo.Simulator, Floats]) -> None:
+    sim, x = whip
+    assert sim.replace(divide=False).rollout(x, steps=20).knot == 1
+    motion = sim.rollout(x, steps=20, throw=True)
+    assert motion.substeps[0] == 1 < motion.substeps[1]
+    assert sim.step(motion.x[1]).substeps == motion.substeps[1]
+    assert np.array_equal(motion.x, sim.rollout(x, steps=20).x)  # a division is deterministic
+
+
+def test_a_motion_without_division_is_that_of_a_simulator_that_refuses() -> None:
+    sim, x, _ = moving("quadruped", 0.01)
+    motion = sim.rollout(x, steps=40, throw=True)
+    assert motion.substeps.max() == 1
+    assert np.array_equal(motion.x, sim.replace(divide=False).rollout(x, steps=40).x)
+
+
+@pytest.mark.parametrize("parts", [2, 16])
+def test_parts_of_a_fall_are_the_fall(parts: int) -> None:
+    """Without rotation, steps of any length have the same nodes: momentum is handed on at both ends."""
+    sim = dojo.Simulator(models.sphere(), time_step=0.05, tolerance=1e-13)
+    x = sim.neutral()
+    x[2], x[sim.nq : sim.nq + 3] = 20.0, (1.0, -2.0, 3.0)
+    u = np.zeros(sim.nu)
+    assert np.allclose(forced(sim, x, u, parts), sim.step(x, u, throw=True).x, rtol=0.0, atol=1e-10)
+
+
+def test_momentum_is_handed_on_exactly() -> None:
+    rng = np.random.default_rng(0)
+    mech = dojo.Mechanism(
+        [dojo.Body("a", 1.0, (0.1, 0.2, 0.3)), dojo.Body("b", 0.5, (0.02, 0.03, 0.04))],
+        [dojo.Joint("floating", None, "a"), dojo.Joint("spherical", "a", "b", parent_point=(0.3, 0, 0))],
+        gravity=(0.0, 0.0, 0.0),
+    )
+    sim = dojo.Simulator(mech, time_step=0.1, tolerance=1e-13)
+    x = sim.integrate(sim.neutral(), np.r_[np.zeros(sim.nv), 4.0 * rng.normal(size=sim.nv)])
+    before = np.concatenate(sim.momentum(x))
+    for parts in (2, 4, 32):
+        after = np.concatenate(sim.momentum(forced(sim, x, np.zeros(sim.nu), parts)))
+        assert np.abs(after - before).max() < 1e-11 * np.abs(before).max()
+
+
+@pytest.mark.parametrize(("name", "steps"), [("quadruped", 0), ("quadruped", 60), ("hopper", 60), ("fourbar", 3)])
+def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
+    """The products of those of its parts and of the conversions, against central differences that keep the division."""
+    sim, x, u = moving(name, 0.01, steps)
+    if name == "fourbar":
+        x = sim.start(sim.neutral()[: sim.nq], np.ones(sim.nv))
+    found = engine(sim).in_parts(4, x, (u, engine(sim).no_wrenches), derivatives=True)
+    assert found is not None
+    A, B = engine(sim).slopes(x, found)
+    eps = 2e-7
+    for k in range(sim.ndx):
+        dx = eps * np.eye(sim.ndx)[k]
+        ahead, behind = (forced(sim, sim.integrate(x, s * dx), u, 4) for s in (1.0, -1.0))
+        assert np.abs(sim.difference(ahead, behind) / (2 * eps) - A[:, k]).max() < 1e-6 * np.abs(A).max()
+    for k in range(sim.nu):
+        du = 1e-3 * np.eye(sim.nu)[k]
+        ahead, behind = (forced(sim, x, u + s * du, 4) for s in (1.0, -1.0))
+        assert np.abs(sim.difference(ahead, behind) / 2e-3 - B[:, k]).max() < 1e-5 * np.abs(B).max()
+
+
+@pytest.fixture(scope="module")
+def divided(whip: tuple[dojo.Simulator, Floats]) -> tuple[dojo.Simulator, dojo.Trajectory]:
+    """A motion in which one step is divided, and its end is exact."""
+    sim, x = whip
+    motion = sim.rollout(x, 1e-3 * np.ones((3, sim.nu)), throw=True)
+    assert motion.substeps.max() > 1
+    return sim, motion
+
+
+NAMES = ("mass", "inertia", "com", "parent_point", "time_step")
+
+
+def test_derivatives_by_parameters(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    sim, motion = divided
+    t = int(motion.substeps.argmax())
+    x, u = motion.x[t], motion.u[t]
+    table = sim.linearize(x, u, wrt=NAMES)
+    for name in NAMES:
+        values = sim.parameters([name]).values
+        for j, value in enumerate(values):
+            eps = 1e-5 * max(abs(value), 1e-1)
+            ends = []
+            for sign in (1.0, -1.0):
+                changed = values.copy()
+                changed[j] += sign * eps
+                ends.append(sim.with_parameters({name: changed}).step(x, u, throw=True))
+            assert ends[0].substeps == ends[1].substeps == motion.substeps[t]
+            difference = sim.difference(ends[0].x, ends[1].x) / (2.0 * eps)
+            assert np.abs(table[name][:, j] - difference).max() < 1e-6 * max(1.0, np.abs(table[name]).max()), name
+
+
+def test_sweep_and_products_agree(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    sim, motion = divided
+    xs, linear = sim.linearize_rollout(motion.x[0], motion.u, wrt=["mass"], throw=True)
+    assert np.allclose(xs, motion.x, rtol=0.0, atol=1e-9)
+    loss = np.random.default_rng(1).normal(size=(len(xs), sim.ndx))
+    gradient = sim.vjp(motion, loss, wrt=("state", "input", "mass"), throw=True)
+    costate, mass = loss[-1], np.zeros(sim.nbody)
+    for t in range(len(motion.u) - 1, -1, -1):
+        mass = mass + linear.parameters["mass"][t].T @ costate
+        assert np.allclose(gradient["input"][t], linear.B[t].T @ costate, rtol=1e-7)
+        costate = linear.A[t].T @ costate + loss[t]
+    assert np.allclose(gradient["state"], costate, rtol=1e-7)
+    assert np.allclose(gradient["mass"], mass, rtol=1e-7)
+    knots = sim.linearize_trajectory(motion.x, motion.u, throw=True)
+    assert np.allclose(knots.A, linear.A, rtol=1e-6, atol=1e-6 * np.abs(linear.A).max())
+
+
+def test_batches_and_closed_loops_divide(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    sim, motion = divided
+    x0, us = motion.x[0], motion.u
+    batch = sim.rollout_batch(np.tile(x0, (3, 1)), np.tile(us, (3, 1, 1)), throw=True)
+    assert np.allclose(batch.x, motion.x, rtol=0.0, atol=1e-9)
+    shot = sim.closed_loop(x0, us, throw=True)
+    assert np.allclose(shot.x, motion.x, rtol=0.0, atol=1e-9)
+    held = sim.closed_loop(x0, us[:1], substeps=3, throw=True)
+    assert np.allclose(held.x[-1], sim.rollout(x0, np.tile(us[:1], (3, 1))).x[-1], rtol=0.0, atol=1e-9)
+
+
+def test_reactions_of_a_divided_step_are_means(divided: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    """The force of the world on the first link and gravity change the momentum of all links, over the parts."""
+    sim, motion = divided
+    t = int(motion.substeps.argmax())
+    force = sim.reactions(motion.x[t], motion.u[t], throw=True).force[0]
+    parts = engine(sim).divide(motion.x[t], motion.u[t], engine(sim).no_wrenches)
+    assert parts is not None and parts.parts == motion.substeps[t]
+    momentum = parts.engine.momenta(parts.rolled.xs)[:, :3]
+    weight = 2.0 * np.asarray(sim.mechanism.gravity)
+    assert np.allclose(momentum[-1] - momentum[0], sim.time_step * (force + weight), rtol=0.0, atol=1e-9)
+
+
+def test_contact_impulses_add_up() -> None:
+    """A ball that rests on the ground is carried by its weight times the time, in parts as well."""
+    sim = dojo.Simulator(models.sphere(), time_step=0.02)
+    x = sim.rollout(sim.neutral(), steps=200, throw=True).x[-1]
+    e = engine(sim)
+    first = e.in_parts(8, x, (np.zeros(sim.nu), e.no_wrenches))
+    assert first is not None
+    second = e.in_parts(8, first.x, (np.zeros(sim.nu), e.no_wrenches))
+    assert second is not None
+    mass = sum(b.mass for b in sim.mechanism.bodies)
+    assert second.contacts()[0, 2] == pytest.approx(mass * 9.81 * sim.time_step, rel=1e-6)
+
+
+@pytest.mark.parametrize("rate", [500.0, 3000.0])
+def test_bodies_spin_as_fast_as_they_like(rate: float) -> None:
+    mech = dojo.Mechanism([dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], gravity=(0, 0, 0))
+    sim = dojo.Simulator(mech, time_step=0.01, tolerance=1e-13)
+    x = sim.start(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.1, 0.2, rate]))
+    motion = sim.rollout(x, steps=50, throw=True)
+    momentum = np.asarray([np.concatenate(sim.momentum(row)) for row in motion.x])
+    assert np.abs(momentum - momentum[0]).max() < 1e-10 * np.abs(momentum[0]).max()
+    assert np.abs(sim.energy(motion.x) / sim.energy(x) - 1.0).max() < 1e-4
+    assert sim.velocity(motion.x[-1])[5] == pytest.approx(rate, rel=1e-6)
+
+
+@pytest.mark.parametrize("order", [4])
+def test_higher_orders_divide_their_steps_of_order_two(order: int) -> None:
+    """A hard landing in one step that order 2 refuses as a whole."""
+    sim = dojo.Simulator(models.quadruped(), time_step=0.02, order=order)
+    rng = np.random.default_rng(5)
+    x = sim.integrate(sim.neutral(), np.r_[np.zeros(sim.nv), 3.0 * rng.normal(size=sim.nv)])
+    motion = sim.rollout(x, steps=40)
+    assert motion.success, motion.message
+
+
+def test_what_division_cannot_solve_keeps_its_reason() -> None:
+    sim = dojo.Simulator(models.quadruped(), time_step=0.01, max_iterations=1)
+    result = sim.step(sim.neutral())
+    assert result.status == dojo.Status.MAX_ITERATIONS
+    assert result.substeps == 1
+    with pytest.raises(TypeError, match="divide"):
+        dojo.Simulator(models.quadruped(), divide=3)  # type: ignore[arg-type]
