@@ -23,7 +23,7 @@ from solvers.rotation import Mat3, cross, rotate
 from solvers.types import Matrix, Vector
 
 _HALF_TURN, _WHOLE_TURN = 9.8696, 39.4784  # pi^2 and (2 pi)^2, rounded down
-_QUARTER = 0.7071  # cosine of half a quarter turn
+_QUARTER = 0.7071  # cosine of half a quarter turn; as an angle, less than it about three axes
 
 
 @kernel
@@ -115,12 +115,14 @@ def turns_below_half(model: Model, data: Data, h: float, v: Vector) -> bool:
 def ends_below_half(model: Model, data: Data, h: float) -> bool:
     """`turns_below_half` at configuration 3, for the velocity data.nu: whether another step may begin there.
 
-    Axes turn with the body behind their joint. Bodies that turned by less than a quarter of a turn need no look.
+    Axes turn with the body behind their joint. Where no body or joint turned by a quarter of a turn, all is well.
     """
-    c = 1.0
+    c, most = 1.0, 0.0
     for i in range(data.turn.shape[0]):
         c = min(c, data.turn[i, 0])
-    if c > _QUARTER:
+        for d in range(model.body_vadr[i] + model.joint_ntrans[i], model.body_vadr[i + 1]):
+            most = max(most, abs(data.nu[d]))
+    if c > _QUARTER and h * most < _QUARTER:
         return True
     for i in range(model.body_parent.shape[0]):
         p, w, t = model.body_parent[i], data.twist[i], data.turn[i]

@@ -33,7 +33,8 @@ __all__ = ["LARGEST_DIVISION", "DividingEngine"]
 
 LARGEST_DIVISION = 1024  # parts of a step
 
-_PART = 1e-3  # largest gain or loss of energy in a part, of the energies that change
+_WHOLE = 0.05  # largest gain or loss of energy in a whole step, of the energies that change
+_PART = 1e-3  # in a part
 _PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
 
 
@@ -56,7 +57,7 @@ class DividingEngine(Engine):
     """The kernels of one packed mechanism, with steps of order 2 that are divided where that is necessary."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        super().__init__(model, settings._replace(loss=settings.gain))
+        super().__init__(model, settings._replace(gain=_WHOLE, loss=_WHOLE))
         self.intervals = Intervals(self)
         self._engines: dict[int, Engine] = {}  # of parts, by their number
 
