@@ -24,6 +24,7 @@ class Ours:
     order: int = 2
     kappa: float | None = None  # by default that of Simulator
     tolerance: float = 1e-8
+    divide: bool = True  # whether steps that cannot be solved are divided
     rounds: int = 3  # a run shorter than a second is clocked so many times
 
     @property
@@ -45,7 +46,7 @@ class Ours:
         """As Engine.simulate; a start that cannot be represented ends the run at its first sample."""
         marks = nodes(time_step, duration, samples)
         u = held(mechanism, inputs, int(marks[-1]))
-        sim = Simulator(mechanism, time_step, self.kappa, self.tolerance, order=self.order)
+        sim = Simulator(mechanism, time_step, self.kappa, self.tolerance, order=self.order, divide=self.divide)
         try:
             x = sim.start(q, v)
         except SimulationError as error:

@@ -10,6 +10,7 @@ import numpy as np
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.shapes import rotation_matrix
+from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
 from solvers.types import Vector
 
@@ -49,8 +50,8 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
             raise TypeError(f"expected a Trajectory, a Plan or a ClosedLoop to show, got a {type(result).__name__}")
         raise ValueError(f"this {type(result).__name__} does not know its simulator; give simulator=...")
     x, u = np.asarray(result.x, dtype=np.float64), np.asarray(result.u, dtype=np.float64)
-    substeps = getattr(result, "substeps", 1)
     known = getattr(result, "contacts", None)  # a plan has none
+    substeps = 1 if isinstance(result, Trajectory) else getattr(result, "substeps", 1)  # per knot
     if known is None:
         normal, friction = _contact_forces(sim, x, u, substeps)
     else:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.integrators.legendre import momentum_jacobian
+from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.model.pace import rows
 from sim.simulator.engine import Engine, Floats
 from sim.simulator.link import link_gradient, link_step

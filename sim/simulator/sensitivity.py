@@ -81,7 +81,7 @@ class Request(NamedTuple):
         return self._replace(plan=self.plan._replace(weights=weights))
 
 
-class Slopes(NamedTuple):
+class StepSlopes(NamedTuple):
     """Derivatives of one step."""
 
     A: Floats  # (ndx, ndx)
@@ -93,7 +93,7 @@ class Slopes(NamedTuple):
 
 def step_slopes(
     engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], kappa: float | None, *, whole: bool = True
-) -> Slopes:
+) -> StepSlopes:
     """Derivatives of the step (state, input, external wrenches (1 or 0, nbody, 6)), divided where necessary.
 
     whole: whether to try it as a whole.
@@ -102,7 +102,7 @@ def step_slopes(
     J = np.zeros((engine.ndx, request.plan.size))
     if whole:
         A, B, x_next, reports = Engine.linearize(engine, x[None], u[None], 1, kappa, None, external)
-        out = Slopes(A[0], B[0], x_next[0], reports[0], J)
+        out = StepSlopes(A[0], B[0], x_next[0], reports[0], J)
         if out.report[0] == Status.SOLVED:
             return out._replace(J=parameter_columns(engine, request.mechanism, (x, u), out.A, request.plan))
         if int(out.report[0]) not in DIVISIBLE:
@@ -110,14 +110,14 @@ def step_slopes(
     else:
         unsolved = np.zeros(REPORT)
         unsolved[0] = Status.NO_PROGRESS
-        out = Slopes(np.zeros((engine.ndx, engine.ndx)), np.zeros((engine.ndx, engine.nu)), x, unsolved, J)
+        out = StepSlopes(np.zeros((engine.ndx, engine.ndx)), np.zeros((engine.ndx, engine.nu)), x, unsolved, J)
     divided = engine.divide(x, u, external, kappa, derivatives=True)
     return out if divided is None else _divided_slopes(engine, request, (x, u, external), divided, kappa)
 
 
 def _divided_slopes(
     engine: Engine, request: Request, step: tuple[Vector, Vector, Floats], divided: Divided, kappa: float | None
-) -> Slopes:
+) -> StepSlopes:
     """Of a divided step: the products of those of its parts and of the conversions at both ends."""
     x, u, external = step
     parts, h = divided.parts, divided.engine.settings.time_step
@@ -130,7 +130,7 @@ def _divided_slopes(
     for dx, du, dp in zip(rolled.A, rolled.B, Js, strict=True):
         A, B, J = dx @ A, dx @ B + du, dx @ J + dp
     J = back @ J + request.change(last, h, engine.interval(divided.x))
-    return Slopes(back @ A, back @ B, divided.x, divided.report(), J)
+    return StepSlopes(back @ A, back @ B, divided.x, divided.report(), J)
 
 
 def roll_parameters(

@@ -83,7 +83,7 @@ def test_lost_runs_have_infinite_errors() -> None:
     fast = replace(
         scene, v=np.array([500.0, 0.0]), reference=lambda q, v, t: (np.tile(q, (11, 1)), np.tile(v, (11, 1)))
     )
-    lost = curves.point(fast, Ours(rounds=0), 0.1, fast.exact())
+    lost = curves.point(fast, Ours(rounds=0, divide=False), 0.1, fast.exact())
     assert lost.errors["position"] == np.inf and "half a turn" in lost.message
 
 

@@ -103,14 +103,14 @@ def test_closed_loop_stops_at_a_fall_and_at_an_unsolved_step():
     assert len(fall.x) == len(fall.time) == len(fall.u) + 1 == len(fall.status) + 1
     wild = HOPPER.neutral()
     wild[11] = 1e4
-    stop = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER, wild), 1.0)
+    stop = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(HOPPER.replace(divide=False), wild), 1.0)
     assert not stop.survived and stop.status[-1] != Status.SOLVED and "step 0" in stop.message
     assert len(stop.x) == 1 and stop.u.shape == (0, 3)
 
 
 def test_a_step_that_cannot_be_solved_is_softened_and_counted():
     """With one iteration less than it needs, a block that lies on the ground is only solved with softer contact."""
-    limited = BLOCK.replace(max_iterations=BLOCK.step(BLOCK.neutral()).iterations - 1)
+    limited = BLOCK.replace(max_iterations=BLOCK.step(BLOCK.neutral()).iterations - 1, divide=False)
     assert not limited.step(BLOCK.neutral()).success
     assert limited.replace(kappa=1e3 * BLOCK.kappa).step(BLOCK.neutral()).success
     loop = dojo.closed_loop(lambda t, x: np.zeros(3), Plant(limited), 5e-3, fallen=lambda x: False)

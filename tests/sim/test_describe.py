@@ -30,7 +30,7 @@ def test_a_pendulum_has_no_empty_lists_and_one_of_each() -> None:
 
 
 def test_a_body_that_turns_too_far_is_named() -> None:
-    sim = dojo.Simulator(dojo.models.block(), time_step=0.1)
+    sim = dojo.Simulator(dojo.models.block(), time_step=0.1, divide=False)
     x = sim.neutral()
     x[2], x[-1] = 3.0, 100.0
     assert "The fastest is 'block', with 100 rad/s before the step." in sim.rollout(x, np.zeros((3, 3))).message

@@ -213,7 +213,9 @@ def test_contact_impulses_add_up() -> None:
 
 @pytest.mark.parametrize("rate", [500.0, 3000.0])
 def test_bodies_spin_as_fast_as_they_like(rate: float) -> None:
-    mech = dojo.Mechanism([dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], gravity=(0, 0, 0))
+    mech = dojo.Mechanism(
+        [dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], gravity=(0, 0, 0)
+    )
     sim = dojo.Simulator(mech, time_step=0.01, tolerance=1e-13)
     x = sim.start(sim.neutral()[:7], np.array([0.0, 0.0, 0.0, 0.1, 0.2, rate]))
     motion = sim.rollout(x, steps=50, throw=True)

@@ -64,7 +64,8 @@ def test_extreme_state_whose_solutions_gain_energy(robustness, number, kappa):
     sim = dojo.Simulator(robustness.MECHANISMS["quadruped"](0.0), time_step=0.05, kappa=kappa)
     rng = np.random.default_rng([0, list(robustness.MECHANISMS).index("quadruped"), 500])
     x = [robustness.random_state(sim, rng) for _ in range(number + 1)][-1]
-    assert sim.step(x, np.zeros(sim.nu)).status == dojo.Status.ENERGY_STEP
+    assert sim.replace(divide=False).step(x, np.zeros(sim.nu)).status == dojo.Status.ENERGY_STEP
+    assert sim.energy(sim.step(x, np.zeros(sim.nu), throw=True).x) < sim.energy(x)
     finer = sim.replace(time_step=0.05 / 32)
     start = finer.start(x[: sim.nq], sim.velocity(x))
     motion = finer.rollout(start, np.zeros((32, sim.nu)), throw=True)
@@ -135,9 +136,11 @@ def test_joints_give_no_energy(start, ends, kappa):
     The second start has a solution beside that. The first has none with 10 ms, and with half of it has.
     """
     sim = dojo.Simulator(dojo.models.atlas(), time_step=0.01, kappa=kappa)
-    fall = sim.rollout(thrown(sim, start), np.zeros((100, sim.nu)))
+    fall = sim.replace(divide=False).rollout(thrown(sim, start), np.zeros((100, sim.nu)))
     assert fall.status == ends, fall.message
     assert np.diff([sim.energy(x) for x in fall.x]).max() < 1.0  # [J]
+    whole = sim.rollout(thrown(sim, start), np.zeros((100, sim.nu)), throw=True)
+    assert np.diff([sim.energy(x) for x in whole.x]).max() < 1.0
     half = sim.replace(time_step=0.005)
     then = half.rollout(fall.x[-1], np.zeros((2, sim.nu)), throw=True)
     assert half.energy(then.x[-1]) < half.energy(fall.x[-1]) + 1.0
