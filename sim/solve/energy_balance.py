@@ -58,6 +58,7 @@ LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an 
 # cosines of half the turns below which there is no such work, without contacts and with them, and above which it tells
 # nothing
 _NEAR, _NEAR_GROUND, _FAR = 0.99719, 0.99969, 0.825
+_FAR_DIVIDED = 0.97  # the same where a refused step is divided
 
 
 @kernel
@@ -213,7 +214,7 @@ def step_gained(model: Model, data: Data, options: StepOptions, inputs: tuple[Ve
     if turned > near and model.terrain_size.shape[0] == 0:
         return False
     h, least = options.h, noise(model, data, options, v)
-    if turned > _FAR:
+    if turned > (_FAR if options.loss > 1e300 else _FAR_DIVIDED):
         before = 0.5 * momentum_velocity(model, data, h, data.move_in, data.turn_in, v)
         work = constraint_work(model, data, h, v)
         if not (abs(work) if both else work) > options.gain * before + least:
