@@ -17,7 +17,7 @@ from numba.core.compiler import Compiler
 
 from solvers.compiler.notice import compiling
 
-__all__ = ["FAST", "EntryCompiler", "InnerCompiler"]
+__all__ = ["FAST", "EntryCompiler", "InnerCompiler", "PlainCompiler"]
 
 _KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline was tested with
 
@@ -27,7 +27,7 @@ class PlainCompiler(Compiler):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""
-        with compiling():
+        with compiling(func):
             return super().compile_extra(func)
 
 

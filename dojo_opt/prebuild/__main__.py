@@ -1,0 +1,73 @@
+"""python -m dojo_opt.prebuild: compile the code that a wheel ships."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from dojo_opt.prebuild.tasks import CONTENTS, tasks
+from dojo_opt.prebuild.workers import BuildError, Done, compile_tasks, work
+from solvers.compiler.cache import INNER, open_store, stamp
+from solvers.compiler.shipped import FOLDER, write_shipped
+from solvers.compiler.targets import FEATURES, target_names
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m dojo_opt.prebuild", description=__doc__)
+    parser.add_argument("--content", choices=CONTENTS, default="all", help="what is compiled (default: all)")
+    parser.add_argument("--target", choices=FEATURES, default=next(iter(target_names()), None), help="processor")
+    parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
+    parser.add_argument("--cache", type=Path, help="folder of compiled code to go on from; a temporary one by default")
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
+                        else os.cpu_count() or 1, help="processes (default: one per core)")
+    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    return parser
+
+
+def build(content: str, target: str, out: Path, cache: Path, jobs: int) -> Path:
+    """Compile, and write the file of the target."""
+    begin, names = time.perf_counter(), tasks(content)
+
+    def progress(done: Done, left: int) -> None:
+        now = time.perf_counter() - begin
+        print(
+            f"dojo_opt: {now:5.0f} s, {len(names) - left:3d} of {len(names)}: {done.task}, "
+            f"{done.compiled} functions in {done.seconds:.1f} s",
+            flush=True,
+        )
+
+    compile_tasks(names, target, cache, jobs, progress)
+    store = open_store(cache)
+    entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
+    path = write_shipped(out, target, stamp(), entries)
+    size, seconds = path.stat().st_size / 1e6, time.perf_counter() - begin
+    print(f"dojo_opt: {len(entries)} entries for {target}, {size:.1f} MB, in {seconds:.0f} s: {path}", flush=True)
+    return path
+
+
+def main() -> int:
+    """Run the command; returns the exit status."""
+    args = _parser().parse_args()
+    if args.worker:
+        return work()
+    if args.target is None:
+        print("dojo_opt: no target is known for this processor", file=sys.stderr)
+        return 2
+    try:
+        if args.cache is not None:
+            build(args.content, args.target, args.out, args.cache, args.jobs)
+        else:
+            with tempfile.TemporaryDirectory(prefix="dojo_opt_") as cache:
+                build(args.content, args.target, args.out, Path(cache), args.jobs)
+    except BuildError as error:
+        print(f"dojo_opt: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
