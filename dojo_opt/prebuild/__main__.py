@@ -13,17 +13,23 @@ from dojo_opt.prebuild.tasks import CONTENTS, tasks
 from dojo_opt.prebuild.workers import BuildError, Done, compile_tasks, work
 from solvers.compiler.cache import INNER, open_store, stamp
 from solvers.compiler.shipped import FOLDER, write_shipped
-from solvers.compiler.targets import FEATURES, target_names
+from solvers.compiler.targets import FEATURES, runnable
+
+
+def _cores() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m dojo_opt.prebuild", description=__doc__)
     parser.add_argument("--content", choices=CONTENTS, default="all", help="what is compiled (default: all)")
-    parser.add_argument("--target", choices=FEATURES, default=next(iter(target_names()), None), help="processor")
+    parser.add_argument(
+        "--targets", nargs="+", choices=FEATURES, default=runnable()[:1], help="processors that this one can stand for"
+    )
     parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
     parser.add_argument("--cache", type=Path, help="folder of compiled code to go on from; a temporary one by default")
-    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity")
-                        else os.cpu_count() or 1, help="processes (default: one per core)")
+    parser.add_argument("--jobs", type=int, default=_cores(), help="processes (default: one per core)")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
 
@@ -54,15 +60,14 @@ def main() -> int:
     args = _parser().parse_args()
     if args.worker:
         return work()
-    if args.target is None:
-        print("dojo_opt: no target is known for this processor", file=sys.stderr)
-        return 2
+    if not args.targets:
+        print("dojo_opt: no code can be shipped for this processor")
     try:
-        if args.cache is not None:
-            build(args.content, args.target, args.out, args.cache, args.jobs)
-        else:
-            with tempfile.TemporaryDirectory(prefix="dojo_opt_") as cache:
-                build(args.content, args.target, args.out, Path(cache), args.jobs)
+        for target in args.targets:
+            if target not in runnable():
+                raise BuildError(f"this processor cannot run code for {target}")
+            with tempfile.TemporaryDirectory(prefix="dojo_opt_") as scratch:
+                build(args.content, target, args.out, args.cache or Path(scratch), args.jobs)
     except BuildError as error:
         print(f"dojo_opt: {error}", file=sys.stderr)
         return 1

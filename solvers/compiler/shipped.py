@@ -1,7 +1,7 @@
 """Shipped code: the entries that came compiled with the package, one file per target in `solvers/shipped`.
 
     magic, digest of the index, length of the index
-    index       stamp, target, and by name of an entry: where it begins, its length, its SHA-256
+    index       stamp, versions of Numba and Python, target, and by name of an entry: where it begins, its length, its SHA-256
     entries     as the cache keeps them (cache.py)
 
 The stamp is that of the cache: sources of all kernels, version of Numba, flags. Neither the place of the package nor
@@ -20,9 +20,12 @@ import hashlib
 import json
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+
+import numba
 
 from solvers.compiler.ownership import OTHERS, WORLD, foreign, is_private_group
 from solvers.compiler.targets import best_target
@@ -52,7 +55,9 @@ class Shipped:
             self.why_not = str(error)
             return
         if found["stamp"] != stamp:
-            self.why_not = "the shipped code is that of other sources, flags, or versions of Numba or Python"
+            same = found["versions"] == versions()
+            other = "other sources or flags" if same else f"{found['versions']}, this is {versions()}"
+            self.why_not = f"the shipped code is for {other}"
             return
         self._entries = {name: (int(a), int(n), str(d)) for name, (a, n, d) in found["entries"].items()}
 
@@ -111,6 +116,11 @@ def _files(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*{SUFFIX}")) if folder.is_dir() else []
 
 
+def versions() -> str:
+    """Those that compiled code depends on, as text."""
+    return f"Numba {numba.__version__} and Python {sys.version_info[0]}.{sys.version_info[1]}"
+
+
 def open_shipped(stamp: str, folder: Path = FOLDER) -> Shipped:
     """The code shipped for the best target that this processor can run."""
     if os.environ.get("DOJO_OPT_SHIPPED", "1") == "0":
@@ -136,7 +146,7 @@ def write_shipped(folder: Path, target: str, stamp: str, entries: Mapping[str, b
     for name, data in sorted(entries.items()):
         index[name] = (start, len(data), hashlib.sha256(data).hexdigest())
         start += len(data)
-    text = json.dumps({"stamp": stamp, "target": target, "entries": index}).encode()
+    text = json.dumps({"stamp": stamp, "versions": versions(), "target": target, "entries": index}).encode()
     folder.mkdir(parents=True, exist_ok=True)
     handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
     try:

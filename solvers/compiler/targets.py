@@ -13,7 +13,7 @@ import sys
 import llvmlite.binding as llvm
 import numba
 
-__all__ = ["FEATURES", "best_target", "build_environment", "target_names"]
+__all__ = ["FEATURES", "best_target", "build_environment", "runnable"]
 
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
@@ -44,9 +44,11 @@ def runnable() -> tuple[str, ...]:
         named = numba.config.CPU_NAME if numba.config.CPU_FEATURES == "" else None
         return tuple(target for target in target_names() if target == named)
     try:
-        host = llvm.get_host_cpu_features()
+        host = dict(llvm.get_host_cpu_features())
     except RuntimeError:  # LLVM does not know this system
-        return ()
+        host = {}
+    if not numba.config.ENABLE_AVX:  # which Numba turns off where it is known to fail
+        host = {name: has and not name.startswith("avx") for name, has in host.items()}
     return tuple(target for target in target_names() if all(host.get(name, False) for name in FEATURES[target]))
 
 

@@ -1,0 +1,67 @@
+"""Build hook: a wheel holds the compiled code of the kernels, unless it is a pure one.
+
+    DOJO_OPT_PURE=1                        the pure wheel, for any system and Python; compiles on the first use
+    DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of README's examples
+    DOJO_OPT_TARGETS="x86-64-v3 ..."       for which processors; the best that this one can run by default
+
+The code runs with the version of Numba that compiled it. A build in isolation has the newest; `pip install
+--no-build-isolation .` takes that of the environment, which needs hatchling then.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+_NEEDED = ("numba", "numpy", "scipy")  # what running a kernel takes
+
+
+def _content() -> str:
+    """What is compiled; "none" for a pure wheel."""
+    if os.environ.get("DOJO_OPT_PURE", "0") not in ("", "0"):
+        return "none"
+    return os.environ.get("DOJO_OPT_PREBUILD", "") or "all"
+
+
+class PrebuildHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Compile in worker processes, and add the files to the wheel."""
+
+    _folder: str | None = None
+
+    def dependencies(self) -> list[str]:
+        """What the build environment needs beside hatchling."""
+        if _content() == "none":
+            return []
+        names = {text: re.split(r"[^\w-]", text)[0].lower() for text in self.metadata.core.dependencies}
+        return [text for text, name in names.items() if name in _NEEDED]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Before the wheel is written; an editable installation compiles on the first use."""
+        if self.target_name != "wheel" or version == "editable" or _content() == "none":
+            return
+        self._folder = tempfile.mkdtemp(prefix="dojo_opt_build_")
+        command = [sys.executable, "-m", "dojo_opt.prebuild", "--content", _content(), "--out", self._folder]
+        command += ["--targets", *os.environ["DOJO_OPT_TARGETS"].split()] if "DOJO_OPT_TARGETS" in os.environ else []
+        path = os.pathsep.join([self.root, *filter(None, [os.environ.get("PYTHONPATH")])])
+        done = subprocess.run(command, cwd=self.root, env={**os.environ, "PYTHONPATH": path})
+        if done.returncode:
+            raise RuntimeError("the kernels could not be compiled ahead of time; DOJO_OPT_PURE=1 installs without that")
+        files = sorted(Path(self._folder).glob("*.kernels"))
+        if not files:  # no target is known for this processor: as a pure wheel
+            return
+        build_data["pure_python"], build_data["infer_tag"] = False, True
+        for file in files:
+            build_data["force_include"][str(file)] = f"solvers/shipped/{file.name}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """After the wheel was written."""
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
