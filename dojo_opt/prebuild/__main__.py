@@ -11,8 +11,8 @@ from pathlib import Path
 
 from dojo_opt.prebuild.tasks import CONTENTS, tasks
 from dojo_opt.prebuild.workers import BuildError, Done, compile_tasks, work
-from solvers.compiler.cache import INNER, open_store, stamp
-from solvers.compiler.shipped import FOLDER, write_shipped
+from solvers.compiler.cache import ship
+from solvers.compiler.shipped import FOLDER
 from solvers.compiler.targets import FEATURES, runnable
 
 
@@ -47,11 +47,9 @@ def build(content: str, target: str, out: Path, cache: Path, jobs: int) -> Path:
         )
 
     compile_tasks(names, target, cache, jobs, progress)
-    store = open_store(cache)
-    entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
-    path = write_shipped(out, target, stamp(), entries)
+    path, count = ship(cache, out, target)
     size, seconds = path.stat().st_size / 1e6, time.perf_counter() - begin
-    print(f"dojo_opt: {len(entries)} entries for {target}, {size:.1f} MB, in {seconds:.0f} s: {path}", flush=True)
+    print(f"dojo_opt: {count} entries for {target}, {size:.1f} MB, in {seconds:.0f} s: {path}", flush=True)
     return path
 
 

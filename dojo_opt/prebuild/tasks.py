@@ -17,15 +17,12 @@ from solvers.compiler.optional import OptionalKernel, optional_kernels
 __all__ = ["CONTENTS", "run", "tasks"]
 
 CONTENTS = ("all", "examples", "none")
-_LONGEST = (  # begun first, so that no worker is left with one of them at the end
+_FIRST = (  # the longest, and what later tasks would compile beside them
     "interior_point:interior_point",
-    "pair_contact:pair_kinematics",
     "step_gradient:gradient",
+    "step:step",
     "newton:newton",
-    "cylinder_pairs:cylinder_distance",
-    "inactive_pairs:begin_pairs",
-    "inactive_pairs:far_pair_impulses",
-    "active_features:choose_pairs",
+    "pair_contact:pair_kinematics",
 )
 
 
@@ -89,6 +86,11 @@ def _every(sim: Any) -> None:
         calls(sim)
 
 
+def _pendulum(calls: Callable[[Any], None], order: int = 2) -> None:
+    """Calls on the least that moves: their entries are the same for all scenes."""
+    calls(dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=order))
+
+
 def _models() -> None:
     for entry in dojo.models.catalogue():
         sim = dojo.Simulator(entry.build(), time_step=0.01)
@@ -97,17 +99,14 @@ def _models() -> None:
             calls(sim)
 
 
-def _orders() -> None:
-    bodies = [dojo.Body("a", 1.0, (0.1, 0.2, 0.3)), dojo.Body("b", 1.0, (0.1, 0.2, 0.3))]
-    joints = [dojo.Joint("floating", None, "a"), dojo.Joint("revolute", "a", "b", spring=1.0, damper=0.1)]
+def _flight(calls: Callable[[Any], None], order: int) -> None:
+    """Calls on a body above the ground, with steps of higher order."""
     foot = dojo.Contact("b", point=(0.0, 0.0, -0.1))
     above = (0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0)
-    for contacts in ((), (foot,)):
-        mech = dojo.Mechanism(bodies, joints, contacts, neutral={"a": above})
-        for order in (4, 8):
-            sim = dojo.Simulator(mech, time_step=0.01, order=order)
-            for calls in (states, motions, derivatives):
-                calls(sim)
+    mech = dojo.Mechanism(
+        [dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], [foot], neutral={"b": above}
+    )
+    calls(dojo.Simulator(mech, time_step=0.01, order=order))
 
 
 def _grounds() -> None:
@@ -153,13 +152,17 @@ def _loops() -> None:
 # -- planning ----------------------------------------------------------------------------------------------------------
 
 
+def _swingup() -> None:
+    dojo.ilqr(dojo.problems.swingup(), max_iterations=4)
+
+
 def _hop() -> None:
     plan = dojo.ilqr(dojo.problems.hop())
     dojo.tracking_gains(plan.problem, plan)
 
 
 def _plans() -> None:
-    for problem in (dojo.problems.swingup(), dojo.problems.block(), dojo.problems.trot(), dojo.problems.jump()):
+    for problem in (dojo.problems.block(), dojo.problems.trot(), dojo.problems.jump()):
         dojo.ilqr(problem, max_iterations=4)
 
 
@@ -169,13 +172,26 @@ def _mpc() -> None:
         dojo.closed_loop(mpc, dojo.tasks.plant(mpc), 0.1)
 
 
-_SCENES: dict[str, Callable[[], None]] = {
+_CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry compiles it; those below are disjoint
+    "parameters": lambda: _pendulum(parameters),
+    "derivatives": lambda: _pendulum(derivatives),
+    "plan": lambda: _swingup(),
+    "motions": lambda: _pendulum(motions),
+    "states": lambda: _pendulum(states),
+    "flight": lambda: _flight(motions, 8),
+    "states of higher order": lambda: _pendulum(states, 4),
+    "motions of higher order": lambda: _pendulum(motions, 4),
+}
+_BEYOND = {  # what neither README's examples nor the models need
+    "derivatives of higher order": lambda: _pendulum(derivatives, 4),
+    "derivatives of a flight": lambda: _flight(derivatives, 8),
+}
+_SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for
     "hop": _hop,
     "joints": _joints,
     "grounds": _grounds,
     "pairs": _pairs,
     "loops": _loops,
-    "orders": _orders,
     "models": _models,
     "plans": _plans,
     "closed loops": _mpc,
@@ -199,14 +215,15 @@ def tasks(content: str) -> list[str]:
     """
     if content == "none":
         return []
-    first = [next((k for k, end in enumerate(_LONGEST) if name.endswith(end)), len(_LONGEST)) for name in _kernels()]
-    ordered = [name for _, name in sorted(zip(first, _kernels(), strict=True), key=lambda pair: pair[0])]
-    return [*ordered, *_SCENES]
+    first = [next(name for name in _kernels() if name.endswith(f".{end}")) for end in _FIRST]
+    others = [name for name in _kernels() if name not in first]
+    return [*first, *(_BEYOND if content == "all" else ()), *_CALLS, *others, *_SCENES]
 
 
 def run(task: str) -> None:
     """Carry out one task: its kernels are compiled, or loaded."""
-    if task in _SCENES:
-        _SCENES[task]()
+    calls = _CALLS | _BEYOND | _SCENES
+    if task in calls:
+        calls[task]()
     else:
         _kernels()[task].address()

@@ -41,9 +41,9 @@ from numba.core.serialize import dumps
 
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST
-from solvers.compiler.shipped import Shipped, open_shipped
+from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 
-__all__ = ["INNER", "STORE", "KernelCache", "cache_folder", "open_store", "prepare", "shipped", "stamp"]
+__all__ = ["INNER", "STORE", "KernelCache", "cache_folder", "open_store", "prepare", "ship", "shipped", "stamp"]
 
 INNER = "inner"  # the form of a kernel that kernels call
 
@@ -221,6 +221,22 @@ STORE = Store(*_found())
 def shipped() -> Shipped:
     """The code that came with the package."""
     return open_shipped(stamp())
+
+
+def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
+    """Write the entries that processes compiled for a target as shipped code.
+
+    Args:
+        base: their NUMBA_CACHE_DIR; with the variables of `targets.build_environment`.
+        folder: where the file goes.
+        target: one of `targets.FEATURES`.
+
+    Returns:
+        The file, and the number of its entries.
+    """
+    store = open_store(base)
+    entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
+    return write_shipped(folder, target, stamp(), entries), len(entries)
 
 
 @cache
