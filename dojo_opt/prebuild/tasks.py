@@ -110,7 +110,9 @@ def _flight(calls: Callable[[Any], None], order: int) -> None:
 
 
 def _grounds() -> None:
-    hill = dojo.Terrain.from_function(lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 1.0])
+    hill = dojo.Terrain.from_function(
+        lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 1.0]
+    )
     for more in ({}, {"terrain": hill}, {"law": "linear"}, {"law": "impact"}, {"restitution": 0.5}):
         foot = dojo.Contact("ball", radius=0.1, **more)
         mech = dojo.Mechanism([dojo.Body("ball", 1.0, (0.1, 0.1, 0.1))], [dojo.Joint("floating", None, "ball")], [foot])
@@ -118,19 +120,13 @@ def _grounds() -> None:
 
 
 def _pairs() -> None:
-    shapes = (dojo.Sphere(0.1), dojo.Box(0.1, 0.1, 0.1), dojo.Cylinder(0.1, 0.1), dojo.String(1.0))
-    names = "ab"
-    for shape in shapes:
-        string = {"shape_a": shape, "shape_b": shape} if isinstance(shape, dojo.String) else {}
-        bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1), shape=None if string else shape) for name in names]
-        joints = [dojo.Joint("floating", None, name) for name in names]
-        apart = {"b": (0.15, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}
-        _every(
-            dojo.Simulator(
-                dojo.Mechanism(bodies, joints, collisions=[dojo.Collision("a", "b", **string)], neutral=apart),
-                time_step=0.01,
-            )
-        )
+    apart = {"b": (0.15, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    solids = (dojo.Sphere(0.1), dojo.Box(0.1, 0.1, 0.1), dojo.Cylinder(0.1, 0.1))
+    touching = [dojo.Collision("a", "b", shape, shape) for shape in (*solids, dojo.String(1.0))]
+    for collision in touching:
+        bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "ab"]
+        _every(dojo.Simulator(dojo.Mechanism(bodies, joints, collisions=[collision], neutral=apart), time_step=0.01))
 
 
 def _joints() -> None:

@@ -39,6 +39,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from solvers.compiler.notice import because
 from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST
 from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
@@ -248,6 +249,8 @@ def prepare() -> None:
     """
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
+    why = shipped().why_not or "this is not among the shipped code"
+    because(f"{why}; {f'kept in {STORE.folder}' if STORE.folder else 'not kept on disk'}")
 
 
 @cache

@@ -34,7 +34,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from solvers.compiler.kernels import entry
-from solvers.compiler.notice import each
+from solvers.compiler.notice import parts
 from solvers.compiler.records import RECORDS, load_word
 
 __all__ = ["OptionalKernel", "link", "optional", "optional_kernels"]
@@ -177,7 +177,7 @@ def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
         table: (slots,) addresses; overwritten in place.
         kernels: functions decorated by `optional`.
     """
-    for kernel in each(kernels):
+    for kernel in parts(kernels):
         found = cast(OptionalKernel, kernel)
         table[found.slot] = found.address()
 

@@ -1,7 +1,7 @@
 """Shipped code: the entries that came compiled with the package, one file per target in `solvers/shipped`.
 
     magic, digest of the index, length of the index
-    index       stamp, versions of Numba and Python, target, and by name of an entry: where it begins, its length, its SHA-256
+    index       stamp, versions of Numba and Python, target; by name of an entry its place, length and SHA-256
     entries     as the cache keeps them (cache.py)
 
 The stamp is that of the cache: sources of all kernels, version of Numba, flags. Neither the place of the package nor
@@ -24,6 +24,7 @@ import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -80,7 +81,7 @@ class Shipped:
             raise ValueError(f"{self._path}: cut off")
         return data
 
-    def _index(self) -> dict[str, Mapping[str, tuple[int, int, str]] | str]:
+    def _index(self) -> dict[str, Any]:
         """What the file holds."""
         _check(self._path.parent, self._path.parent.stat())
         head = self._read(0, _HEAD)
