@@ -1,7 +1,7 @@
 """Build hook: a wheel holds the compiled code of the kernels, unless it is a pure one.
 
     DOJO_OPT_PURE=1                        the pure wheel, for any system and Python; compiles on the first use
-    DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of README's examples
+    DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of README's examples (the default)
     DOJO_OPT_TARGETS="x86-64-v3 ..."       for which processors; the best that this one can run by default
 
 The code runs with the version of Numba that compiled it. A build in isolation has the newest; `pip install
@@ -28,7 +28,7 @@ def _content() -> str:
     """What is compiled; "none" for a pure wheel."""
     if os.environ.get("DOJO_OPT_PURE", "0") not in ("", "0"):
         return "none"
-    return os.environ.get("DOJO_OPT_PREBUILD", "") or "all"
+    return os.environ.get("DOJO_OPT_PREBUILD", "") or "examples"
 
 
 class PrebuildHook(BuildHookInterface):  # type: ignore[type-arg]

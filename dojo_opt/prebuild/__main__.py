@@ -9,8 +9,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from dojo_opt.prebuild.tasks import CONTENTS, tasks
+from dojo_opt.prebuild.tasks import CONTENTS, run, tasks
 from dojo_opt.prebuild.workers import BuildError, Done, compile_tasks, work
+from solvers.compiler import compiled, shipped
 from solvers.compiler.cache import ship
 from solvers.compiler.shipped import FOLDER
 from solvers.compiler.targets import FEATURES, runnable
@@ -30,6 +31,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
     parser.add_argument("--cache", type=Path, help="folder of compiled code to go on from; a temporary one by default")
     parser.add_argument("--jobs", type=int, default=_cores(), help="processes (default: one per core)")
+    parser.add_argument("--check", action="store_true", help="compile nothing: fail if the shipped code does not do")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
 
@@ -53,11 +55,26 @@ def build(content: str, target: str, out: Path, cache: Path, jobs: int) -> Path:
     return path
 
 
+def check(content: str) -> int:
+    """Carry out the tasks with the shipped code; the exit status is 1 if anything compiles."""
+    if not len(shipped()):
+        print(f"dojo_opt: {shipped().why_not}", file=sys.stderr)
+        return 1
+    for task in tasks(content):
+        run(task)
+    for name in compiled():
+        print(f"dojo_opt: compiled {name}, which should have been shipped", file=sys.stderr)
+    print(f"dojo_opt: {len(shipped())} entries for {shipped().target}, {len(compiled())} functions compiled")
+    return 1 if compiled() else 0
+
+
 def main() -> int:
     """Run the command; returns the exit status."""
     args = _parser().parse_args()
     if args.worker:
         return work()
+    if args.check:
+        return check(args.content)
     if not args.targets:
         print("dojo_opt: no code can be shipped for this processor")
     try:

@@ -1,7 +1,7 @@
 """Worker processes that compile for a target into one cache, each the next task when it is done with one.
 
-A worker reads names of tasks and answers each with a line; it ends where its input ends, so none outlives the process
-that started it.
+A worker reads names of tasks and answers each with a line. It ends where its input ends, or with the process that
+started it.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +25,7 @@ __all__ = ["BuildError", "Done", "compile_tasks", "work"]
 
 _ROOT = str(Path(__file__).resolve().parents[2])
 _ANSWER = "done"
+_LOOK = 0.5  # [s] between two looks for the process that started a worker
 
 
 class BuildError(RuntimeError):
@@ -40,11 +42,19 @@ class Done(NamedTuple):
 
 def work() -> int:
     """Carry out tasks, named line by line at the standard input, until it ends."""
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     for line in sys.stdin:
         begin, before = time.perf_counter(), len(compiled())
         run(line.strip())
         print(_ANSWER, f"{time.perf_counter() - begin:.3f}", len(compiled()) - before, flush=True)
     return 0
+
+
+def _end_with(parent: int) -> None:
+    """End this process, in the middle of a task, when the one that started it is gone. Files are written atomically."""
+    while os.getppid() == parent:
+        time.sleep(_LOOK)
+    os._exit(1)
 
 
 def _environment(target: str, cache: Path) -> dict[str, str]:
