@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.studies.timing.cold_features import SCENES, cold_step, cold_table
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 from solvers.compiler import shipped as shipped_code
@@ -80,6 +81,10 @@ class CompileTimeStudy:
             ]
         else:
             report.notes.append(f"shipped code: {shipped_code().why_not}")
+        if not self.quick:
+            features = {name: cold_step(name) for name in SCENES}
+            report.details["features"] = features
+            report.tables.append(cold_table(features))
         if cold["several"]:
             report.notes += ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
         return report
