@@ -234,7 +234,12 @@ def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
 
     Returns:
         The file, and the number of its entries.
+
+    Raises:
+        RuntimeError: sources were edited since this process began, so nobody knows which of them was compiled.
     """
+    if stamp.__wrapped__() != stamp():
+        raise RuntimeError("sources of kernels were edited during the build; build again")
     store = open_store(base)
     entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
     return write_shipped(folder, target, stamp(), entries), len(entries)

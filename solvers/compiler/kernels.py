@@ -16,7 +16,7 @@ from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
 from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, UsersCompiler
 
 __all__ = [
     "FLAGS",
@@ -181,13 +181,15 @@ class UsersKernel(Kernel):
     def entry(self) -> Any:
         """The form with a way in for Python."""
         prepare()
-        return numba.jit(nopython=True, **self.flags)(self.py_func)
+        return numba.jit(nopython=True, pipeline_class=UsersCompiler, **self.flags)(self.py_func)
 
     @cached_property
     def inner(self) -> Any:
         """The form without."""
         prepare()
-        return numba.jit(nopython=True, no_cpython_wrapper=True, **self.flags)(self.py_func)
+        return numba.jit(nopython=True, no_cpython_wrapper=True, pipeline_class=UsersCompiler, **self.flags)(
+            self.py_func
+        )
 
 
 def users_kernel(func: F, boundscheck: bool = True) -> F:

@@ -35,7 +35,7 @@ class _Clock:
     """Time spent on compilations so far; those of its callees are part of that of a kernel."""
 
     def __init__(self) -> None:
-        self.names: list[str] = []
+        self.names: list[tuple[str, bool]] = []
         self.depth = 0
         self.spent = 0.0
         self.begin = 0.0
@@ -55,7 +55,7 @@ class _Clock:
         if not self.told:
             self.told = True
             print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr)
-        text = f"dojo_opt: compiling {self.names[-1]} (function {len(self.names)}, {spent:.0f} s so far{self.part})"
+        text = f"dojo_opt: compiling {self.names[-1][0]} (function {len(self.names)}, {spent:.0f} s so far{self.part})"
         print(f"\r{text[:_WIDTH]:<{_WIDTH}}", end="", file=sys.stderr, flush=True)
         self.written = True
 
@@ -70,9 +70,9 @@ _CLOCK = _Clock()
 
 
 @contextmanager
-def compiling(func: Callable[..., Any]) -> Iterator[None]:
-    """Around the compilation of one function."""
-    _CLOCK.names.append(f"{func.__module__}.{func.__qualname__}")
+def compiling(func: Callable[..., Any], own: bool = True) -> Iterator[None]:
+    """Around the compilation of one function; own: it is not the user's."""
+    _CLOCK.names.append((f"{func.__module__}.{func.__qualname__}", own))
     if _CLOCK.depth == 0:
         _CLOCK.begin = time.perf_counter()
     _CLOCK.depth += 1
@@ -107,4 +107,4 @@ def compiled() -> list[str]:
 
     Functions of the user, and the loops around them, are not counted.
     """
-    return list(_CLOCK.names)
+    return [name for name, own in _CLOCK.names if own]
