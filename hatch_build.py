@@ -1,4 +1,4 @@
-"""Build hook: a wheel holds the compiled code of the kernels, unless it is a pure one.
+"""Build backend: hatchling, with a hook that adds the compiled code of the kernels to a wheel that is not pure.
 
     DOJO_OPT_PURE=1                        the pure wheel, for any system and Python; compiles on the first use
     DOJO_OPT_PREBUILD=all|examples|none    what is compiled: every entry, or those of README's examples (the default)
@@ -16,9 +16,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 from typing import Any
 
+from hatchling import build
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 _NEEDED = ("numba", "numpy", "scipy")  # what running a kernel takes
@@ -31,17 +33,24 @@ def _content() -> str:
     return os.environ.get("DOJO_OPT_PREBUILD", "") or "examples"
 
 
+def get_requires_for_build_wheel(config_settings: dict[str, Any] | None = None) -> list[str]:
+    """What a wheel needs beside hatchling: the libraries that run a kernel. An editable installation needs none."""
+    needed = list(build.get_requires_for_build_wheel(config_settings))
+    if _content() == "none":
+        return needed
+    with open(Path(__file__).with_name("pyproject.toml"), "rb") as file:
+        given = tomllib.load(file)["project"]["dependencies"]
+    return needed + [text for text in given if re.split(r"[^\w-]", text)[0].lower() in _NEEDED]
+
+
+for _name in build.__all__:  # the rest of the backend is that of hatchling
+    globals().setdefault(_name, getattr(build, _name))
+
+
 class PrebuildHook(BuildHookInterface):  # type: ignore[type-arg]
     """Compile in worker processes, and add the files to the wheel."""
 
     _folder: str | None = None
-
-    def dependencies(self) -> list[str]:
-        """What the build environment needs beside hatchling."""
-        if _content() == "none":
-            return []
-        names = {text: re.split(r"[^\w-]", text)[0].lower() for text in self.metadata.core.dependencies}
-        return [text for text, name in names.items() if name in _NEEDED]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Before the wheel is written; an editable installation compiles on the first use."""
