@@ -60,7 +60,8 @@ class PrebuildHook(BuildHookInterface):  # type: ignore[type-arg]
         command = [sys.executable, "-m", "dojo_opt.prebuild", "--content", _content(), "--out", self._folder]
         command += ["--targets", *os.environ["DOJO_OPT_TARGETS"].split()] if "DOJO_OPT_TARGETS" in os.environ else []
         path = os.pathsep.join([self.root, *filter(None, [os.environ.get("PYTHONPATH")])])
-        done = subprocess.run(command, cwd=self.root, env={**os.environ, "PYTHONPATH": path})
+        plain = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA_", "DOJO_OPT_"))}
+        done = subprocess.run(command, cwd=self.root, env={**plain, "PYTHONPATH": path})
         if done.returncode:
             raise RuntimeError("the kernels could not be compiled ahead of time; DOJO_OPT_PURE=1 installs without that")
         files = sorted(Path(self._folder).glob("*.kernels"))

@@ -247,6 +247,26 @@ def targets_private(about: os.stat_result) -> bool:
     return group.gr_name == pwd.getpwuid(about.st_uid).pw_name and not set(group.gr_mem) - {group.gr_name}
 
 
+def test_nothing_is_shipped_where_flags_or_sources_differ(package: Package, tmp_path: Path) -> None:
+    assert package.call(DOJO_OPT_SHIPPED="0", **targets.build_environment(TARGET))[1] == 4
+    cache, out = package.root / "cache", tmp_path / "out"
+    program = f"""
+from pathlib import Path
+from solvers.compiler import cache
+{{edit}}
+try:
+    cache.ship(Path({str(cache)!r}), Path({str(out)!r}), {TARGET!r})
+except RuntimeError as error:
+    print(error)
+"""
+    edit = f"Path({str(package.root / 'sim' / 'step.py')!r}).write_text('')"
+    assert "nothing was compiled with the flags" in python(
+        program.format(edit=""), home=package.root, NUMBA_BOUNDSCHECK="1"
+    )
+    assert "were edited during the build" in python(program.format(edit=edit), home=package.root)
+    assert not out.exists()
+
+
 def test_a_file_is_written_as_a_whole_or_not_at_all(tmp_path: Path) -> None:
     write_shipped(tmp_path, TARGET, "first", {"name": b"code"})
     with pytest.raises(TypeError):

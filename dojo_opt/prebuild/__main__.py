@@ -16,10 +16,12 @@ from solvers.compiler.cache import ship
 from solvers.compiler.shipped import FOLDER
 from solvers.compiler.targets import FEATURES, runnable
 
+_MOST = 8  # workers by default: each takes half a gigabyte, and the longest task is a fifth of all
+
 
 def _cores() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Those that this process may use, as far as they are of use."""
+    return min(_MOST, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -30,7 +32,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
     parser.add_argument("--cache", type=Path, help="folder of compiled code to go on from; a temporary one by default")
-    parser.add_argument("--jobs", type=int, default=_cores(), help="processes (default: one per core)")
+    parser.add_argument(
+        "--jobs", type=int, default=_cores(), help=f"processes (default: one per core, {_MOST} at most)"
+    )
     parser.add_argument("--check", action="store_true", help="compile nothing: fail if the shipped code does not do")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
@@ -83,7 +87,7 @@ def main() -> int:
                 raise BuildError(f"this processor cannot run code for {target}")
             with tempfile.TemporaryDirectory(prefix="dojo_opt_") as scratch:
                 build(args.content, target, args.out, args.cache or Path(scratch), args.jobs)
-    except BuildError as error:
+    except RuntimeError as error:  # a BuildError, or nothing that could be shipped
         print(f"dojo_opt: {error}", file=sys.stderr)
         return 1
     return 0

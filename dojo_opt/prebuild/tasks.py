@@ -16,7 +16,7 @@ from solvers.compiler.optional import OptionalKernel, optional_kernels
 
 __all__ = ["CONTENTS", "run", "tasks"]
 
-CONTENTS = ("all", "examples", "none")
+CONTENTS = ("all", "examples")
 _FIRST = (  # the longest, and what later tasks would compile beside them
     "interior_point:interior_point",
     "step_gradient:gradient",
@@ -207,10 +207,8 @@ def tasks(content: str) -> list[str]:
     """Names of the tasks of a build, the longest first.
 
     Args:
-        content: "all", "examples" (those of README, and the models) or "none".
+        content: "all", or "examples": those of README, and the models.
     """
-    if content == "none":
-        return []
     first = [next(name for name in _kernels() if name.endswith(f".{end}")) for end in _FIRST]
     others = [name for name in _kernels() if name not in first]
     return [*first, *(_BEYOND if content == "all" else ()), *_CALLS, *others, *_SCENES]

@@ -236,12 +236,15 @@ def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
         The file, and the number of its entries.
 
     Raises:
-        RuntimeError: sources were edited since this process began, so nobody knows which of them was compiled.
+        RuntimeError: sources were edited since this process began, so nobody knows which of them was compiled; or there
+            is nothing compiled with the flags of this process.
     """
     if stamp.__wrapped__() != stamp():
         raise RuntimeError("sources of kernels were edited during the build; build again")
     store = open_store(base)
     entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
+    if not entries:
+        raise RuntimeError("nothing was compiled with the flags of this process; unset NUMBA_... and DOJO_OPT_...")
     return write_shipped(folder, target, stamp(), entries), len(entries)
 
 
