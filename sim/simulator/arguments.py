@@ -35,7 +35,7 @@ class Arguments:
 
     def states(self, call: str, xs: Floats) -> Floats:
         """A copy of the states (..., nx), with quaternions of length one."""
-        out = np.array(xs, dtype=np.float64)
+        out = np.array(xs, dtype=np.float64, order="C")
         bad = self._engine.normalise(out.reshape(-1, self.nx), UNIT)
         if bad >= 0:
             row, body = divmod(bad, self.nbody)
@@ -69,8 +69,8 @@ class Arguments:
                 f"Simulator.{method}: leading axes {a.shape[:-1]} of {first[0]} and {b.shape[:-1]} of {second[0]} "
                 "do not broadcast"
             ) from None
-        # copies: arrays of broadcast_to are read-only, and kernels would be compiled once more for them
-        rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1]))).reshape(-1, m.shape[-1]) for m in (a, b)]
+        # copies by rows: kernels would be compiled once more for read-only arrays, and for columns
+        rows = [np.array(np.broadcast_to(m, (*lead, m.shape[-1])), order="C").reshape(-1, m.shape[-1]) for m in (a, b)]
         return rows[0], rows[1], lead
 
     def inputs(self, method: str, name: str, u: ArrayLike, shape: tuple[int | str | None, ...]) -> Floats:

@@ -10,11 +10,13 @@ optional, link          a kernel with a slot in a table of addresses, for featur
 record, Field, Table    NamedTuples of arrays that kernels take as one pointer
 seconds, PAUSE          the clock of kernels
 cache_folder            the folder of the compiled code
+compiled                the kernels that this process compiled
 compiled_signatures     the kernels compiled or loaded so far
+shipped                 the code that came compiled with the package
 CompilationError        Numba's error for code it cannot compile
 """
 
-from solvers.compiler.cache import cache_folder
+from solvers.compiler.cache import cache_folder, shipped
 from solvers.compiler.clock import PAUSE, seconds
 from solvers.compiler.kernels import (
     CompilationError,
@@ -27,6 +29,7 @@ from solvers.compiler.kernels import (
     users_kernel,
     users_loop,
 )
+from solvers.compiler.notice import compiled
 from solvers.compiler.optional import link, optional
 from solvers.compiler.parallel import parallel_kernel, prange, threads
 from solvers.compiler.records import Field, Table, record, table
@@ -37,6 +40,7 @@ __all__ = [
     "Field",
     "Table",
     "cache_folder",
+    "compiled",
     "compiled_signatures",
     "entry",
     "inlined",
@@ -49,6 +53,7 @@ __all__ = [
     "prange",
     "record",
     "seconds",
+    "shipped",
     "table",
     "threads",
     "users_kernel",

@@ -6,7 +6,8 @@ from an empty folder.
 
 To load compiled code is to run it. So a folder is read only where its owner is the user or root, and where neither a
 group nor the world can write; and a file only when it is as it was written. Everything else is compiled, in memory
-if it cannot be stored, with one warning that gives the reason.
+if it cannot be stored, with one warning that gives the reason. What came compiled with the package (shipped.py) is
+looked for first, and never written here.
 
     DOJO_OPT_CACHE=0         compile in memory only
     NUMBA_CACHE_DIR=DIR      keep the compiled code below DIR instead of the user's cache folder
@@ -34,34 +35,44 @@ from typing import Any
 import numba
 from numba.core.caching import FunctionCache
 from numba.core.compiler import CompileResult
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from solvers.compiler.notice import because
+from solvers.compiler.ownership import OTHERS, WORLD, foreign
 from solvers.compiler.pipeline import FAST
+from solvers.compiler.shipped import Shipped, open_shipped, write_shipped
 
-__all__ = ["STORE", "KernelCache", "cache_folder"]
+__all__ = ["INNER", "STORE", "KernelCache", "cache_folder", "open_store", "prepare", "ship", "shipped", "stamp"]
+
+INNER = "inner"  # the form of a kernel that kernels call
 
 _KEEP = 4  # digests kept on disk however old they are, so that switching between two versions stays warm
 _IN_USE = 14 * 24 * 3600.0  # [s] since its last use for which a folder is kept
 _DIGEST = re.compile("[0-9a-f]{16}")
 _LOADERS = ("urdf", "mjcf")  # folders without kernels
+_PYTHON = (*sys.version_info[:2], getattr(sys, "abiflags", ""))
 _CHECK = hashlib.blake2b().digest_size  # bytes of a file before its contents
 _KERNELS = re.compile(rb"from solvers\.compiler import (\([^)]*|.*)(kernel|inlined)")  # in a file that may hold some
-_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_ROOT = Path(__file__).resolve().parents[2]
+_FLAGS = ("BOUNDSCHECK", "OPT", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE")  # that Numba's own key omits
 
 
 def _sources() -> list[Path]:
     """Every file whose text can end up inside a compiled kernel; a loader (sim/urdf, sim/mjcf) is not among them."""
-    root = Path(__file__).resolve().parents[2]
-    files = [*root.glob("solvers/**/*.py"), *(f for f in root.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
-    files += [f for f in root.glob("dojo_opt/**/*.py") if _KERNELS.search(f.read_bytes())]
+    files = [*_ROOT.glob("solvers/**/*.py"), *(f for f in _ROOT.glob("sim/**/*.py") if f.parent.name not in _LOADERS)]
+    files += [f for f in _ROOT.glob("dojo_opt/**/*.py") if _KERNELS.search(f.read_bytes())]
     return sorted(files)
 
 
-def _digest() -> str:
-    """Digest of all kernel sources and of the flags that Numba's own cache key omits."""
-    digest = hashlib.sha256(f"{numba.__version__} {numba.config.BOUNDSCHECK} {FAST}".encode())
+@cache
+def stamp() -> str:
+    """Digest of all kernel sources, of the versions of Numba and Python, and of flags."""
+    flags = [getattr(numba.config, name, None) for name in _FLAGS]
+    digest = hashlib.sha256(f"{numba.__version__} {_PYTHON} {flags} {FAST}".encode())
     for path in _sources():
-        digest.update(path.name.encode() + path.read_bytes())
+        digest.update(path.relative_to(_ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -73,41 +84,30 @@ def _base() -> tuple[Path | None, int]:
     named = [numba.config.CACHE_DIR and os.path.abspath(numba.config.CACHE_DIR), os.environ.get("XDG_CACHE_HOME", "")]
     for name in named:
         if os.path.isabs(name):
-            return Path(name), _OTHERS
+            return Path(name), OTHERS
     try:
         home = Path.home()
     except RuntimeError:  # of a user that the system does not know
         return None, 0
     # the group of a home is often that of its user alone; and folders below are checked one by one
-    return (home / ".cache" if home.is_absolute() else None), stat.S_IWOTH
-
-
-def _foreign(path: Path, about: os.stat_result, forbidden: int = _OTHERS) -> str:
-    """Why the code in a file or folder may be somebody else's; empty when it is the user's own, or root's."""
-    if not hasattr(os, "geteuid"):  # Windows, where a user's folders are his own
-        return ""
-    if about.st_uid not in (os.geteuid(), 0):
-        return f"{path} belongs to the user with id {about.st_uid}"
-    if about.st_mode & forbidden:
-        return f"others can write to {path} (chmod go-w ends that)"
-    return ""
+    return (home / ".cache" if home.is_absolute() else None), WORLD
 
 
 def _opened(base: Path, forbidden: int) -> tuple[Path | None, str]:
     """(folder below the base, made if need be; why there is none)."""
     for outer in (base, *base.parents):  # root makes no folders where they would be in another user's way
         if outer.exists():
-            if why := _foreign(outer, outer.stat(), forbidden=0):
+            if why := foreign(outer, outer.stat(), forbidden=0):
                 return None, why
             break
     base.parent.mkdir(parents=True, exist_ok=True)
-    folder = base / "dojo_opt" / _digest()
+    folder = base / "dojo_opt" / stamp()
     for part in (base, folder.parent, folder):
         part.mkdir(mode=0o700, exist_ok=True)
         about = part.stat()
         # in a sticky folder such as /tmp, other users cannot replace ours
-        bits = _OTHERS if part != base else 0 if about.st_mode & stat.S_ISVTX else forbidden
-        if why := _foreign(part, about, bits):
+        bits = OTHERS if part != base else 0 if about.st_mode & stat.S_ISVTX else forbidden
+        if why := foreign(part, about, bits):
             return None, why
     return folder, ""
 
@@ -141,13 +141,17 @@ def cache_folder() -> Path | None:
 class Store:
     """The files of the folder, each as it was written or not at all."""
 
-    def __init__(self) -> None:
-        self.folder, self.why_not = _found()
+    def __init__(self, folder: Path | None, why_not: str) -> None:
+        self.folder, self.why_not = folder, why_not
         self.wanted, self._told = self.folder is not None or bool(self.why_not), False
         self._written = False
         if self.folder is not None:
             with suppress(OSError):  # one that is filled, and read-only
                 os.utime(self.folder)  # says when it was used last
+
+    def names(self) -> list[str]:
+        """Those of all files, apart from drafts."""
+        return sorted(path.name for path in self.folder.glob("*.nbc")) if self.folder else []
 
     def read(self, name: str) -> bytes:
         """The contents stored under this name.  OSError, ValueError: missing or damaged."""
@@ -157,7 +161,7 @@ class Store:
         # a named pipe without a writer would block
         with open(path, "rb", opener=lambda p, flags: os.open(p, flags | getattr(os, "O_NONBLOCK", 0))) as file:
             about = os.fstat(file.fileno())
-            if not stat.S_ISREG(about.st_mode) or _foreign(path, about):
+            if not stat.S_ISREG(about.st_mode) or foreign(path, about):
                 raise ValueError(f"{path}: not a file of this user")
             data = file.read()
         if hashlib.blake2b(data[_CHECK:]).digest() != data[:_CHECK]:
@@ -206,7 +210,55 @@ class Store:
             )
 
 
-STORE = Store()
+def open_store(base: Path) -> Store:
+    """The compiled code below another folder."""
+    return Store(*_opened(base, OTHERS))
+
+
+STORE = Store(*_found())
+
+
+@cache
+def shipped() -> Shipped:
+    """The code that came with the package."""
+    return open_shipped(stamp())
+
+
+def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
+    """Write the entries that processes compiled for a target as shipped code.
+
+    Args:
+        base: their NUMBA_CACHE_DIR; with the variables of `targets.build_environment`.
+        folder: where the file goes.
+        target: one of `targets.FEATURES`.
+
+    Returns:
+        The file, and the number of its entries.
+
+    Raises:
+        RuntimeError: sources were edited since this process began, so nobody knows which of them was compiled; or there
+            is nothing compiled with the flags of this process.
+    """
+    if stamp.__wrapped__() != stamp():
+        raise RuntimeError("sources of kernels were edited during the build; build again")
+    store = open_store(base)
+    entries = {name: store.read(name) for name in store.names() if f"-{INNER}-" not in name}
+    if not entries:
+        raise RuntimeError("nothing was compiled with the flags of this process; unset NUMBA_... and DOJO_OPT_...")
+    return write_shipped(folder, target, stamp(), entries), len(entries)
+
+
+@cache
+def prepare() -> None:
+    """Let Numba register what it compiles with: half a second of processor time, which shipped code does not need.
+
+    Plain arithmetic before anything else: otherwise the operators of sets and strings come first, and every operator
+    of every kernel is then tried on all of them: 10 of the 50 s of processor time of a cold start (Numba 0.68).
+    """
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
+    why = shipped().why_not or "this is not among the shipped code"
+    because(f"{why}; {f'kept in {STORE.folder}' if STORE.folder else 'not kept on disk'}")
 
 
 @cache
@@ -214,25 +266,43 @@ def _text_digest(file: str) -> bytes:
     return hashlib.sha256(Path(file).read_bytes()).digest()
 
 
+class _Named:
+    """What Numba's keys ask of a code generator: system, processor and features."""
+
+    def __init__(self, codegen: Any, target: str) -> None:
+        self._magic = (codegen.magic_tuple()[0], target, "")
+
+    def magic_tuple(self) -> tuple[str, str, str]:
+        """As a process that compiles for the target has it."""
+        return self._magic
+
+
 class KernelCache(FunctionCache):
     """The signatures of one form of a kernel; any failure to load one is a reason to compile it."""
 
     def __init__(self, py_func: Callable[..., Any], form: str) -> None:
         self._py_func, self._form = py_func, form
-        self._file = inspect.getfile(py_func)
-        name = re.sub(r"\W+", "_", f"{Path(self._file).stem}.{py_func.__name__}")
+        path = Path(inspect.getfile(py_func))
+        self._text = _text_digest(str(path))
+        try:  # of a kernel of ours the same wherever the package is
+            self._file = path.resolve().relative_to(_ROOT).as_posix()
+        except ValueError:
+            self._file = str(path)
+        name = re.sub(r"\W+", "_", f"{path.stem}.{py_func.__name__}")
         self._stem = f"{name}-{py_func.__code__.co_firstlineno}-{form}"
         self._cache_path = str(STORE.folder)
         self.enable()
 
     def _key(self, sig: Any, codegen: Any) -> tuple[Any, str]:
-        """(dependencies of the compiled code, apart from the sources of the digest; name of its file)."""
-        version = (*sys.version_info[:2], getattr(sys, "abiflags", ""))
-        key = (self._form, self._file, _text_digest(self._file), version, self._index_key(sig, codegen))
+        """(dependencies of the compiled code, apart from those of the stamp; name of its file)."""
+        key = (self._form, self._file, self._text, self._index_key(sig, codegen))
         return key, f"{self._stem}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compile result that was kept for this signature; None where there is none, or none of use."""
+        """The compile result that was shipped or kept for this signature; None where there is none, or none of use."""
+        if self._form != INNER and (found := self._load_shipped(sig, target_context)) is not None:
+            return found
+        prepare()
         target_context.refresh()
         key, name = self._key(sig, target_context.codegen())
         try:
@@ -246,10 +316,29 @@ class KernelCache(FunctionCache):
         STORE.drop(name)
         return None
 
+    def _load_shipped(self, sig: Any, target_context: Any) -> Any:
+        """The compile result that was shipped; None where there is none."""
+        if not len(shipped()):
+            return None
+        key, name = self._key(sig, _Named(target_context.codegen(), str(shipped().target)))
+        if name not in shipped():
+            return None
+        try:
+            kept, payload = pickle.loads(shipped().read(name))
+            if kept == key:
+                rtsys.initialize(target_context)
+                return CompileResult._rebuild(target_context, *payload)
+        except Exception as error:  # as above; but this one cannot be mended by writing it again
+            warnings.warn(f"dojo_opt: shipped code is not used: {error}", RuntimeWarning, stacklevel=2)
+        shipped().drop(name)
+        return None
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compile result."""
         if data.lifted or data.library.has_dynamic_globals:
             STORE.tell(f"{self._py_func.__name__} holds addresses of this process")
+            return
+        if not STORE.wanted:  # the cache is off, and shipped code is looked for only
             return
         key, name = self._key(sig, data.codegen)
         STORE.write(name, dumps((key, data._reduce())))

@@ -149,7 +149,7 @@ class _Compiler(Compiler):
         library = self.library(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         self.state.library = library
-        with compiling(), _seldom_collected():
+        with compiling(func), _seldom_collected():
             return super().compile_extra(func)
 
 

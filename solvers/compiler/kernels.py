@@ -11,12 +11,12 @@ from typing import Any, TypeVar, cast
 import numba
 from numba import types
 from numba.core.errors import NumbaError as CompilationError
-from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.registry import CPUDispatcher
 from numba.core.serialize import custom_reduce
 from numba.core.types.misc import unliteral
 
-from solvers.compiler.cache import STORE, KernelCache, cache_folder
-from solvers.compiler.pipeline import EntryCompiler, InnerCompiler
+from solvers.compiler.cache import INNER, STORE, KernelCache, cache_folder, prepare, shipped
+from solvers.compiler.pipeline import EntryCompiler, InnerCompiler, UsersCompiler
 
 __all__ = [
     "FLAGS",
@@ -40,12 +40,6 @@ FLAGS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": {"co
 _REGISTRY: list[Any] = []
 
 
-# Plain arithmetic before anything else: a first look into a cache registers the operators of sets and strings first,
-# and every operator of every kernel is then tried on all of them: 10 of the 50 s of processor time of a cold start
-# (numba 0.68).
-cpu_target.typing_context.refresh()
-
-
 def _is_plain(kind: Any) -> bool:
     """Whether Numba makes a Python object of this type without running Python."""
     if isinstance(kind, types.Tuple | types.UniTuple):
@@ -64,6 +58,8 @@ class _Form(CPUDispatcher):
         """Compile or load. Kernels that return a NamedTuple or an enum to Python are refused: Numba 0.68 runs Python
         to make one, ignores failures, and crashes on a Ctrl-C that arrived during the call.
         """
+        if not isinstance(self._cache, KernelCache):
+            prepare()
         compiled = super().compile(sig)
         for found in () if self.targetoptions.get("no_cpython_wrapper") else self.overloads.values():
             if not _is_plain(kind := found.signature.return_type):
@@ -110,7 +106,7 @@ class Kernel:
     def inner(self) -> _Form:
         """The form without."""
         form = _Form(self.py_func, InnerCompiler, no_cpython_wrapper=True, **self.targetoptions)
-        return cached(form, "inner") if self.keep else form
+        return cached(form, INNER) if self.keep else form
 
     @property
     def _numba_type_(self) -> Any:
@@ -124,7 +120,7 @@ class Kernel:
 
 def cached(form: Any, name: str = "entry") -> Any:
     """The form, with its compiled code on disk; that of a function without a file is in memory."""
-    if STORE.wanted and os.path.isfile(inspect.getfile(form.py_func)):
+    if (STORE.wanted or (name != INNER and len(shipped()))) and os.path.isfile(inspect.getfile(form.py_func)):
         form._cache = KernelCache(form.py_func, name)
     return form
 
@@ -184,12 +180,16 @@ class UsersKernel(Kernel):
     @cached_property
     def entry(self) -> Any:
         """The form with a way in for Python."""
-        return numba.jit(nopython=True, **self.flags)(self.py_func)
+        prepare()
+        return numba.jit(nopython=True, pipeline_class=UsersCompiler, **self.flags)(self.py_func)
 
     @cached_property
     def inner(self) -> Any:
         """The form without."""
-        return numba.jit(nopython=True, no_cpython_wrapper=True, **self.flags)(self.py_func)
+        prepare()
+        return numba.jit(nopython=True, no_cpython_wrapper=True, pipeline_class=UsersCompiler, **self.flags)(
+            self.py_func
+        )
 
 
 def users_kernel(func: F, boundscheck: bool = True) -> F:

@@ -1,42 +1,78 @@
-"""A notice at the terminal during compilation, which happens once and takes a while."""
+"""Signs of life during compilation, which happens once and takes a while; and the count of what was compiled.
+
+dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/0123456789abcdef
+dojo_opt: compiling sim.solve.interior_point.interior_point (function 34, 5 s so far, part 2 of 14)
+
+The second line is written again and again while it lasts. Both are for users who wait: at a terminal or in a notebook.
+
+DOJO_OPT_QUIET=1 says nothing.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any, TypeVar
 
-__all__ = ["compiling"]
+__all__ = ["because", "compiled", "compiling", "parts"]
 
-_PATIENCE = 2.0  # [s] of compilation before a word about it
-_TEXT = "dojo_opt: compiling, for up to a minute; kept on disk where it can be. `dojo-opt warmup` does it ahead of time"
+_PATIENCE = 1.0  # [s] of compilation before a word about it, and between two of them
+_WIDTH = 118
+T = TypeVar("T")
+
+
+def _is_watched() -> bool:
+    """Whether a user sees what is printed, and wants to."""
+    if os.environ.get("DOJO_OPT_QUIET", "0") not in ("", "0"):
+        return False
+    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
 
 
 class _Clock:
     """Time spent on compilations so far; those of its callees are part of that of a kernel."""
 
     def __init__(self) -> None:
+        self.names: list[tuple[str, bool]] = []
         self.depth = 0
         self.spent = 0.0
         self.begin = 0.0
-        self.told = False
+        self.next_word = _PATIENCE
+        self.reason = ""
+        self.part = ""
+        self.told = self.written = False
 
     def look(self) -> None:
-        """Print the notice once, if compilation takes long and a user waits: at a terminal or in a notebook."""
-        if self.told or self.spent + time.perf_counter() - self.begin < _PATIENCE:
+        """Print what goes on, if compilation takes long and a user waits."""
+        spent = self.spent + time.perf_counter() - self.begin
+        if spent < self.next_word:
             return
-        self.told = True
-        if "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()):
-            print(_TEXT, file=sys.stderr, flush=True)
+        self.next_word = spent + _PATIENCE
+        if not _is_watched():
+            return
+        if not self.told:
+            self.told = True
+            print(f"dojo_opt: compiling, once{self.reason}", file=sys.stderr)
+        text = f"dojo_opt: compiling {self.names[-1][0]} (function {len(self.names)}, {spent:.0f} s so far{self.part})"
+        print(f"\r{text[:_WIDTH]:<{_WIDTH}}", end="", file=sys.stderr, flush=True)
+        self.written = True
+
+    def clear(self) -> None:
+        """Remove the line when nothing is compiled any more."""
+        if self.written:
+            self.written = False
+            print(f"\r{'':<{_WIDTH}}\r", end="", file=sys.stderr, flush=True)
 
 
 _CLOCK = _Clock()
 
 
 @contextmanager
-def compiling() -> Iterator[None]:
-    """Around the compilation of one function."""
+def compiling(func: Callable[..., Any], own: bool = True) -> Iterator[None]:
+    """Around the compilation of one function; own: it is not the user's."""
+    _CLOCK.names.append((f"{func.__module__}.{func.__qualname__}", own))
     if _CLOCK.depth == 0:
         _CLOCK.begin = time.perf_counter()
     _CLOCK.depth += 1
@@ -47,3 +83,28 @@ def compiling() -> Iterator[None]:
         _CLOCK.depth -= 1
         if _CLOCK.depth == 0:
             _CLOCK.spent += time.perf_counter() - _CLOCK.begin
+            _CLOCK.clear()
+
+
+def because(reason: str) -> None:
+    """Say, where something is said at all, why this process compiles, and where the code is kept."""
+    _CLOCK.reason = f": {reason}"
+
+
+def parts(items: Iterable[T]) -> Iterator[T]:
+    """The items, as parts of a task that may compile each of them."""
+    every = list(items)
+    try:
+        for k, item in enumerate(every):
+            _CLOCK.part = f", part {k + 1} of {len(every)}" if len(every) > 1 else ""
+            yield item
+    finally:
+        _CLOCK.part = ""
+
+
+def compiled() -> list[str]:
+    """Functions that this process compiled, in the order in which it began; those loaded from disk are not there.
+
+    Functions of the user, and the loops around them, are not counted.
+    """
+    return [name for name, own in _CLOCK.names if own]

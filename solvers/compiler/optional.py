@@ -34,9 +34,10 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from solvers.compiler.kernels import entry
+from solvers.compiler.notice import parts
 from solvers.compiler.records import RECORDS, load_word
 
-__all__ = ["OptionalKernel", "link", "optional"]
+__all__ = ["OptionalKernel", "link", "optional", "optional_kernels"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -76,6 +77,7 @@ def _tuple_of(alias: GenericAlias) -> types.Type:
     return types.BaseTuple.from_types(parts)
 
 
+_EVERY: list[OptionalKernel] = []
 _UNCOMPILED: list[OptionalKernel] = []  # addresses requested with NUMBA_DISABLE_JIT=1
 
 
@@ -86,6 +88,7 @@ class OptionalKernel:
         self.func, self.slot, self.default = func, slot, default
         self.name = f"{func.__module__}:{func.__name__}"
         self._code: Any = None
+        _EVERY.append(self)
 
     def __call__(self, *args: Any) -> Any:
         """The call of compiled code, for kernels that run uncompiled."""
@@ -162,6 +165,11 @@ def optional(slot: int, default: Any = None) -> Callable[[Function], Function]:
     return decorate
 
 
+def optional_kernels() -> list[OptionalKernel]:
+    """Those of all modules imported so far."""
+    return list(_EVERY)
+
+
 def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
     """Write the addresses of optional kernels into their slots; compile them, or load them, the first time.
 
@@ -169,7 +177,7 @@ def link(table: NDArray[np.int64], *kernels: Callable[..., Any]) -> None:
         table: (slots,) addresses; overwritten in place.
         kernels: functions decorated by `optional`.
     """
-    for kernel in kernels:
+    for kernel in parts(kernels):
         found = cast(OptionalKernel, kernel)
         table[found.slot] = found.address()
 

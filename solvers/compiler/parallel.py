@@ -20,6 +20,7 @@ from numba import prange
 from numba.np.ufunc import parallel as layer
 
 from solvers.compiler.kernels import FLAGS, cached, registered
+from solvers.compiler.pipeline import PlainCompiler
 
 __all__ = ["parallel_kernel", "prange", "threads"]
 
@@ -60,12 +61,12 @@ class ParallelKernel:
     @cached_property
     def spread(self) -> Any:
         """Over the threads."""
-        return cached(numba.njit(parallel=True, **FLAGS)(self.py_func))
+        return cached(numba.njit(parallel=True, pipeline_class=PlainCompiler, **FLAGS)(self.py_func))
 
     @cached_property
     def serial(self) -> Any:
         """On one core."""
-        return cached(numba.njit(**FLAGS)(self.py_func), "serial")
+        return cached(numba.njit(pipeline_class=PlainCompiler, **FLAGS)(self.py_func), "serial")
 
     @property
     def signatures(self) -> set[Any]:

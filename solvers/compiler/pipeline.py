@@ -17,7 +17,7 @@ from numba.core.compiler import Compiler
 
 from solvers.compiler.notice import compiling
 
-__all__ = ["FAST", "EntryCompiler", "InnerCompiler"]
+__all__ = ["FAST", "EntryCompiler", "InnerCompiler", "PlainCompiler", "UsersCompiler"]
 
 _KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline was tested with
 
@@ -25,10 +25,18 @@ _KNOWN = ("0.66", "0.67", "0.68")  # versions of Numba that the fast pipeline wa
 class PlainCompiler(Compiler):
     """Numba's own pipeline."""
 
+    own = True
+
     def compile_extra(self, func: Any) -> Any:
         """Compile one function."""
-        with compiling():
+        with compiling(func, self.own):
             return super().compile_extra(func)
+
+
+class UsersCompiler(PlainCompiler):
+    """The same for functions of the user, and loops around them."""
+
+    own = False
 
 
 def _compilers() -> tuple[bool, type[Compiler], type[Compiler]]:

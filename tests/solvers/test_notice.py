@@ -1,9 +1,10 @@
-"""A word to whoever waits for a compilation: once, late, and only to a terminal."""
+"""Signs of life for whoever waits for a compilation: late, short, and only to a terminal or a notebook."""
 
 from __future__ import annotations
 
 import io
-import sys
+from collections.abc import Iterable
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,42 +18,84 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A clock to be set, and a notice that has not been given."""
+    """A clock to be set, and nothing said so far."""
     now = [0.0]
     monkeypatch.setattr(notice, "_CLOCK", notice._Clock())
     monkeypatch.setattr(notice.time, "perf_counter", lambda: now[0])
+    monkeypatch.delenv("DOJO_OPT_QUIET", raising=False)
     return now
 
 
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    return watched(monkeypatch, Terminal())
+
+
+def watched(monkeypatch: pytest.MonkeyPatch, stream: io.StringIO, *modules: str) -> io.StringIO:
+    """The stream as standard error; that of `sys` itself changes hands between a fixture and its test."""
+    monkeypatch.setattr(notice, "sys", SimpleNamespace(stderr=stream, modules=modules))
+    return stream
+
+
 def compile_for(clock: list[float], seconds: float, within: int = 1) -> None:
-    with notice.compiling():
+    with notice.compiling(compile_for):
         for _ in range(within):
             clock[0] += seconds
-            with notice.compiling():
+            with notice.compiling(parts_of):
                 pass
 
 
-def test_a_terminal_is_told_once_when_it_takes_long(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    compile_for(clock, 0.5, within=2)
-    assert stream.getvalue() == ""
+def parts_of(items: Iterable[int]) -> list[int]:
+    return list(notice.parts(items))
+
+
+def test_what_takes_longer_than_a_second_says_what_it_does(clock: list[float], terminal: io.StringIO) -> None:
+    notice.because("no code is shipped")
+    compile_for(clock, 0.4, within=2)
+    assert terminal.getvalue() == ""
     compile_for(clock, 0.5, within=4)
+    assert terminal.getvalue().count("dojo_opt: compiling, once: no code is shipped\n") == 1
+    assert "parts_of (function 5, 1 s so far)" in terminal.getvalue()
     compile_for(clock, 9.0)
-    assert stream.getvalue().count("compiling") == 1
+    assert "(function 10, 12 s so far)" in terminal.getvalue()
+    assert terminal.getvalue().count("once") == 1
+    assert terminal.getvalue().endswith(" \r"), "the line is removed at the end"
 
 
-def test_time_between_compilations_does_not_count(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
+def test_parts_of_a_task_are_counted(clock: list[float], terminal: io.StringIO) -> None:
+    for _ in notice.parts("abc"):
+        compile_for(clock, 0.7)
+    assert "part 2 of 3)" in terminal.getvalue()
+    before = len(terminal.getvalue())
+    compile_for(clock, 2.0)
+    assert "part" not in terminal.getvalue()[before:].replace("parts_of", "")
+
+
+def test_time_between_compilations_does_not_count(clock: list[float], terminal: io.StringIO) -> None:
     for _ in range(3):
         compile_for(clock, 0.1)
         clock[0] += 100.0
-    assert stream.getvalue() == ""
+    assert terminal.getvalue() == ""
+
+
+def test_quiet_says_nothing(clock: list[float], terminal: io.StringIO, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DOJO_OPT_QUIET", "1")
+    compile_for(clock, 9.0)
+    assert terminal.getvalue() == ""
 
 
 def test_a_file_is_told_nothing(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
-    stream = io.StringIO()
-    monkeypatch.setattr(sys, "stderr", stream)
+    stream = watched(monkeypatch, io.StringIO())
     compile_for(clock, 9.0)
     assert stream.getvalue() == ""
+
+
+def test_a_notebook_is_told(clock: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = watched(monkeypatch, io.StringIO(), "ipykernel")
+    compile_for(clock, 9.0)
+    assert "compiling" in stream.getvalue()
+
+
+def test_compilations_are_counted_by_name(clock: list[float]) -> None:
+    compile_for(clock, 0.0)
+    assert [name.split(".")[-1] for name in notice.compiled()] == ["compile_for", "parts_of"]

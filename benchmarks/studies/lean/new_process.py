@@ -33,11 +33,11 @@ print(json.dumps({"seconds": seconds, "success": path.success, "kernels": sorted
 def new_process(feature: str, *, cold: bool) -> dict[str, Any]:
     """seconds of processor time, kernels, and heavy modules of a new process that simulates one scene of `features`.
 
-    cold: with an empty cache, so that it compiles everything; otherwise it loads what it finds in the cache.
+    cold: with an empty cache and no shipped code, so that it compiles everything; otherwise it loads what it finds.
     """
     with tempfile.TemporaryDirectory() if cold else nullcontext(None) as folder:
         path = os.pathsep.join(filter(None, sys.path))  # of the checkout, too
-        cache = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1"} if folder else {}
+        cache = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": "0"} if folder else {}
         environment = {**os.environ, "PYTHONPATH": path, **cache}
         command = [sys.executable, "-c", _PROGRAM, feature, *HEAVY]
         done = subprocess.run(command, env=environment, capture_output=True, text=True)

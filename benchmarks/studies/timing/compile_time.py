@@ -1,4 +1,4 @@
-"""Report `compile`: what the first plan costs in a new process, with an empty and with a filled cache."""
+"""Report `compile`: what the first plan costs in a new process: cache empty, cache filled, code shipped."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.studies.timing.cold_features import SCENES, cold_step, cold_table
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
+from solvers.compiler import shipped as shipped_code
 
 # One new process: the import, the first plan, and the same plan again, which is the time of the solve alone.
 _PROGRAM = """
@@ -27,9 +29,10 @@ first = time.perf_counter() - wall, time.process_time() - cpu
 wall, cpu = time.perf_counter(), time.process_time()
 again = dojo.ilqr(dojo.problems.hop())
 second = time.perf_counter() - wall, time.process_time() - cpu
-from solvers.compiler import compiled_signatures
+from solvers.compiler import compiled, compiled_signatures, shipped
 kernels = compiled_signatures()
 print(json.dumps({"import": imported, "first": first, "again": second, "success": bool(plan.success),
+                  "compiled": len(compiled()), "why_not": shipped().why_not,
                   "kernels": len(kernels), "signatures": sum(kernels.values()),
                   "several": {k: n for k, n in kernels.items() if n > 1}}))
 """
@@ -37,21 +40,26 @@ print(json.dumps({"import": imported, "first": first, "again": second, "success"
 
 @dataclass(frozen=True)
 class CompileTimeStudy:
-    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process."""
+    """One cold start, then warm ones (1 quick, otherwise the median of 5), each in its own process; with the code that
+    came with an installation as many, again with an empty cache.
+    """
 
     quick: bool = False
 
     def run(self, progress: Progress) -> Report:
         """Measure."""
         report = Report("Start of a new process, to the first planned hop")
-        starts = ["cold", *["warm"] * (1 if self.quick else 5)]
+        several = 1 if self.quick else 5
+        starts = ["cold", *["warm"] * several]
         with tempfile.TemporaryDirectory() as folder:
             cold, *warm = [_start(folder) for _ in progress([(name, None) for name in starts], "compile")]
             size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
-        report.details = {"cold": cold, "warm": warm, "cache_bytes": size}
+        with tempfile.TemporaryDirectory() as folder:
+            shipped = [_start(folder, shipped=True) for _ in range(several)] if len(shipped_code()) else []
+        report.details = {"cold": cold, "warm": warm, "shipped": shipped, "cache_bytes": size}
 
-        def median(what: str, clock: int) -> float:
-            return float(np.median([run[what][clock] for run in warm]))
+        def median(what: str, clock: int, runs: list[dict[str, Any]] = warm) -> float:
+            return float(np.median([run[what][clock] for run in runs]))
 
         beyond = float(np.median([run["first"][0] - run["again"][0] for run in warm]))
         report.rows = [
@@ -65,14 +73,27 @@ class CompileTimeStudy:
             Row("signatures", cold["signatures"], ""),
             Row("cache", size / 1e6, "MB"),
         ]
+        if shipped:
+            report.rows += [
+                Row("shipped code, start to first plan, CPU", median("first", 1, shipped), "s", 1.5),
+                Row("shipped code, start to first plan, wall", median("first", 0, shipped), "s"),
+                Row("shipped code, functions compiled", max(run["compiled"] for run in shipped), "", 0.0),
+            ]
+        else:
+            report.notes.append(f"shipped code: {shipped_code().why_not}")
+        if not self.quick:
+            features = {name: cold_step(name) for name in SCENES}
+            report.details["features"] = features
+            report.tables.append(cold_table(features))
         if cold["several"]:
-            report.notes = ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
+            report.notes += ["more than one signature: " + ", ".join(f"{k} {n}" for k, n in cold["several"].items())]
         return report
 
 
-def _start(folder: str) -> dict[str, Any]:
-    """The program in a new process whose cache is below `folder`."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1"}
+def _start(folder: str, shipped: bool = False) -> dict[str, Any]:
+    """The program in a new process whose cache is below `folder`, with or without shipped code."""
+    own = {"NUMBA_CACHE_DIR": folder, "DOJO_OPT_CACHE": "1", "DOJO_OPT_SHIPPED": str(int(shipped))}
+    environment = {**os.environ, **own}
     done = subprocess.run([sys.executable, "-c", _PROGRAM], env=environment, capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"report compile: the measured process failed\n{done.stderr}")

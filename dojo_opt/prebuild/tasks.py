@@ -1,0 +1,223 @@
+"""Tasks of a build: the optional kernels one by one, then public calls on scenes that reach all other entries.
+
+Which entries a call reaches depends neither on sizes nor on numbers, so scenes are small and rollouts short.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+import dojo_opt as dojo
+from solvers.compiler.optional import OptionalKernel, optional_kernels
+
+__all__ = ["CONTENTS", "run", "tasks"]
+
+CONTENTS = ("all", "examples")
+_FIRST = (  # the longest, and what later tasks would compile beside them
+    "interior_point:interior_point",
+    "step_gradient:gradient",
+    "step:step",
+    "newton:newton",
+    "pair_contact:pair_kinematics",
+)
+
+
+# -- scenes ------------------------------------------------------------------------------------------------------------
+
+
+def states(sim: Any) -> None:
+    """What can be said about a state without moving it."""
+    x = sim.neutral()
+    sim.describe()
+    sim.velocity(x)
+    z = sim.maximal(x)
+    sim.minimal(z)
+    sim.difference(sim.integrate(x, np.zeros(sim.ndx)), x)
+    sim.difference(np.stack([x, x]), np.stack([x, x]))
+    sim.start(x[: sim.nq], x[sim.nq :])
+    sim.bodies(x[: sim.nq], x[sim.nq :])
+    sim.energy(x), sim.kinetic_energy(x), sim.momentum(x), sim.left_out(x)
+    sim.loop_gaps(x)
+    if sim.mechanism.loops:
+        sim.loop_rank()
+        sim.close(x)
+
+
+def motions(sim: Any) -> None:
+    """Steps and rollouts, open and closed."""
+    x, us = sim.neutral(), np.zeros((2, sim.nu))
+    wrenches = np.zeros((2, sim.nbody, 6))
+    sim.step(x)
+    sim.rollout(x, us)
+    sim.rollout(x, us, wrenches=wrenches)
+    sim.rollout_batch(np.stack([x] * 4), np.zeros((4, 2, sim.nu)))
+    k, K = np.zeros((2, sim.nu)), np.zeros((2, sim.nu, sim.ndx))
+    sim.closed_loop(x, us, np.stack([x] * 3), k, K)
+
+
+def derivatives(sim: Any) -> None:
+    """Of steps and rollouts, by state and input."""
+    x, us = sim.neutral(), np.zeros((2, sim.nu))
+    sim.linearize(x, us[0], kappa=1e-3)
+    sim.linearize(x, us[0], wrenches=np.zeros((sim.nbody, 6)))
+    sim.linearize_rollout(x, us, kappa=1e-3)
+    sim.linearize_trajectory(np.stack([x] * 3), us, kappa=1e-3)
+    sim.linearize_trajectory(np.stack([x] * 100), np.zeros((99, sim.nu)), kappa=1e-3)
+    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), kappa=1e-3)
+
+
+def parameters(sim: Any) -> None:
+    """What steps of order 2 alone have: reactions, derivatives by maximal coordinates and by parameters."""
+    x, us = sim.neutral(), np.zeros((2, sim.nu))
+    sim.reactions(x[None], us[:1])
+    sim.linearize_maximal(sim.maximal(x), us[0], 1e-3)
+    kinds = tuple(dict.fromkeys(name.split(":")[0].split("[")[0] for name in sim.parameters().names))
+    sim.linearize(x, us[0], wrt=kinds)
+    sim.linearize_rollout(x, us, wrt=kinds)
+    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), ("state", "input", *kinds))
+
+
+def _every(sim: Any) -> None:
+    for calls in (states, motions, derivatives, parameters):
+        calls(sim)
+
+
+def _pendulum(calls: Callable[[Any], None], order: int = 2) -> None:
+    """Calls on the least that moves: their entries are the same for all scenes."""
+    calls(dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=order))
+
+
+def _models() -> None:
+    for entry in dojo.models.catalogue():
+        sim = dojo.Simulator(entry.build(), time_step=0.01)
+        sim.linearize_maximal(sim.maximal(sim.neutral()))
+        for calls in (states, motions, derivatives):
+            calls(sim)
+
+
+def _flight(calls: Callable[[Any], None], order: int) -> None:
+    """Calls on a body above the ground, with steps of higher order."""
+    foot = dojo.Contact("b", point=(0.0, 0.0, -0.1))
+    above = (0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0)
+    mech = dojo.Mechanism(
+        [dojo.Body("b", 1.0, (0.1, 0.2, 0.3))], [dojo.Joint("floating", None, "b")], [foot], neutral={"b": above}
+    )
+    calls(dojo.Simulator(mech, time_step=0.01, order=order))
+
+
+def _grounds() -> None:
+    hill = dojo.Terrain.from_function(
+        lambda x, y: 0.1 * np.sin(x) + 0.1 * np.cos(y), np.linspace(-2, 2, 9), [-1.0, 1.0]
+    )
+    for more in ({}, {"terrain": hill}, {"law": "linear"}, {"law": "impact"}, {"restitution": 0.5}):
+        foot = dojo.Contact("ball", radius=0.1, **more)
+        mech = dojo.Mechanism([dojo.Body("ball", 1.0, (0.1, 0.1, 0.1))], [dojo.Joint("floating", None, "ball")], [foot])
+        _every(dojo.Simulator(mech, time_step=0.01))
+
+
+def _pairs() -> None:
+    apart = {"b": (0.15, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)}
+    joints = [dojo.Joint("floating", None, name) for name in "ab"]
+    solids = (dojo.Sphere(0.1), dojo.Box(0.1, 0.1, 0.1), dojo.Cylinder(0.1, 0.1))
+    touching = [dojo.Collision("a", "b", shape, shape) for shape in (*solids, dojo.String(1.0))]
+    for collision in touching:
+        bodies = [dojo.Body(name, 1.0, (0.1, 0.1, 0.1)) for name in "ab"]
+        _every(dojo.Simulator(dojo.Mechanism(bodies, joints, collisions=[collision], neutral=apart), time_step=0.01))
+
+
+def _joints() -> None:
+    body, point = dojo.Body("a", 1.0, (0.1, 0.2, 0.3)), (0.0, 0.0, -0.1)
+    joints = (
+        dojo.Joint("spherical", None, "a", cone=0.5, spring=1.0, damper=0.1, child_point=point),
+        dojo.Joint("orbital", None, "a", spring=1.0, damper=0.1, child_point=point),
+        dojo.Joint("revolute", None, "a", limits=(-0.5, 0.5), child_point=point),
+    )
+    for joint in joints:
+        _every(dojo.Simulator(dojo.Mechanism([body], [joint]), time_step=0.01))
+
+
+def _loops() -> None:
+    for build in (dojo.models.fourbar, dojo.models.delta):
+        _every(dojo.Simulator(build(), time_step=0.01))
+
+
+# -- planning ----------------------------------------------------------------------------------------------------------
+
+
+def _swingup() -> None:
+    dojo.ilqr(dojo.problems.swingup(), max_iterations=4)
+
+
+def _hop() -> None:
+    plan = dojo.ilqr(dojo.problems.hop())
+    dojo.tracking_gains(plan.problem, plan)
+
+
+def _plans() -> None:
+    for problem in (dojo.problems.block(), dojo.problems.trot(), dojo.problems.jump()):
+        dojo.ilqr(problem, max_iterations=4)
+
+
+def _mpc() -> None:
+    for make in (dojo.tasks.hopper_mpc, dojo.tasks.quadruped_mpc):
+        mpc = make()
+        dojo.closed_loop(mpc, dojo.tasks.plant(mpc), 0.1)
+
+
+_CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry compiles it; those below are disjoint
+    "parameters": lambda: _pendulum(parameters),
+    "derivatives": lambda: _pendulum(derivatives),
+    "plan": lambda: _swingup(),
+    "motions": lambda: _pendulum(motions),
+    "states": lambda: _pendulum(states),
+    "flight": lambda: _flight(motions, 8),
+    "states of higher order": lambda: _pendulum(states, 4),
+    "motions of higher order": lambda: _pendulum(motions, 4),
+}
+_BEYOND = {  # what neither README's examples nor the models need
+    "derivatives of higher order": lambda: _pendulum(derivatives, 4),
+    "derivatives of a flight": lambda: _flight(derivatives, 8),
+}
+_SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for
+    "hop": _hop,
+    "joints": _joints,
+    "grounds": _grounds,
+    "pairs": _pairs,
+    "loops": _loops,
+    "models": _models,
+    "plans": _plans,
+    "closed loops": _mpc,
+}
+
+
+# -- tasks -------------------------------------------------------------------------------------------------------------
+
+
+def _kernels() -> dict[str, OptionalKernel]:
+    """Those that a scene may link, by name."""
+    import_module("sim.simulator.link")
+    return {kernel.name: kernel for kernel in optional_kernels()}
+
+
+def tasks(content: str) -> list[str]:
+    """Names of the tasks of a build, the longest first.
+
+    Args:
+        content: "all", or "examples": those of README, and the models.
+    """
+    first = [next(name for name in _kernels() if name.endswith(f".{end}")) for end in _FIRST]
+    others = [name for name in _kernels() if name not in first]
+    return [*first, *(_BEYOND if content == "all" else ()), *_CALLS, *others, *_SCENES]
+
+
+def run(task: str) -> None:
+    """Carry out one task: its kernels are compiled, or loaded."""
+    calls = _CALLS | _BEYOND | _SCENES
+    if task in calls:
+        calls[task]()
+    else:
+        _kernels()[task].address()
