@@ -11,12 +11,14 @@ derivatives are the products of those of its parts and of both conversions.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 
 import numpy as np
 
 from sim.integrators.feedback import Path
 from sim.integrators.rollout import MotionBuffers
+from sim.model.data import Data
 from sim.model.layout import CARRY
 from sim.model.model import Model
 from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Law
@@ -60,6 +62,7 @@ class DividingEngine(Engine):
         super().__init__(model, settings._replace(gain=_WHOLE, loss=_WHOLE))
         self.intervals = Intervals(self)
         self._engines: dict[int, Engine] = {}  # of parts, by their number
+        self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
 
     def part(self, parts: int) -> Engine:
         """The engine of the parts of a step."""
@@ -129,10 +132,16 @@ class DividingEngine(Engine):
             A, B = dx @ A, dx @ B + du
         return back @ A, back @ B
 
+    def last(self) -> Data:
+        """Data of the last step of this thread, or of its last part."""
+        parts = getattr(self._ended, "parts", None)
+        return super().last() if parts is None else parts.last()
+
     # -- motions -------------------------------------------------------------------------------------------------------
 
     def take_steps(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division) -> int:
         """As Engine.take_steps, with division."""
+        self._ended.parts = None
         return self._go_on(model, motion, kappa, division, super().take_steps(model, motion, kappa, division))
 
     def _go_on(self, model: Table, motion: MotionBuffers, kappa: float | None, division: Division, knot: int) -> int:
@@ -144,6 +153,7 @@ class DividingEngine(Engine):
                 while knot < steps and whole:
                     rest = _rows(motion, knot, min(piece, steps - knot))
                     done = super().take_steps(model, rest, kappa, division)
+                    self._ended.parts = None if done else self._ended.parts
                     knot, whole = knot + done, done == len(rest.us)
                     piece = min(2 * piece, _LARGEST_PIECE) if whole else _PIECE
         except KeyboardInterrupt as stop:
@@ -161,6 +171,7 @@ class DividingEngine(Engine):
         if divided is None:
             return False
         motion.xs[knot + 1] = divided.x
+        self._ended.parts = divided.engine
         report[:] = divided.report()
         division.substeps[knot], division.shares[knot] = divided.parts, divided.share
         if len(motion.contacts):
@@ -185,7 +196,7 @@ class DividingEngine(Engine):
         """Divide the unsolved step of a closed loop after `done` solved ones; False where that does not solve it."""
         policy, alpha, _ = law
         t, s = divmod(done, substeps)
-        data = self.last()
+        data = super().last()
         x, total = data.step_x[0].copy(), path.report[REPORT]
         divided = self.divide(x, path.us[t], policy.wrenches[t : t + 1], settings[1])
         if divided is None:

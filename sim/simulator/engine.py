@@ -393,7 +393,7 @@ class Engine:
     def far(self) -> NDArray[np.bool_]:
         """Whether each contact was inactive in the last step of this thread, (ncontact,)."""
         out = np.ones(self.sizes.ncontact, dtype=bool)
-        data = data_view(self._scratch.table())
+        data = self.last()
         out[data.active[: data.active_count[0]]] = False
         return out
 

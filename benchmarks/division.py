@@ -1,0 +1,175 @@
+"""Motions that a fixed time step could not follow: refused as a whole, and with their steps divided.
+
+    pip install --no-deps "example-robot-data>=6" && pip install pybullet        for robots from files
+    python benchmarks/division.py            --match chain for some of them
+
+Every motion runs twice: with divide=False, up to the first refused step, and as it is by default. The table says how
+many steps were divided, into how many parts at most, how many handed on only a share of the momentum of the bodies
+against each other, and the processor time of a step in both runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from command import deliver, number, parser, progress
+from numpy.typing import NDArray
+
+import dojo_opt as dojo
+from dojo_opt.report.result import Report, Table
+
+Vector = NDArray[np.float64]
+Motion = tuple[dojo.Simulator, Vector, Vector]  # simulator, first state, inputs (T, nu)
+
+
+def chain(links: int, heavy: float = 1.0) -> dojo.Mechanism:
+    """An undamped pendulum of 2 m and 2 kg; heavy: factor of the mass of its last link."""
+    length, mass, radius = 2.0 / links, 2.0 / links, 0.02 * min(1.0, 10.0 / links)
+    across, along = mass / 12.0 * (3.0 * radius**2 + length**2), 0.5 * mass * radius**2
+    bodies = [dojo.Body(f"link{k}", mass, (across, across, along)) for k in range(links)]
+    bodies[-1] = replace(bodies[-1], mass=heavy * mass, inertia=heavy * np.asarray(bodies[-1].inertia))
+    below = (0.0, 0.0, 0.5 * length)
+    joints = [
+        dojo.Joint(
+            "revolute",
+            f"link{k - 1}" if k else None,
+            f"link{k}",
+            parent_point=(0.0, 0.0, -0.5 * length if k else 0.0),
+            child_point=below,
+            axis=(0.0, -1.0, 0.0),
+        )
+        for k in range(links)
+    ]
+    return dojo.Mechanism(bodies, joints, inputs=())
+
+
+def released(mechanism: dojo.Mechanism, time_step: float, seconds: float) -> Motion:
+    """A pendulum from the horizontal."""
+    sim = dojo.Simulator(mechanism, time_step)
+    q = np.zeros(sim.nq)
+    q[0] = 0.5 * np.pi
+    return sim, sim.start(q, np.zeros(sim.nv)), np.zeros((round(seconds / time_step), sim.nu))
+
+
+def spin(rate: float) -> Motion:
+    """A body that spins nearly about its middle axis, at 10 ms."""
+    body = dojo.Body("body", 1.0, (0.1, 0.2, 0.3))
+    sim = dojo.Simulator(dojo.Mechanism([body], [dojo.Joint("floating", None, "body")], gravity=(0, 0, 0)), 0.01)
+    x = sim.neutral()
+    x[-3:] = (0.1, rate, 0.2)
+    return sim, sim.start(x[: sim.nq], x[sim.nq :]), np.zeros((100, 0))
+
+
+def on_the_ground() -> Motion:
+    """A free chain of 100 links falls on the ground, 10 ms."""
+    from benchmarks.studies.stability.chain_trials import on_the_ground as trial
+
+    found = trial(0.01)
+    sim = dojo.Simulator(found.mechanism, 0.01)
+    return sim, sim.start(found.q, found.v), np.zeros((200, sim.nu))
+
+
+def tower(kappa: float) -> Motion:
+    """Ten boxes on one another, 10 ms."""
+    from support.towers import EDGE
+    from support.towers import tower as boxes
+
+    sim = dojo.Simulator(boxes(dojo.Box(EDGE, EDGE, EDGE), [1.0] * 10), 0.01, kappa)
+    return sim, sim.neutral(), np.zeros((200, sim.nu))
+
+
+def dropped(file: Path, time_step: float, seconds: float) -> Motion:
+    """A robot from a file falls from its neutral state."""
+    sim = dojo.Simulator(dojo.load_urdf(file), time_step)
+    return sim, sim.neutral(), np.zeros((round(seconds / time_step), sim.nu))
+
+
+def _files() -> list[tuple[str, Callable[[], Motion]]]:
+    found: list[tuple[str, Callable[[], Motion]]] = []
+    for package, pattern in (
+        ("pybullet_data", "laikago/laikago_toes.urdf"),
+        ("example_robot_data", "**/g1*hand*.urdf"),
+    ):
+        spec = find_spec(package)
+        roots = [] if spec is None or spec.origin is None else [Path(spec.origin).parent]
+        roots += [Path(sys.prefix) / "share/example-robot-data"] if package == "example_robot_data" else []
+        for file in sorted({f for root in roots for f in root.glob(pattern)})[:1]:
+            for h in (0.005, 0.01):
+                found.append((f"{file.stem} falls, {1e3 * h:g} ms", lambda f=file, h=h: dropped(f, h, 2.0)))
+    return found
+
+
+def motions() -> list[tuple[str, Callable[[], Motion]]]:
+    """Names, and what sets them up."""
+    chains = ((5, 10.0, 100.0), (10, 10.0, 100.0), (50, 2.5, 10.0), (100, 1.0, 5.0))
+    return [
+        *(
+            (f"chain of {n} links, {h:g} ms, {s:g} s", lambda n=n, h=h, s=s: released(chain(n), 1e-3 * h, s))
+            for n, h, s in chains
+        ),
+        ("tip 500 times heavier, 1 ms, 5 s", lambda: released(chain(10, 500.0), 1e-3, 5.0)),
+        *((f"spin of {rate:g} rad/s, 10 ms", lambda rate=rate: spin(rate)) for rate in (100.0, 1000.0, 3000.0)),
+        ("free chain of 100 links on the ground, 10 ms", on_the_ground),
+        *((f"tower of 10 boxes, kappa {kappa:g}", lambda kappa=kappa: tower(kappa)) for kappa in (1e-6, 1e-5)),
+        *_files(),
+    ]
+
+
+def clocked(sim: dojo.Simulator, x: Vector, us: Vector) -> tuple[dojo.Trajectory, float]:
+    """(motion, processor time of a step [us])."""
+    sim.rollout(x, us[:2])
+    begin = time.process_time()
+    motion = sim.rollout(x, us)
+    return motion, 1e6 * (time.process_time() - begin) / max(motion.knot, 1)
+
+
+def run(args: argparse.Namespace) -> Report:
+    """Every motion whose name contains `match`."""
+    warnings.simplefilter("ignore")  # what files of robots say
+    report = Report("Steps that are divided", "")
+    chosen = [(name, (name, build)) for name, build in motions() if args.match in name]
+    lines, refused = [], 0
+    for name, build in progress()(chosen[5:6] if args.quick else chosen, "motions"):
+        sim, x, us = build()
+        whole, cost = clocked(sim.replace(divide=False), x, us)
+        motion, divided_cost = clocked(sim, x, us)
+        refused += not motion.success
+        ended = "end" if whole.success else f"{whole.knot * sim.time_step:.3g} s, {whole.status.name}"
+        reached = "end" if motion.success else f"{motion.knot * sim.time_step:.3g} s, {motion.status.name}"
+        parts = motion.substeps
+        lines.append(
+            [name, ended, reached, int((parts > 1).sum()), int(parts.max(initial=1)), int((motion.shares < 1.0).sum())]
+            + [cost, divided_cost]
+        )
+    report.rows = [number("motions", len(lines)), number("motions that end early", refused, 0)]
+    header = (
+        "motion",
+        "whole steps until",
+        "divided until",
+        "divided steps",
+        "parts",
+        "with a share",
+        "us",
+        "us divided",
+    )
+    report.tables = [Table("Motions", header, lines)]
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--match", default="", help="only motions whose name contains this")
+    return deliver("division", run, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
