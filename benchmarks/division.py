@@ -88,7 +88,7 @@ def tower(kappa: float) -> Motion:
 
 def dropped(file: Path, time_step: float, seconds: float) -> Motion:
     """A robot from a file falls from its neutral state."""
-    sim = dojo.Simulator(dojo.load_urdf(file), time_step)
+    sim = dojo.Simulator(dojo.load_urdf(file, repair=True), time_step)
     return sim, sim.neutral(), np.zeros((round(seconds / time_step), sim.nu))
 
 

@@ -70,6 +70,16 @@ def derivatives(sim: Any) -> None:
     sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)), kappa=1e-3)
 
 
+def divisions(sim: Any) -> None:
+    """Steps that turn a body too far, and their derivatives."""
+    x, us = sim.neutral(), np.zeros((2, sim.nu))
+    x[sim.nq :] = 4.0 / sim.time_step
+    sim.rollout(x, us)
+    sim.linearize(x, us[0])
+    sim.linearize(x, us[0], wrt=("mass",))
+    sim.reactions(x[None], us[:1])
+
+
 def parameters(sim: Any) -> None:
     """What steps of order 2 alone have: reactions, derivatives by maximal coordinates and by parameters."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
@@ -174,6 +184,7 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
     "plan": lambda: _swingup(),
     "motions": lambda: _pendulum(motions),
     "states": lambda: _pendulum(states),
+    "divisions": lambda: _pendulum(divisions),
     "flight": lambda: _flight(motions, 8),
     "states of higher order": lambda: _pendulum(states, 4),
     "motions of higher order": lambda: _pendulum(motions, 4),
