@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contact.collision.collide import collide
-from sim.model.shape_kinds import OUT, Pair, Shape, count, pair
+from sim.model.shape_kinds import OUT, Pair, Shape, count
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
@@ -32,7 +32,8 @@ def deepest(kind: Pair, sizes: Array, R: Array, r: Array) -> Array:
 
 
 def shapes(kind: Pair) -> tuple[Shape, Shape]:
-    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
+    first, *second = kind.name.split("_")
+    return Shape[first], Shape[second[0] if second else first]
 
 
 def random_pose(

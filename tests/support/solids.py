@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from sim.mechanism.polytope import Polytope, hull_table
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Sphere
-from sim.model.shape_kinds import CROSSINGS, EDGES, RIM_POINTS, SIZES, SPARE, Pair, Shape, count, pair
+from sim.model.shape_kinds import SIZES, Pair, Shape, count
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,8 @@ PAIRS = (*(p.name.lower() for p in Pair if p not in _OF_POLYTOPES), *POLYTOPES, 
 
 def shapes(kind: Pair) -> tuple[Shape, Shape]:
     """Shapes a and b of a pair, in its order."""
-    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
+    first, *second = kind.name.split("_")
+    return Shape[first], Shape[second[0] if second else first]
 
 
 class Case(NamedTuple):
@@ -69,11 +70,7 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
 
 def features(case: Case) -> int:
     """How many contact points there may be."""
-    if case.kind == Pair.POLYTOPE_CYLINDER:
-        return len(case.points[0]) + CROSSINGS + (RIM_POINTS if case.hull[0, 2] > 0 else 0)
-    if case.kind != Pair.POLYTOPE_POLYTOPE:
-        return count(case.kind)
-    return sum(len(p) for p in case.points) + (EDGES if len(case.points[0]) > 1 else SPARE)
+    return count(case.kind, (len(case.points[0]), len(case.points[1])))
 
 
 def support(case: Case, side: int, n: Floats) -> Floats:

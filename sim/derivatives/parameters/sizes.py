@@ -8,17 +8,17 @@ a size costs as much as a shift, with an e of its own for every point, and no pa
 
 from __future__ import annotations
 
-from sim.contact.collision.witness import dot
+from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.pairs.pair_contact import gap_normal
 from sim.contact.pairs.pair_pose import place_shape
 from sim.contact.pairs.string import is_taut
-from sim.derivatives.parameters.directions import SIDE, Size
+from sim.derivatives.parameters.directions import SIDE
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.columns import Bounce, Witness
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.shape_kinds import SWAPPED, Pair
+from sim.model.shape_kinds import SWAPPED, Pair, Size
 from solvers.compiler import kernel
 from solvers.rotation import Vec3
 from solvers.types import Vector
@@ -100,5 +100,5 @@ def add_shapes_size(model: Model, data: Data, h: float, first: int, which: int, 
             if is_taut(model, data, j):  # where it pulls along stays
                 add_moved_end(model, data, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
             else:
-                add_moved_shape(model, data, h, j, which // SIDE, e, floor, w, col)
+                add_moved_shape(model, data, h, j, which // SIDE, (e, NOWHERE, NOWHERE), floor, w, col)
         j += 1
