@@ -175,7 +175,7 @@ def _geometry(part: Primitive) -> Any:
         return geometry.Cylinder(length, radius)
     if part.kind == "box":
         return geometry.Box(part.size.tolist())
-    return geometry.Sphere(float(part.size[0]))
+    return geometry.Sphere(float(part.size[0])) if len(part.size) == 1 else geometry.Ellipsoid(part.size.tolist())
 
 
 def _at(part: Primitive) -> Any:

@@ -1,4 +1,4 @@
-"""Sphere, Box, Capsule, Cylinder: solids of uniform density, for inertia, for contact and for drawing.
+"""Sphere, Box, Capsule, Cylinder, Ellipsoid: solids of uniform density, for inertia, for contact and for drawing.
 
 A shape is one class. It says its inertia and volume, its number and sizes for the kernels, a ball around it, how its
 surface moves with each of its sizes, the points and balls by which it stands on ground, and how it is drawn.
@@ -290,6 +290,46 @@ class Capsule(Solid):
 
 
 @dataclass(frozen=True)
+class Ellipsoid(Solid):
+    """Ellipsoid with the semi-axes x, y, z [m]; m/5 (y^2 + z^2) and so on.
+
+    It touches ground and planes as a collision with a HalfSpace: the point it stands on moves over it.
+    """
+
+    code = shape_kinds.Shape.ELLIPSOID
+    surface = {"x": (Size.SEMI_X, 1.0), "y": (Size.SEMI_Y, 1.0), "z": (Size.SEMI_Z, 1.0)}
+
+    x: float
+    y: float
+    z: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._positive("x", "y", "z")
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """m/5 (y^2 + z^2), and so on."""
+        x, y, z = self.x**2, self.y**2, self.z**2
+        return mass / 5 * (y + z), mass / 5 * (x + z), mass / 5 * (x + y)
+
+    def bounding_radius(self) -> float:
+        """The longest semi-axis."""
+        return max(self.sizes())
+
+    def volume(self) -> float:
+        """4/3 pi x y z."""
+        return 4.0 / 3.0 * pi * self.x * self.y * self.z
+
+    def outline(self) -> Floats:
+        """Of the ball, stretched."""
+        return BALL * self.sizes()
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("ball", np.array(self.sizes()))]
+
+
+@dataclass(frozen=True)
 class HalfSpace(Solid):
     """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, no body."""
 
@@ -322,4 +362,4 @@ class String(Solid):
         raise ValueError("String: a body cannot have this shape")
 
 
-Shape = Sphere | Box | Cylinder | Capsule
+Shape = Sphere | Box | Cylinder | Capsule | Ellipsoid

@@ -23,6 +23,7 @@ class Shape(IntEnum):
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
     POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
+    ELLIPSOID = 7  # semi-axes along x, y, z
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
 
 
@@ -38,6 +39,9 @@ class Size(IntEnum):
     LENGTH = 6  # half length of a cylinder: its ends
     SCALE = 7  # of a polytope: away from the centre
     STRING = 8  # length: the point stays, the gap grows
+    SEMI_X = 9  # semi-axis of an ellipsoid: in proportion to the place along it; normals turn
+    SEMI_Y = 10
+    SEMI_Z = 11
 
 
 class Pair(IntEnum):
@@ -55,9 +59,13 @@ class Pair(IntEnum):
     BOX_HALFSPACE = 9
     CYLINDER_HALFSPACE = 10
     STRING = 11
-    POLYTOPE_POLYTOPE = 12
-    POLYTOPE_CYLINDER = 13
-    CYLINDER_CYLINDER = 14
+    ELLIPSOID_HALFSPACE = 12
+    ELLIPSOID_ELLIPSOID = 13
+    CYLINDER_ELLIPSOID = 14
+    POLYTOPE_ELLIPSOID = 15
+    POLYTOPE_POLYTOPE = 16  # from here on pairs have room for elements that are kept
+    POLYTOPE_CYLINDER = 17
+    CYLINDER_CYLINDER = 18
 
 
 _PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
@@ -73,6 +81,10 @@ _PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
     (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
     (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
     (Shape.STRING, Shape.STRING): Pair.STRING,
+    (Shape.ELLIPSOID, Shape.HALFSPACE): Pair.ELLIPSOID_HALFSPACE,
+    (Shape.ELLIPSOID, Shape.ELLIPSOID): Pair.ELLIPSOID_ELLIPSOID,
+    (Shape.CYLINDER, Shape.ELLIPSOID): Pair.CYLINDER_ELLIPSOID,
+    (Shape.POLYTOPE, Shape.ELLIPSOID): Pair.POLYTOPE_ELLIPSOID,
     (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
     (Shape.POLYTOPE, Shape.CYLINDER): Pair.POLYTOPE_CYLINDER,
     (Shape.CYLINDER, Shape.CYLINDER): Pair.CYLINDER_CYLINDER,
@@ -91,6 +103,7 @@ _COUNT = {
 
 _STANDING = {Shape.SPHERE, Shape.CAPSULE, Shape.BOX}  # on corners, which may have a ball around them: polytopes
 _TABLES = {
+    Pair.POLYTOPE_ELLIPSOID: (True, False),
     Pair.POLYTOPE_POLYTOPE: (True, True),
     Pair.POLYTOPE_CYLINDER: (True, False),
 }

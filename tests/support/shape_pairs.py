@@ -10,8 +10,9 @@ from sim.model.shape_kinds import OUT, Pair, Shape, count
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
-SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE]  # test_collision_table.py has the others
-CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING"} & set(p.name.split("_"))]
+TABLES = {"POLYTOPE"}  # test_collision_table.py has those of polytopes
+SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE and not TABLES & set(p.name.split("_"))]
+CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING", "ELLIPSOID"} & set(p.name.split("_"))]
 NAMES = {p: p.name.lower() for p in Pair}
 
 
