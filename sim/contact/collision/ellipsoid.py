@@ -27,6 +27,7 @@ from sim.contact.collision.support import (
     farthest,
     farthest_across,
     farthest_apart,
+    farthest_from_circle,
     solved,
     stiffness,
 )
@@ -136,32 +137,46 @@ def _apart(n: Vec3, sizes: Vector, R: Vector, r: Vector) -> float:
 
 
 @inner_kernel
+def best_end(sizes: Vector, R: Vector, r: Vector) -> tuple[float, Vec3, bool]:
+    """The end of a cylinder a with the larger s, its n, and whether b is outside of that end and above it."""
+    u = column(R, 2)
+    n, best = u, _apart(u, sizes, R, r)
+    m = (-u[0], -u[1], -u[2])
+    s = _apart(m, sizes, R, r)
+    if s > best:
+        n, best = m, s
+    y = farthest(n, (sizes[4], sizes[5], sizes[6]))[1]
+    y = to_a(R, (y[0] - r[0], y[1] - r[1], y[2] - r[2]))
+    above_it = y[0] * y[0] + y[1] * y[1] <= sizes[0] * sizes[0]
+    return best, n, above_it and dot(n, (r[0], r[1], r[2])) > sizes[1]
+
+
+@inner_kernel
 def cylinder_ellipsoid(sizes: Vector, R: Vector, r: Vector, out: Vector) -> None:
     """The element of a with the largest s: an end, the side or a rim."""
     c, u, db = (r[0], r[1], r[2]), column(R, 2), (sizes[4], sizes[5], sizes[6])
-    da, tie = (sizes[0], sizes[0], 0.0), _TIE * (sizes[0] + sizes[1])
-    n, best, kind = Z, -1e300, _END
-    for side in range(2):
-        m = u if side == 1 else (-u[0], -u[1], -u[2])
-        s = _apart(m, sizes, R, r)
-        if s > best:
-            n, best = m, s
+    tie = _TIE * (sizes[0] + sizes[1])
+    best, n, above_it = best_end(sizes, R, r)
+    if above_it:
+        put_plane(n, best, db, out)
+        return
     m = farthest_across(c, u, R, db)
     s = _apart(m, sizes, R, r)
+    side, end, kind = m, c, _END
     if s > best + tie:
-        n, best, kind = m, s, _LINE
-    rim, end = n, c
-    for side in range(2):
-        e = along(c, sizes[1] if side == 1 else -sizes[1], u)
-        m = farthest_apart(e, da, R, db)
+        best, kind = s, _LINE
+    rim = n
+    for k in range(2):
+        v = u if k == 1 else (-u[0], -u[1], -u[2])
+        e = along(c, sizes[1], v)
+        m = farthest_from_circle(e, v, sizes[0], R, db)
         s = _apart(m, sizes, R, r)
-        faces = dot(m, u) <= 0.0 if side == 1 else dot(m, u) >= 0.0  # the other rim is nearer to b otherwise
-        if faces and s > best + tie:
+        if dot(m, v) <= 0.0 and s > best + tie:  # the other rim is nearer to b otherwise
             rim, best, kind, end = m, s, _CIRCLE, e
     if kind == _CIRCLE:
-        put_round(rim, end, da, R, 0.0, db, out)
+        put_round(rim, end, (sizes[0], sizes[0], 0.0), R, 0.0, db, out)
     elif kind == _LINE:
-        put_line(n, c, u, sizes[0], db, out)
+        put_line(side, c, u, sizes[0], db, out)
     else:
         put_plane(n, best, db, out)
 

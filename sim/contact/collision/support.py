@@ -25,6 +25,8 @@ _STRIDE = 0.5  # [rad] longest step
 _CONVERGED = 1e-10  # [rad] a step of Newton's method after which the next one would be rounding
 _CREEPING = 1e-15  # [rad] the same of steps with another matrix
 _ROUNDING = 1e-15  # of s, relative to the sizes
+_TILT = 0.01  # [rad] from the axis of a circle where a search begins, and more by factors of two
+_TILTS = 8
 _NOTHING = 1e-300
 
 
@@ -144,13 +146,12 @@ def ascended(n: Vec3, step: Vec3, c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec
 
 
 @inner_kernel
-def farthest_apart(c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
-    """The n of the largest s of an ellipsoid a, a point or a circle, at c: Newton's method on the sphere.
+def climbed(n: Vec3, c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
+    """The n of the largest s of an ellipsoid a, a point or a circle, at c: Newton's method on the sphere, from n.
 
     Where s > 0 it is concave there, and there is one. Inside, H_a + H_b takes the place of a matrix that is not
     positive.
     """
-    n = towards(c, da, R, db)
     for _ in range(_STEPS):
         w = between(n, c, da, R, db)
         M = stiffness(n, dot(n, w), da, R, db)
@@ -162,6 +163,33 @@ def farthest_apart(c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
         if dot(step, step) < small * small:
             break
     return n
+
+
+@inner_kernel
+def farthest_apart(c: Vec3, da: Vec3, R: Vector, db: Vec3) -> Vec3:
+    """`climbed` of an ellipsoid or a point, from `towards`."""
+    return climbed(towards(c, da, R, db), c, da, R, db)
+
+
+@inner_kernel
+def farthest_from_circle(c: Vec3, axis: Vec3, rho: float, R: Vector, db: Vec3) -> Vec3:
+    """`climbed` of a circle at the end of a cylinder. Along the axis s has a peak like that of a cone: not from there,
+    but from the side where the plane touches b.
+    """
+    da = (rho, rho, 0.0)
+    n = (-axis[0], -axis[1], -axis[2])
+    y = farthest(n, db)[1]
+    e = (y[0] - c[0], y[1] - c[1], y[2] - c[2])
+    e = unit(along(e, -dot(e, axis), axis), column(R, 0))
+    x = along(c, rho, e)
+    tilted = unit(along(n, -_TILT, e), n)
+    for m in (x, (x[0] / (db[0] * db[0]), x[1] / (db[1] * db[1]), x[2] / (db[2] * db[2]))):
+        tilted = better(tilted, m, c, da, R, db)
+    k = 2.0 * _TILT
+    for _ in range(_TILTS):
+        tilted = better(tilted, along(n, -k, e), c, da, R, db)
+        k *= 2.0
+    return climbed(tilted, c, da, R, db)
 
 
 @inner_kernel
