@@ -103,6 +103,11 @@ class Solid:
         """[m^3]; infinite of a shape that does not end."""
         return inf
 
+    def support(self, n: Floats) -> float:
+        """Largest n.x over the points x of the shape, in its frame, for a unit vector n (3,) [m]."""
+        stance = self.stance()
+        return inf if stance is None else float((stance.points @ n).max()) + stance.radius
+
     def outline(self) -> Floats:
         """Points (n, 3) in the frame of the shape whose hull is the shape, or close to it [m]."""
         raise NotImplementedError
@@ -225,6 +230,10 @@ class Cylinder(Solid):
         """Distance of its rims."""
         return hypot(*self.sizes())
 
+    def support(self, n: Floats) -> float:
+        """r |n_xy| + l/2 |n_z|."""
+        return float(self.radius * hypot(n[0], n[1]) + 0.5 * self.length * abs(n[2]))
+
     def volume(self) -> float:
         """pi r^2 l."""
         return pi * self.radius**2 * self.length
@@ -315,6 +324,10 @@ class Ellipsoid(Solid):
     def bounding_radius(self) -> float:
         """The longest semi-axis."""
         return max(self.sizes())
+
+    def support(self, n: Floats) -> float:
+        """|D n|."""
+        return hypot(self.x * n[0], self.y * n[1], self.z * n[2])
 
     def volume(self) -> float:
         """4/3 pi x y z."""
