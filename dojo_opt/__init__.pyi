@@ -47,6 +47,7 @@ from sim.mechanism.shapes import (
     Box as Box,
     Capsule as Capsule,
     Cylinder as Cylinder,
+    Ellipsoid as Ellipsoid,
     HalfSpace as HalfSpace,
     Sphere as Sphere,
     String as String,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD
-from sim.mechanism.polytope import Polytope
 from sim.mechanism.poses import poses
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.mechanism.shapes import Solid, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -78,24 +76,9 @@ def _bones(mechanism: Mechanism, at: Any) -> list[tuple[Floats, Floats]]:
     return out
 
 
-def _surface(shape: Shape | Polytope) -> Floats:
+def _surface(shape: Solid) -> Floats:
     """Points whose hull is the shape, body axes (n, 3)."""
-    turn, centre = rotation_matrix(shape.orientation), np.asarray(shape.center)
-    angles = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
-    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)], axis=1)
-    ball = np.concatenate([ring * (np.cos(t), np.cos(t), 0.0) + (0, 0, np.sin(t)) for t in np.linspace(-1.5, 1.5, 9)])
-    if isinstance(shape, Box):
-        local = 0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))
-    elif isinstance(shape, Sphere):
-        local = shape.radius * ball
-    elif isinstance(shape, Polytope):
-        local = np.asarray(shape.vertices)
-    else:
-        assert isinstance(shape, Capsule | Cylinder)
-        end = shape.radius * (ball if isinstance(shape, Capsule) else ring)
-        half = np.array([0.0, 0.0, shape.length / 2])
-        local = np.concatenate([end + half, end - half])
-    return np.asarray(local @ turn.T + centre)
+    return np.asarray(shape.outline() @ rotation_matrix(shape.orientation).T + np.asarray(shape.center))
 
 
 def _hull(points: Floats) -> Floats:

@@ -17,14 +17,13 @@ from dojo_opt.viewer.page import page
 from sim.mechanism import shapes
 from sim.mechanism.pack import contact_frame
 from sim.mechanism.parts import WORLD
-from sim.mechanism.polytope import Polytope
+from sim.mechanism.shapes import PLATE, Primitive
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator
 
 __all__ = ["save_html"]
 
 FRAMES = 60  # per second of the animation
-_THICK = 0.002  # of a drawn plane [m]
 _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squares, length of a piece of a line [m]
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
@@ -73,9 +72,9 @@ def _ground(m: Motion) -> list[Any]:
         n, *sides = contact_frame(normal)
         place = np.eye(4)
         place[:3, :3] = np.stack([*sides, n], axis=1)
-        place[:3, 3] = (height - 0.5 * _THICK) * n
+        place[:3, 3] = (height - 0.5 * PLATE) * n
         node = Node(("meshcat", "ground", str(k)))
-        commands += [SetObject(geometry.Box([10.0, 10.0, _THICK]), earth, node), SetTransform(place, node)]
+        commands += [SetObject(geometry.Box([10.0, 10.0, PLATE]), earth, node), SetTransform(place, node)]
     return commands
 
 
@@ -93,8 +92,8 @@ def _floor() -> list[Any]:
     points = np.array([(a, b, 0.0) for a, b in ends] + [(b, a, 0.0) for a, b in ends]).T
     ink = geometry.LineBasicMaterial(color=_LINE)
     return [
-        SetObject(geometry.Box([_GRID, _GRID, _THICK]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
-        SetTransform(_place((0.0, 0.0, -2.0 * _THICK)), plane),
+        SetObject(geometry.Box([_GRID, _GRID, PLATE]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
+        SetTransform(_place((0.0, 0.0, -2.0 * PLATE)), plane),
         SetObject(geometry.LineSegments(geometry.PointsGeometry(points.astype(np.float32)), ink), path=lines),
     ]
 
@@ -160,24 +159,28 @@ def _solids(shape: Any) -> list[tuple[Any, Any]]:
     if shape is None:
         return [(geometry.Sphere(0.02), np.eye(4))]
     place = _place(shape.center, shape.orientation)
-    if isinstance(shape, shapes.Sphere):
-        return [(geometry.Sphere(shape.radius), place)]
-    if isinstance(shape, shapes.Box):
-        return [(geometry.Box([shape.x, shape.y, shape.z]), place)]
-    if isinstance(shape, shapes.HalfSpace):
-        return [(geometry.Box([10.0, 10.0, _THICK]), place @ _place((0, 0, -0.5 * _THICK)))]
-    if isinstance(shape, Polytope):
+    return [(_geometry(part), place @ _at(part)) for part in shape.primitives()]
+
+
+def _geometry(part: Primitive) -> Any:
+    """The MeshCat geometry of a part of a shape."""
+    from meshcat import geometry
+
+    if part.kind == "hull":
         from scipy.spatial import ConvexHull
 
-        points = np.asarray(shape.vertices)
-        return [(geometry.TriangularMeshGeometry(points, ConvexHull(points).simplices), place)]
-    # MeshCat's cylinders stand along y, ours along z
-    upright = place @ _place((0, 0, 0), (np.sqrt(0.5), np.sqrt(0.5), 0, 0))
-    solids = [(geometry.Cylinder(shape.length, shape.radius), upright)]
-    if isinstance(shape, shapes.Capsule):
-        ends = [place @ _place((0, 0, side * shape.length / 2)) for side in (-1, 1)]
-        solids += [(geometry.Sphere(shape.radius), end) for end in ends]
-    return solids
+        return geometry.TriangularMeshGeometry(part.size, ConvexHull(part.size).simplices)
+    if part.kind == "cylinder":
+        radius, length = part.size.tolist()
+        return geometry.Cylinder(length, radius)
+    if part.kind == "box":
+        return geometry.Box(part.size.tolist())
+    return geometry.Sphere(float(part.size[0])) if len(part.size) == 1 else geometry.Ellipsoid(part.size.tolist())
+
+
+def _at(part: Primitive) -> Any:
+    """Its placement in the shape: MeshCat's cylinders stand along y, ours along z."""
+    return _place(part.center, (np.sqrt(0.5), np.sqrt(0.5), 0, 0) if part.kind == "cylinder" else (1.0, 0.0, 0.0, 0.0))
 
 
 def _place(position: Any, quaternion: Any = (1.0, 0.0, 0.0, 0.0)) -> Any:

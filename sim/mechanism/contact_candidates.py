@@ -9,13 +9,11 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.mechanism.bounding_spheres import bounding_radius
 from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD, Body, Joint
 from sim.mechanism.polytope import Polytope, hull_table
-from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String, rotation_matrix
+from sim.mechanism.shapes import HalfSpace, Solid, String, rotation_matrix
 from sim.model import shape_kinds
-from sim.model.shape_kinds import CROSSINGS, EDGES, RIM_POINTS, SPARE
 
 Floats = NDArray[np.float64]
 End = tuple[int, Solid]  # body, -1 for the world, and shape
@@ -76,30 +74,33 @@ def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision
         return _corners(collision, (a, first), (b, second))
     if isinstance(first, HalfSpace) and isinstance(second, Polytope) and b >= 0:
         return _corners(collision, (b, second), (a, first))
-    for one, other in ((solids, second), (solids[::-1], first)):
-        if isinstance(other, Cylinder) and type(one[0][1]) in (Capsule, Box, Polytope):
-            return _on_cylinder(collision, one)
-    if Polytope in (type(first), type(second)) and {type(first), type(second)} <= _CONVEX:
-        return _polytopes(collision, solids if isinstance(second, Polytope) else solids[::-1])
-    codes = [_CODES.get(type(first)), _CODES.get(type(second))]
-    match = None if codes[0] is None or codes[1] is None else shape_kinds.pair(codes[0], codes[1])
+    match = shape_kinds.pair(first.code, second.code)
     if match is None:
         names = f"{type(first).__name__} and {type(second).__name__}"
         raise ValueError(f"{call}: there is no collision of {names}: {_REASON}")
     kind, swapped = match
-    return _features(collision, kind, solids[::-1] if swapped else solids)
+    if kind == shape_kinds.Pair.POLYTOPE_POLYTOPE:  # of two polytopes that are one in other pairs, b is the polytope
+        swapped = not isinstance(second, Polytope)
+    return _points(collision, kind, solids[::-1] if swapped else solids)
 
 
-def _features(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> list[Touch]:
+def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> list[Touch]:
     """The contact points of two shapes in the order of their pair."""
-    code, number = int(kind), shape_kinds.count(kind)
     rope = isinstance(ends[0][1], String)  # which pulls along itself, and does not rub
     sizes = np.zeros(8)
-    around = []
+    around, corners, tables = [0.0, 0.0], [0, 0], []
     for k, (_, shape) in enumerate(ends):
-        values = _sizes(shape)
+        if shape_kinds.tables(kind)[k]:
+            table, radius = hull_table(shape)
+            points = table[1 : 1 + int(table[0, 0]), :3]
+            thick = radius if len(points) < 4 else float(np.ptp(points, axis=0).min())
+            values: tuple[float, ...] = (0.0, radius, thick)
+            around[k], corners[k] = float(np.linalg.norm(points, axis=1).max()) + radius, len(points)
+            tables.append(table)
+        else:
+            values, around[k] = shape.sizes(), shape.bounding_radius()
         sizes[4 * k : 4 * k + len(values)] = values
-        around.append(bounding_radius(_CODES[type(shape)], values))
+    code, number = int(kind), shape_kinds.count(kind, (corners[0], corners[1]))
     if ends[0][0] < 0:  # the world is always b
         ends, around, code = ends[::-1], around[::-1], code + shape_kinds.SWAPPED
     places = np.array([_place(shape) for _, shape in ends])
@@ -110,7 +111,7 @@ def _features(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> 
             code,
             feature,
             sizes,
-            (),
+            tuple(tables) if feature == 0 else (),
             (around[0], around[1]),
             places,
             0.0 if rope else collision.friction,
@@ -137,77 +138,6 @@ def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> 
         law = (collision.friction, collision.law, collision.restitution, collision.name)
         out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
     return out
-
-
-_CONVEX: set[type] = {Polytope, Box, Capsule, Sphere}
-
-
-def _polytopes(collision: Collision, ends: list[End]) -> list[Touch]:
-    """The contact points of a shape and a polytope: corners, and crossings of edges."""
-    tables, radii = zip(*(hull_table(shape) for _, shape in ends), strict=True)
-    corners = [table[1 : 1 + int(table[0, 0]), :3] for table in tables]
-    around = [float(np.linalg.norm(c, axis=1).max()) + r for c, r in zip(corners, radii, strict=True)]
-    thick = [r if len(c) < 4 else float(np.ptp(c, axis=0).min()) for c, r in zip(corners, radii, strict=True)]
-    sizes = np.array([0.0, radii[0], thick[0], 0.0, 0.0, radii[1], thick[1], 0.0])
-    number = len(corners[0]) + len(corners[1]) + (EDGES if tables[0][0, 1] > 0 else SPARE)
-    return _points(collision, ends, shape_kinds.Pair.POLYTOPE_POLYTOPE, number, sizes, around, tables)
-
-
-def _on_cylinder(collision: Collision, ends: list[End]) -> list[Touch]:
-    """The contact points of a capsule, box or polytope and a cylinder: corners, points of rims, crossings."""
-    table, radius = hull_table(ends[0][1])
-    corners = table[1 : 1 + int(table[0, 0]), :3]
-    cylinder = _sizes(ends[1][1])
-    sizes = np.array([0.0, radius, radius or float(np.ptp(corners, axis=0).min()), 0.0, *cylinder, 0.0, 0.0])
-    around = [
-        float(np.linalg.norm(corners, axis=1).max()) + radius,
-        bounding_radius(shape_kinds.Shape.CYLINDER, cylinder),
-    ]
-    number = len(corners) + CROSSINGS + (RIM_POINTS if table[0, 2] > 0 else 0)
-    return _points(collision, ends, shape_kinds.Pair.POLYTOPE_CYLINDER, number, sizes, around, (table,))
-
-
-def _points(
-    collision: Collision,
-    ends: list[End],
-    kind: shape_kinds.Pair,
-    number: int,
-    sizes: Floats,
-    around: list[float],
-    tables: tuple[Floats, ...],
-) -> list[Touch]:
-    """The contact points of two shapes of which at least one has a table."""
-    code = int(kind)
-    if ends[0][0] < 0:  # the world is always b
-        ends, around, code = ends[::-1], around[::-1], code + shape_kinds.SWAPPED
-    places = np.array([_place(shape) for _, shape in ends])
-    bodies, circles = (ends[0][0], ends[1][0]), (around[0], around[1])
-    law = (collision.friction, collision.law, collision.restitution, collision.name)
-    return [
-        Touch(f"{collision.name}_{k}", bodies, code, k, sizes, tables if k == 0 else (), circles, places, *law)
-        for k in range(number)
-    ]
-
-
-_CODES: dict[type, shape_kinds.Shape] = {
-    Sphere: shape_kinds.Shape.SPHERE,
-    Capsule: shape_kinds.Shape.CAPSULE,
-    Box: shape_kinds.Shape.BOX,
-    Cylinder: shape_kinds.Shape.CYLINDER,
-    HalfSpace: shape_kinds.Shape.HALFSPACE,
-    String: shape_kinds.Shape.STRING,
-}
-
-
-def _sizes(shape: Solid) -> tuple[float, ...]:
-    """Sizes in the order of shape_kinds.Shape."""
-    if isinstance(shape, Sphere):
-        return (shape.radius,)
-    if isinstance(shape, Capsule | Cylinder):
-        return shape.radius, 0.5 * shape.length
-    if isinstance(shape, Box):
-        return 0.5 * shape.x, 0.5 * shape.y, 0.5 * shape.z
-    return (shape.length,) if isinstance(shape, String) else ()
 
 
 def _place(shape: Solid) -> Floats:

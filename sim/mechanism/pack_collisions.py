@@ -66,7 +66,6 @@ def _pack_hulls(found: Sequence[Touch], model: Model) -> None:
             rows[k] = end
             model.hull[end : end + len(table)] = table
             end += len(table)
-        if touch.kind % shape_kinds.SWAPPED == shape_kinds.Pair.POLYTOPE_POLYTOPE:
-            model.pair_sizes[j, [0, 4]] = rows
-        elif touch.kind % shape_kinds.SWAPPED == shape_kinds.Pair.POLYTOPE_CYLINDER:
-            model.pair_sizes[j, 0] = rows[0]
+        sides = [side for side, given in enumerate(shape_kinds.tables(touch.kind)) if given]
+        for side, row in zip(sides, rows, strict=False):
+            model.pair_sizes[j, 4 * side] = row

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
-from sim.mechanism.shapes import Box, Capsule, Solid, Sphere, rotation_matrix
+from sim.mechanism.shapes import Primitive, Solid, Stance, rotation_matrix
+from sim.model import shape_kinds
+from sim.model.shape_kinds import Size
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +28,9 @@ class Polytope(Solid):
     `vertices` keeps the corners of the hull only. A body that takes its inertia from the shape has its origin at the
     centre of mass: `Polytope.about_centroid(points)` moves it there.  ValueError: points that span no volume.
     """
+
+    code = shape_kinds.Shape.POLYTOPE
+    surface = {"scale": (Size.SCALE, 1.0)}
 
     vertices: ArrayLike
 
@@ -95,18 +100,43 @@ class Polytope(Solid):
         a, b, c = np.linalg.eigvalsh(self.inertia(mass))
         return float(a), float(b), float(c)
 
+    def sizes(self) -> tuple[float, ...]:
+        """None: its corners are in a table."""
+        return ()
+
+    def bounding_radius(self) -> float:
+        """Distance of its farthest corner."""
+        return float(np.linalg.norm(np.asarray(self.vertices), axis=1).max())
+
+    def volume(self) -> float:
+        """Of the hull."""
+        return self._moments()[0]
+
+    def outline(self) -> Floats:
+        """Its corners."""
+        return np.asarray(self.vertices)
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("hull", np.asarray(self.vertices))]
+
+    def stance(self) -> Stance:
+        """Its corners."""
+        return Stance("corner", np.asarray(self.vertices), 0.0)
+
 
 def hull_table(shape: Solid) -> tuple[Floats, float]:
-    """The table of hull.py, (n, 4), of a shape without its rounding, and the radius of that rounding [m]."""
-    if isinstance(shape, Sphere):
-        return np.array([[1.0, 0.0, 0.0, 0.0], np.zeros(4)]), shape.radius
-    if isinstance(shape, Capsule):
-        half = 0.5 * shape.length
-        return np.array([[2.0, 1, 0, 0], [0, 0, -half, 0], [0, 0, half, 0], [0, 1, -1, -1]]), shape.radius
-    if isinstance(shape, Box):
-        return _table(0.5 * np.array(list(product((-shape.x, shape.x), (-shape.y, shape.y), (-shape.z, shape.z))))), 0.0
-    assert isinstance(shape, Polytope)
-    return _table(np.asarray(shape.vertices)), 0.0
+    """The table of hull.py, (n, 4), of a shape without its rounding, and the radius of that rounding [m].
+
+    The shape stands on the corners of the hull, or on balls around them.
+    """
+    stance = shape.stance()
+    assert stance is not None
+    points = stance.points
+    if len(points) > 2:
+        return _table(points), stance.radius
+    rows = [[len(points), len(points) - 1, 0, 0], *([*p, 0] for p in points), [0, 1, -1, -1]]
+    return np.array(rows[: 2 * len(points)], dtype=np.float64), stance.radius
 
 
 def _table(points: Floats) -> Floats:

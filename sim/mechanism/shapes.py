@@ -1,14 +1,22 @@
-"""Sphere, Box, Capsule, Cylinder: solids of uniform density, for inertia and for drawing."""
+"""Sphere, Box, Capsule, Cylinder, Ellipsoid: solids of uniform density, for inertia, for contact and for drawing.
+
+A shape is one class. It says its inertia and volume, its number and sizes for the kernels, a ball around it, how its
+surface moves with each of its sizes, the points and balls by which it stands on ground, and how it is drawn.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from itertools import product
+from math import hypot, inf, pi
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
+from sim.model import shape_kinds
+from sim.model.shape_kinds import Size
 
 Floats = NDArray[np.float64]
 
@@ -31,9 +39,40 @@ def _matrix(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
     ]
 
 
+class Primitive(NamedTuple):
+    """A part of the drawing of a shape: in the frame of the shape, about its own centre, long along z."""
+
+    kind: str  # "ball" of one radius or three, "cylinder" of radius and length, "box" of its edges, "hull" of points
+    size: Floats  # [m]
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class Stance(NamedTuple):
+    """The points and balls by which a shape stands on ground, in the frame of the shape."""
+
+    part: str  # what one is called
+    points: Floats  # (n, 3) [m]
+    radius: float  # around each [m]
+
+
+def _around() -> tuple[Floats, Floats]:
+    """Points of the unit circle about z, and of the unit ball."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)], axis=1)
+    ball = np.concatenate([ring * (np.cos(t), np.cos(t), 0.0) + (0, 0, np.sin(t)) for t in np.linspace(-1.5, 1.5, 9)])
+    return ring, ball
+
+
+RING, BALL = _around()
+PLATE = 0.002  # thickness of a drawn plane [m]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Solid:
     """Where a shape sits in its body: centre from the centre of mass [m], and orientation."""
+
+    code: ClassVar[shape_kinds.Shape | None] = None  # None: it cannot collide
+    surface: ClassVar[dict[str, tuple[Size, float]]] = {}  # its sizes in order: effect, unit
 
     center: ArrayLike = (0.0, 0.0, 0.0)
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
@@ -52,6 +91,35 @@ class Solid:
         """Moments of inertia about the shape's own centre and axes [kg m^2]."""
         raise NotImplementedError
 
+    def sizes(self) -> tuple[float, ...]:
+        """Sizes [m] in the order of shape_kinds.Shape."""
+        return tuple(unit * getattr(self, name) for name, (_, unit) in self.surface.items())
+
+    def bounding_radius(self) -> float:
+        """Radius [m] of the sphere about the centre of the shape that contains it; infinite where there is none."""
+        return inf
+
+    def volume(self) -> float:
+        """[m^3]; infinite of a shape that does not end."""
+        return inf
+
+    def support(self, n: Floats) -> float:
+        """Largest n.x over the points x of the shape, in its frame, for a unit vector n (3,) [m]."""
+        stance = self.stance()
+        return inf if stance is None else float((stance.points @ n).max()) + stance.radius
+
+    def outline(self) -> Floats:
+        """Points (n, 3) in the frame of the shape whose hull is the shape, or close to it [m]."""
+        raise NotImplementedError
+
+    def primitives(self) -> list[Primitive]:
+        """The drawing."""
+        return []
+
+    def stance(self) -> Stance | None:
+        """The points and balls by which it stands on ground; None: it has none that do not move over it."""
+        return None
+
     def inertia(self, mass: float) -> Floats:
         """Inertia (3, 3) about the shape's own centre, in body axes: R diag(principal) R^T [kg m^2]."""
         R = rotation_matrix(self.orientation)
@@ -61,6 +129,9 @@ class Solid:
 @dataclass(frozen=True)
 class Sphere(Solid):
     """Ball of the given radius [m]; 2/5 m r^2."""
+
+    code = shape_kinds.Shape.SPHERE
+    surface = {"radius": (Size.BALL, 1.0)}
 
     radius: float
 
@@ -73,10 +144,33 @@ class Sphere(Solid):
         i = 0.4 * mass * self.radius**2
         return i, i, i
 
+    def bounding_radius(self) -> float:
+        """Its own."""
+        return self.radius
+
+    def volume(self) -> float:
+        """4/3 pi r^3."""
+        return 4.0 / 3.0 * pi * self.radius**3
+
+    def outline(self) -> Floats:
+        """Of the ball."""
+        return self.radius * BALL
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("ball", np.array([self.radius]))]
+
+    def stance(self) -> Stance:
+        """Itself."""
+        return Stance("ball", np.zeros((1, 3)), self.radius)
+
 
 @dataclass(frozen=True)
 class Box(Solid):
     """Cuboid with edges x, y, z [m]; m/12 (y^2 + z^2) and so on."""
+
+    code = shape_kinds.Shape.BOX
+    surface = {"x": (Size.SIDE_X, 0.5), "y": (Size.SIDE_Y, 0.5), "z": (Size.SIDE_Z, 0.5)}
 
     x: float
     y: float
@@ -91,10 +185,34 @@ class Box(Solid):
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y)
 
+    def bounding_radius(self) -> float:
+        """Half its diagonal."""
+        return hypot(*self.sizes())
+
+    def volume(self) -> float:
+        """x y z."""
+        return self.x * self.y * self.z
+
+    def outline(self) -> Floats:
+        """Its corners."""
+        return 0.5 * np.array(list(product((-self.x, self.x), (-self.y, self.y), (-self.z, self.z))))
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("box", np.array([self.x, self.y, self.z]))]
+
+    def stance(self) -> Stance:
+        """Its corners."""
+        corners = 0.5 * np.array([self.x, self.y, self.z]) * np.array(list(product((-1.0, 1.0), repeat=3)))
+        return Stance("corner", corners, 0.0)
+
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
     """Cylinder about its z axis [m]; m/12 (3 r^2 + l^2) across, m/2 r^2 along."""
+
+    code = shape_kinds.Shape.CYLINDER
+    surface = {"radius": (Size.RIM, 1.0), "length": (Size.LENGTH, 0.5)}
 
     radius: float
     length: float
@@ -108,6 +226,27 @@ class Cylinder(Solid):
         across = mass / 12 * (3 * self.radius**2 + self.length**2)
         return across, across, mass / 2 * self.radius**2
 
+    def bounding_radius(self) -> float:
+        """Distance of its rims."""
+        return hypot(*self.sizes())
+
+    def support(self, n: Floats) -> float:
+        """r |n_xy| + l/2 |n_z|."""
+        return float(self.radius * hypot(n[0], n[1]) + 0.5 * self.length * abs(n[2]))
+
+    def volume(self) -> float:
+        """pi r^2 l."""
+        return pi * self.radius**2 * self.length
+
+    def outline(self) -> Floats:
+        """Its rims."""
+        half = np.array([0.0, 0.0, self.length / 2])
+        return np.concatenate([self.radius * RING + half, self.radius * RING - half])
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("cylinder", np.array([self.radius, self.length]))]
+
 
 @dataclass(frozen=True)
 class Capsule(Solid):
@@ -116,6 +255,9 @@ class Capsule(Solid):
     across = m_c (l^2/12 + r^2/4) + m_s (2/5 r^2 + l^2/4 + 3/8 l r)
     along  = m_c r^2/2 + m_s 2/5 r^2,     m_c : m_s = l : 4/3 r
     """
+
+    code = shape_kinds.Shape.CAPSULE
+    surface = {"radius": (Size.BALL, 1.0), "length": (Size.ROD, 0.5)}
 
     radius: float
     length: float
@@ -132,19 +274,95 @@ class Capsule(Solid):
         across = rod * (length**2 / 12 + r**2 / 4) + ball * (0.4 * r**2 + length**2 / 4 + 0.375 * length * r)
         return across, across, rod * r**2 / 2 + 0.4 * ball * r**2
 
+    def bounding_radius(self) -> float:
+        """Distance of its ends."""
+        return sum(self.sizes())
+
+    def volume(self) -> float:
+        """pi r^2 l + 4/3 pi r^3."""
+        return pi * self.radius**2 * self.length + 4.0 / 3.0 * pi * self.radius**3
+
+    def outline(self) -> Floats:
+        """Of the balls at its ends."""
+        half = np.array([0.0, 0.0, self.length / 2])
+        return np.concatenate([self.radius * BALL + half, self.radius * BALL - half])
+
+    def primitives(self) -> list[Primitive]:
+        """A cylinder, and the balls at its ends."""
+        ends = [(0.0, 0.0, side * self.length / 2) for side in (-1, 1)]
+        rod = Primitive("cylinder", np.array([self.radius, self.length]))
+        return [rod, *(Primitive("ball", np.array([self.radius]), end) for end in ends)]
+
+    def stance(self) -> Stance:
+        """A ball at either end."""
+        return Stance("end", np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * self.length, self.radius)
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Solid):
+    """Ellipsoid with the semi-axes x, y, z [m]; m/5 (y^2 + z^2) and so on.
+
+    It touches ground and planes as a collision with a HalfSpace: the point it stands on moves over it.
+    """
+
+    code = shape_kinds.Shape.ELLIPSOID
+    surface = {"x": (Size.SEMI_X, 1.0), "y": (Size.SEMI_Y, 1.0), "z": (Size.SEMI_Z, 1.0)}
+
+    x: float
+    y: float
+    z: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._positive("x", "y", "z")
+
+    def principal(self, mass: float) -> tuple[float, float, float]:
+        """m/5 (y^2 + z^2), and so on."""
+        x, y, z = self.x**2, self.y**2, self.z**2
+        return mass / 5 * (y + z), mass / 5 * (x + z), mass / 5 * (x + y)
+
+    def bounding_radius(self) -> float:
+        """The longest semi-axis."""
+        return max(self.sizes())
+
+    def support(self, n: Floats) -> float:
+        """|D n|."""
+        return hypot(self.x * n[0], self.y * n[1], self.z * n[2])
+
+    def volume(self) -> float:
+        """4/3 pi x y z."""
+        return 4.0 / 3.0 * pi * self.x * self.y * self.z
+
+    def outline(self) -> Floats:
+        """Of the ball, stretched."""
+        return BALL * self.sizes()
+
+    def primitives(self) -> list[Primitive]:
+        """Itself."""
+        return [Primitive("ball", np.array(self.sizes()))]
+
 
 @dataclass(frozen=True)
 class HalfSpace(Solid):
     """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, no body."""
 
+    code = shape_kinds.Shape.HALFSPACE
+
     def principal(self, mass: float) -> tuple[float, float, float]:
         """None: it has no end."""
         raise ValueError("HalfSpace: a body cannot have this shape")
+
+    def primitives(self) -> list[Primitive]:
+        """A plate of 10 m below its plane."""
+        return [Primitive("box", np.array([10.0, 10.0, PLATE]), (0.0, 0.0, -0.5 * PLATE))]
 
 
 @dataclass(frozen=True)
 class String(Solid):
     """One end, at its centre, of a string of the given length [m] between two bodies; no body."""
+
+    code = shape_kinds.Shape.STRING
+    surface = {"length": (Size.STRING, 1.0)}
 
     length: float
 
@@ -157,4 +375,4 @@ class String(Solid):
         raise ValueError("String: a body cannot have this shape")
 
 
-Shape = Sphere | Box | Cylinder | Capsule
+Shape = Sphere | Box | Cylinder | Capsule | Ellipsoid

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import WORLD
 from sim.mechanism.poses import poses
-from sim.mechanism.shapes import rotation_matrix
+from sim.mechanism.shapes import HalfSpace, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -27,13 +28,32 @@ def gaps(mech: Mechanism, q: Floats) -> Floats:
     return np.array([float(c.gap(at[c.body].at(c.point))) for c in mech.contacts], dtype=np.float64)
 
 
+def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
+    """(distance [m], upward part of the normal) of every shape of a body from a half-space of the world."""
+    at = poses(mech.joints, q)
+    shapes = {body.name: body.shape for body in mech.bodies}
+    out = []
+    for c in mech.collisions:
+        solid = c.shape_a if c.shape_a is not None else shapes[c.a]
+        if c.b != WORLD or not isinstance(c.shape_b, HalfSpace) or solid is None:
+            continue
+        n = rotation_matrix(c.shape_b.orientation)[:, 2]
+        own = (at[c.a].rotation @ rotation_matrix(solid.orientation)).T @ -n
+        arm = at[c.a].at(np.asarray(solid.center)) - np.asarray(c.shape_b.center)
+        out.append((float(n @ arm) - solid.support(own), float(n[2])))
+    return out
+
+
 def lifted(mech: Mechanism, base: str) -> Floats:
-    """Neutral q with the joint `base`, floating in the world, so high that the lowest contact touches its ground."""
+    """Neutral q with the joint `base`, floating in the world, so high that the lowest contact touches its ground, or
+    the lowest shape a half-space.
+    """
     q = np.array(mech.neutral, dtype=np.float64)
     joint = mech.joints[mech.joint_names.index(base)]
-    rise = mech.contact_normals[:, 2]
-    if np.any(rise > 0.0):
-        up = _CLEAR - (gaps(mech, q)[rise > 0.0] / rise[rise > 0.0]).min()
+    low = [*zip(gaps(mech, q), mech.contact_normals[:, 2], strict=True), *plane_heights(mech, q)]
+    heights = [gap / rise for gap, rise in low if rise > 0.0]
+    if heights:
+        up = _CLEAR - min(heights)
         at = mech.q_slice(base).start
         q[at : at + 3] += up * rotation_matrix(joint.orientation)[2]
     return q

@@ -1,8 +1,9 @@
-"""Shape, Pair: the supported pairs of shapes, the layout of their sizes, and the number of their contact points."""
+"""Shape, Pair, Size: shapes as kernels know them, the supported pairs, and the number of their contact points."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from itertools import product
 
 SIZES = 4  # room for the sizes of one shape in the vector that `collide` takes
 SWAPPED = 64  # added to a Pair: the two have changed places
@@ -22,7 +23,25 @@ class Shape(IntEnum):
     CYLINDER = 3  # radius, half length
     HALFSPACE = 4  # no sizes: z <= 0 of its frame is solid
     POLYTOPE = 6  # row of its table (hull.py), radius around it; as others are against one, and all against a cylinder
+    ELLIPSOID = 7  # semi-axes along x, y, z
     STRING = 5  # as shape a: greatest length; against a STRING b without sizes: the other end
+
+
+class Size(IntEnum):
+    """How the surface of a shape moves where it is touched, per unit of one of its sizes (sizes.py)."""
+
+    BALL = 0  # radius around a point, a segment, or a polytope: along the normal
+    ROD = 1  # half length of a capsule: its ends
+    SIDE_X = 2  # half side of a box: corners, edges and faces, away from the middle
+    SIDE_Y = 3
+    SIDE_Z = 4
+    RIM = 5  # radius of a cylinder: away from the axis
+    LENGTH = 6  # half length of a cylinder: its ends
+    SCALE = 7  # of a polytope: away from the centre
+    STRING = 8  # length: the point stays, the gap grows
+    SEMI_X = 9  # semi-axis of an ellipsoid: in proportion to the place along it; normals turn
+    SEMI_Y = 10
+    SEMI_Z = 11
 
 
 class Pair(IntEnum):
@@ -40,12 +59,16 @@ class Pair(IntEnum):
     BOX_HALFSPACE = 9
     CYLINDER_HALFSPACE = 10
     STRING = 11
-    POLYTOPE_POLYTOPE = 12
-    POLYTOPE_CYLINDER = 13
-    CYLINDER_CYLINDER = 14
+    ELLIPSOID_HALFSPACE = 12
+    ELLIPSOID_ELLIPSOID = 13
+    CYLINDER_ELLIPSOID = 14
+    POLYTOPE_ELLIPSOID = 15
+    POLYTOPE_POLYTOPE = 16  # from here on pairs have room for elements that are kept
+    POLYTOPE_CYLINDER = 17
+    CYLINDER_CYLINDER = 18
 
 
-_PAIRS = {
+_PAIRS: dict[tuple[Shape | None, Shape | None], Pair] = {
     (Shape.SPHERE, Shape.SPHERE): Pair.SPHERE_SPHERE,
     (Shape.SPHERE, Shape.CAPSULE): Pair.SPHERE_CAPSULE,
     (Shape.SPHERE, Shape.BOX): Pair.SPHERE_BOX,
@@ -58,6 +81,10 @@ _PAIRS = {
     (Shape.BOX, Shape.HALFSPACE): Pair.BOX_HALFSPACE,
     (Shape.CYLINDER, Shape.HALFSPACE): Pair.CYLINDER_HALFSPACE,
     (Shape.STRING, Shape.STRING): Pair.STRING,
+    (Shape.ELLIPSOID, Shape.HALFSPACE): Pair.ELLIPSOID_HALFSPACE,
+    (Shape.ELLIPSOID, Shape.ELLIPSOID): Pair.ELLIPSOID_ELLIPSOID,
+    (Shape.CYLINDER, Shape.ELLIPSOID): Pair.CYLINDER_ELLIPSOID,
+    (Shape.POLYTOPE, Shape.ELLIPSOID): Pair.POLYTOPE_ELLIPSOID,
     (Shape.POLYTOPE, Shape.POLYTOPE): Pair.POLYTOPE_POLYTOPE,
     (Shape.POLYTOPE, Shape.CYLINDER): Pair.POLYTOPE_CYLINDER,
     (Shape.CYLINDER, Shape.CYLINDER): Pair.CYLINDER_CYLINDER,
@@ -74,15 +101,41 @@ _COUNT = {
 }
 
 
-def pair(a: Shape, b: Shape) -> tuple[Pair, bool] | None:
-    """Kind of the pair, and whether the two must be swapped to match its order; None if the pair is not supported."""
-    if (a, b) in _PAIRS:
-        return _PAIRS[a, b], False
-    if (b, a) in _PAIRS:
-        return _PAIRS[b, a], True
+_STANDING = {Shape.SPHERE, Shape.CAPSULE, Shape.BOX}  # on corners, which may have a ball around them: polytopes
+_TABLES = {
+    Pair.POLYTOPE_ELLIPSOID: (True, False),
+    Pair.POLYTOPE_POLYTOPE: (True, True),
+    Pair.POLYTOPE_CYLINDER: (True, False),
+}
+
+
+def pair(a: Shape | None, b: Shape | None) -> tuple[Pair, bool] | None:
+    """Kind of the pair, and whether the two must be swapped to match its order; None if the pair is not supported.
+
+    Spheres, capsules and boxes are polytopes where they have no routine of their own.
+    """
+    for first, second in product(_forms(a), _forms(b)):
+        if (first, second) in _PAIRS:
+            return _PAIRS[first, second], False
+        if (second, first) in _PAIRS:
+            return _PAIRS[second, first], True
     return None
 
 
-def count(kind: Pair) -> int:
-    """How many contact points the pair may have: features of `collide`; polytopes: contact_candidates.py."""
+def _forms(a: Shape | None) -> list[Shape | None]:
+    """A shape as itself, then as a polytope."""
+    return [a, Shape.POLYTOPE] if a in _STANDING else [a]
+
+
+def tables(kind: int) -> tuple[bool, bool]:
+    """Whether the shapes of a pair are given by tables of corners (hull.py)."""
+    return _TABLES.get(Pair(kind % SWAPPED), (False, False))
+
+
+def count(kind: Pair, corners: tuple[int, int] = (0, 0)) -> int:
+    """How many contact points the pair may have: features of `collide`; corners: of the two in their tables."""
+    if kind == Pair.POLYTOPE_POLYTOPE:
+        return corners[0] + corners[1] + (EDGES if corners[0] > 1 else SPARE)
+    if kind == Pair.POLYTOPE_CYLINDER:
+        return corners[0] + CROSSINGS + (RIM_POINTS if corners[0] > 2 else 0)
     return _COUNT.get(kind, 1)

@@ -11,13 +11,20 @@ from scipy.spatial.transform import Rotation
 
 from sim.contact.collision.collide import arrange, choose, collide, collide_chosen, open_sides
 from sim.contact.collision.edge_axes import OPEN
-from sim.mechanism.bounding_spheres import bounding_radius
+from sim.mechanism.shapes import Box, Capsule, HalfSpace, Solid, Sphere, String
 from sim.model.shape_kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
 from support.jacobians import differences
 from support.shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
 Array = np.ndarray
+SOLIDS: dict[Shape, type[Solid]] = {Shape.SPHERE: Sphere, Shape.CAPSULE: Capsule, Shape.BOX: Box}
 ROUND = {Shape.SPHERE: 1, Shape.CAPSULE: 1, Shape.BOX: 0}  # how many sizes are a radius around the core
+
+
+def solid(shape: Shape, sizes: Array) -> Solid:
+    """The shape with sizes as kernels have them."""
+    make = SOLIDS[shape]
+    return make(*(size / unit for size, (_, unit) in zip(sizes, make.surface.values(), strict=False)))
 
 
 # -- derivatives -------------------------------------------------------------------------------------------------------
@@ -204,7 +211,7 @@ def test_shapes_are_at_least_as_far_apart_as_the_balls_around_them(kind: Pair, r
     for _ in range(100):
         sizes = rng.uniform(0.1, 0.5, 2 * SIZES)
         R, r = Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3)
-        bound = float(np.linalg.norm(r)) - bounding_radius(a, sizes[:4]) - bounding_radius(b, sizes[4:])
+        bound = float(np.linalg.norm(r)) - solid(a, sizes[:4]).bounding_radius() - solid(b, sizes[4:]).bounding_radius()
         if bound > 0.0:
             assert deepest(kind, sizes, R, r)[0] >= bound - 1e-12
         outcomes.add(bound > 0.0)
@@ -212,7 +219,7 @@ def test_shapes_are_at_least_as_far_apart_as_the_balls_around_them(kind: Pair, r
 
 
 def test_nothing_is_around_a_half_space_or_a_string() -> None:
-    assert bounding_radius(Shape.HALFSPACE, []) == bounding_radius(Shape.STRING, [1.0]) == inf
+    assert HalfSpace().bounding_radius() == String(1.0).bounding_radius() == inf
 
 
 def test_pairs_have_one_order() -> None:

@@ -31,7 +31,7 @@ TABLE = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 </mujoco>"""
 
 
-def quietly(text: str, **choices: bool) -> MjcfMechanism:
+def quietly(text: str, **choices: object) -> MjcfMechanism:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", MjcfWarning)
         return load_mjcf(text, **choices)  # type: ignore[arg-type]
@@ -91,3 +91,51 @@ def test_tendons_that_pull_are_warned_of() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", MjcfWarning)
         assert "tendons are left out: rope" in str(load_mjcf(text.format("")).report)
+
+
+STONES = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" euler="10 -20 0" pos="0 0 .1"/>
+  <geom name="post" type="capsule" size=".1 .3" pos="3 0 1"/>
+  <body name="egg" pos="0 0 .1"><freejoint/><geom name="egg" type="ellipsoid" size=".3 .2 .1" friction=".6"/></body>
+  <body name="lens" pos="3 0 2"><freejoint/><geom name="lens" type="ellipsoid" size=".2 .25 .05" euler="20 0 40"/></body>
+  <body name="die" pos="0 3 2"><freejoint/><geom name="die" type="box" size=".1 .12 .2"/></body>
+</worldbody></mujoco>"""
+
+
+def test_ellipsoids_touch_planes_and_one_another_where_mujoco_says(rng: np.random.Generator) -> None:
+    mech = quietly(STONES, collisions=True, gravity=(0.0, 0.0, 0.0))
+    assert {c.name for c in mech.collisions} == {
+        "egg", "lens", "post-egg", "post-lens", "post-die", "egg-lens", "egg-die", "lens-die"
+    }  # fmt: skip
+    assert {c.body for c in mech.contacts} == {"die"}
+    assert (mech.collisions[0].shape_a.sizes(), mech.collisions[0].friction) == ((0.3, 0.2, 0.1), 1.0)
+    sim = Simulator(mech, time_step=1e-3, kappa=1e-12)
+    model = mujoco.MjModel.from_xml_string(STONES)
+    model.geom_margin[0] = 9.0  # of the plane: distances from it are exact whatever the margin, of others they are not
+    data = mujoco.MjData(model)
+    seen = 0
+    for _ in range(20):
+        q = np.array(mech.neutral)
+        for k in range(3):
+            q[7 * k : 7 * k + 3] = np.array([0.0, 0.0, 1.6]) + rng.uniform(-0.9, 0.9, 3)
+            q[7 * k + 3 : 7 * k + 7] = (turn := rng.normal(size=4)) / np.linalg.norm(turn)
+        data.qpos[:] = q
+        mujoco.mj_forward(model, data)
+        theirs = {model.geom(int(c.geom[1])).name: c.dist for c in data.contact if c.geom[0] == 0}
+        for pair in ("post-egg", "post-lens", "egg-lens", "egg-die", "lens-die"):
+            a, b = (model.geom(name).id for name in pair.split("-"))
+            theirs[pair] = mujoco.mj_geomDistance(model, data, a, b, 9.0, None)
+        if min(theirs.values()) < 0.0:
+            continue
+        gaps = sim.step(np.r_[q, np.zeros(sim.nv)], throw=True).contacts.gap
+        for name, gap in zip(mech.contact_names, gaps, strict=True):
+            if name in theirs:
+                assert gap == pytest.approx(theirs[name], abs=1e-5), name
+                seen += 1
+    assert seen > 60
+
+
+def test_a_base_starts_with_its_ellipsoid_on_the_plane() -> None:
+    """The file has it 8 cm deep in a plane."""
+    mech = quietly(STONES.partition('  <body name="lens"')[0] + "</worldbody></mujoco>")
+    gap = Simulator(mech, time_step=1e-9, kappa=1e-18).step(np.r_[mech.neutral, np.zeros(6)]).contacts.gap
+    np.testing.assert_allclose(gap, [0.0], atol=1e-8)

@@ -14,6 +14,7 @@ SHAPES = {
     "capsule": dojo.Capsule(0.15, 0.4),
     "box": dojo.Box(0.4, 0.3, 0.5),
     "cylinder": dojo.Cylinder(0.2, 0.3),
+    "ellipsoid": dojo.Ellipsoid(0.3, 0.2, 0.15),
     "stone": STONE,
     "plane": dojo.HalfSpace(),
     "string": dojo.String(0.5),
@@ -36,6 +37,13 @@ PAIRS = [
     "box stone",
     "stone stone",
     "stone plane",
+    "ellipsoid plane",
+    "ellipsoid ellipsoid",
+    "ellipsoid sphere",
+    "ellipsoid capsule",
+    "box ellipsoid",
+    "cylinder ellipsoid",
+    "stone ellipsoid",
 ]
 # gap [m], kappa, restitution, and the least impulse that makes it what it is called [N s]
 WHERE = {

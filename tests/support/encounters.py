@@ -8,7 +8,7 @@ from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Joint
 from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from sim.simulator.simulator import Simulator
 
 SHAPES: dict[str, Shape] = {
@@ -24,6 +24,7 @@ ALL: dict[str, Shape | Polytope] = {
     "cylinder": Cylinder(0.2, 0.4),
     "wheel": Cylinder(0.3, 0.2),
     "polytope": ROCK,
+    "ellipsoid": Ellipsoid(0.3, 0.2, 0.15),
 }
 
 

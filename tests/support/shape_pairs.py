@@ -6,12 +6,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sim.contact.collision.collide import collide
-from sim.model.shape_kinds import OUT, Pair, Shape, count, pair
+from sim.model.shape_kinds import OUT, Pair, Shape, count
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))
-SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE]  # test_collision_table.py has the others
-CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING"} & set(p.name.split("_"))]
+TABLES = {"POLYTOPE"}  # test_collision_table.py has those of polytopes
+SIMPLE = [p for p in Pair if p < Pair.POLYTOPE_POLYTOPE and not TABLES & set(p.name.split("_"))]
+CORE = [p for p in SIMPLE if not {"CYLINDER", "HALFSPACE", "STRING", "ELLIPSOID"} & set(p.name.split("_"))]
 NAMES = {p: p.name.lower() for p in Pair}
 
 
@@ -32,7 +33,8 @@ def deepest(kind: Pair, sizes: Array, R: Array, r: Array) -> Array:
 
 
 def shapes(kind: Pair) -> tuple[Shape, Shape]:
-    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
+    first, *second = kind.name.split("_")
+    return Shape[first], Shape[second[0] if second else first]
 
 
 def random_pose(

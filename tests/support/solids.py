@@ -13,20 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mechanism.polytope import Polytope, hull_table
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Sphere
-from sim.model.shape_kinds import CROSSINGS, EDGES, RIM_POINTS, SIZES, SPARE, Pair, Shape, count, pair
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Sphere
+from sim.model.shape_kinds import SIZES, Pair, Shape, count
 
 Floats = NDArray[np.float64]
 
 POLYTOPES = ("sphere_polytope", "capsule_polytope", "box_polytope", "polytope_polytope")
 ON_CYLINDERS = ("capsule_cylinder", "box_cylinder", "polytope_cylinder")
+ON_ELLIPSOIDS = ("sphere_ellipsoid", "capsule_ellipsoid", "box_ellipsoid", "polytope_ellipsoid")
+ELLIPSOIDS = ("ellipsoid_halfspace", "ellipsoid_ellipsoid", "cylinder_ellipsoid", *ON_ELLIPSOIDS)
 _OF_POLYTOPES = (Pair.POLYTOPE_POLYTOPE, Pair.POLYTOPE_CYLINDER)
-PAIRS = (*(p.name.lower() for p in Pair if p not in _OF_POLYTOPES), *POLYTOPES, *ON_CYLINDERS)
+_SIMPLE = (p.name.lower() for p in Pair if p not in _OF_POLYTOPES and "ELLIPSOID" not in p.name)
+PAIRS = (*_SIMPLE, *POLYTOPES, *ON_CYLINDERS, *ELLIPSOIDS)
 
 
 def shapes(kind: Pair) -> tuple[Shape, Shape]:
     """Shapes a and b of a pair, in its order."""
-    return next((a, b) for a in Shape for b in Shape if pair(a, b) == (kind, False))
+    first, *second = kind.name.split("_")
+    return Shape[first], Shape[second[0] if second else first]
 
 
 class Case(NamedTuple):
@@ -40,7 +44,7 @@ class Case(NamedTuple):
 
 def random_case(name: str, rng: np.random.Generator) -> Case:
     """A pair of shapes with random sizes."""
-    if name not in (*POLYTOPES, *ON_CYLINDERS):
+    if name not in (*POLYTOPES, *ON_CYLINDERS, *ON_ELLIPSOIDS):
         none = np.zeros((0, 3))
         return Case(Pair[name.upper()], rng.uniform(0.15, 0.5, 2 * SIZES), np.zeros((1, 4)), (none, none))
     solids = []
@@ -55,12 +59,15 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
                 "box": Box(*size),
                 "polytope": Polytope.about_centroid(size * ball),
                 "cylinder": Cylinder(size[0], 2.0 * size[1]),
+                "ellipsoid": Ellipsoid(*size),
             }[word]
         )
-    if isinstance(solids[1], Cylinder):
+    if isinstance(solids[1], Cylinder | Ellipsoid):
         table, radius = hull_table(solids[0])
-        sizes = np.array([0.0, radius, 0.0, 0.0, solids[1].radius, 0.5 * solids[1].length, 0.0, 0.0])
-        return Case(Pair.POLYTOPE_CYLINDER, sizes, table, (table[1 : 1 + int(table[0, 0]), :3], np.zeros((0, 3))))
+        sizes = np.zeros(8)
+        sizes[1], sizes[4 : 4 + len(solids[1].sizes())] = radius, solids[1].sizes()
+        kind = Pair.POLYTOPE_CYLINDER if isinstance(solids[1], Cylinder) else Pair.POLYTOPE_ELLIPSOID
+        return Case(kind, sizes, table, (table[1 : 1 + int(table[0, 0]), :3], np.zeros((0, 3))))
     (a, ra), (b, rb) = (hull_table(solid) for solid in solids)
     sizes = np.array([0.0, ra, 0.0, 0.0, len(a), rb, 0.0, 0.0])
     points = (a[1 : 1 + int(a[0, 0]), :3], b[1 : 1 + int(b[0, 0]), :3])
@@ -69,11 +76,7 @@ def random_case(name: str, rng: np.random.Generator) -> Case:
 
 def features(case: Case) -> int:
     """How many contact points there may be."""
-    if case.kind == Pair.POLYTOPE_CYLINDER:
-        return len(case.points[0]) + CROSSINGS + (RIM_POINTS if case.hull[0, 2] > 0 else 0)
-    if case.kind != Pair.POLYTOPE_POLYTOPE:
-        return count(case.kind)
-    return sum(len(p) for p in case.points) + (EDGES if len(case.points[0]) > 1 else SPARE)
+    return count(case.kind, (len(case.points[0]), len(case.points[1])))
 
 
 def support(case: Case, side: int, n: Floats) -> Floats:
@@ -83,6 +86,8 @@ def support(case: Case, side: int, n: Floats) -> Floats:
         return (n @ case.points[side].T).max(axis=1) + sizes[1]
     if shape == Shape.BOX:
         return np.abs(n) @ sizes[:3]
+    if shape == Shape.ELLIPSOID:
+        return np.linalg.norm(n * sizes[:3], axis=1)
     if shape == Shape.CAPSULE:
         return sizes[0] + sizes[1] * np.abs(n[:, 2])
     if shape == Shape.CYLINDER:

@@ -9,6 +9,12 @@ from __future__ import annotations
 from sim.contact.collision import box_axes, box_box, capsule_box, hulls
 from sim.contact.collision.box_elements import put_elements
 from sim.contact.collision.edge_axes import OPEN, Arrangement
+from sim.contact.collision.ellipsoid import (
+    cylinder_ellipsoid,
+    ellipsoid_ellipsoid,
+    ellipsoid_halfspace,
+    polytope_ellipsoid,
+)
 from sim.contact.collision.exchange import exchange
 from sim.contact.collision.halfspace import box_halfspace, capsule_halfspace, cylinder_halfspace, sphere_halfspace
 from sim.contact.collision.segment import choose_points, put_points
@@ -146,6 +152,14 @@ def _put(kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vec
         cylinder_halfspace(feature, sizes, R, r, out)
     elif kind == Pair.STRING:
         string(sizes, r, out)
+    elif kind == Pair.ELLIPSOID_HALFSPACE:
+        ellipsoid_halfspace(sizes, R, r, out)
+    elif kind == Pair.ELLIPSOID_ELLIPSOID:
+        ellipsoid_ellipsoid(sizes, R, r, out)
+    elif kind == Pair.CYLINDER_ELLIPSOID:
+        cylinder_ellipsoid(sizes, R, r, out)
+    elif kind == Pair.POLYTOPE_ELLIPSOID:
+        polytope_ellipsoid(sizes, hull, R, r, out)
     elif kind == Pair.POLYTOPE_POLYTOPE:
         hulls.put_elements(feature, code, sizes, hull, R, r, out)
     else:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.derivatives.parameters.directions import SIDE, Effect, Size
+from sim.derivatives.parameters.directions import SIDE, Effect
 from sim.derivatives.parameters.parameter import Parameter, Term, vector
 from sim.derivatives.parameters.tree_parameters import frame_turns
 from sim.mechanism.axes import contact_frame
@@ -16,18 +16,10 @@ from sim.mechanism.contact_candidates import Touch
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact
 from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Solid, Sphere, String
+from sim.mechanism.shapes import HalfSpace, Solid, String
+from sim.model.shape_kinds import Size
 
 Floats = NDArray[np.float64]
-
-# of the shapes: their names, their effects on a step, and the scale of a unit
-_SIZES: dict[type, dict[str, tuple[Size, float]]] = {
-    Sphere: {"radius": (Size.BALL, 1.0)},
-    Capsule: {"radius": (Size.BALL, 1.0), "length": (Size.ROD, 0.5)},
-    Box: {"x": (Size.SIDE_X, 0.5), "y": (Size.SIDE_Y, 0.5), "z": (Size.SIDE_Z, 0.5)},
-    Cylinder: {"radius": (Size.RIM, 1.0), "length": (Size.LENGTH, 0.5)},
-    Polytope: {"scale": (Size.SCALE, 1.0)},
-}
 
 
 def normal_turns(normal: ArrayLike) -> Floats:
@@ -112,6 +104,6 @@ def _sizes(
         ]
         yield "scale", 1.0, tuple(moves)
         return
-    for label, (size, unit) in _SIZES.get(type(shape), {}).items():
+    for label, (size, unit) in shape.surface.items():
         value = float(getattr(shape, label, 1.0))
         yield label, value, tuple((Effect.SHAPE_SIZE, j, SIDE * side + size, unit) for j in touches)

@@ -38,22 +38,8 @@ class Effect(IntEnum):
     GEAR_RATIO = 24  # [gear]
     GEAR_OFFSET = 25  # [gear]
     INPUT = 26  # force and torque per unit of an input on a body [input, which of the six]
-    SHAPE_SIZE = 27  # of the shapes of a collision [pair of the first point; SIDE side + Size]
+    SHAPE_SIZE = 27  # of the shapes of a collision [pair of the first point; SIDE side + shape_kinds.Size]
     TERRAIN = 28  # a height of the ground, of all in a row [height]: not in a list of terms, see terrain_parameters.py
-
-
-class Size(IntEnum):
-    """How the surface of a shape moves where it is touched, per unit of one of its sizes; see sizes.py."""
-
-    BALL = 0  # radius around a point, a segment, or a polytope: along the normal
-    ROD = 1  # half length of a capsule: its ends
-    SIDE_X = 2  # half side of a box: corners, edges and faces, away from the middle
-    SIDE_Y = 3
-    SIDE_Z = 4
-    RIM = 5  # radius of a cylinder: away from the axis
-    LENGTH = 6  # half length of a cylinder: its ends
-    SCALE = 7  # of a polytope: away from the centre
-    STRING = 8  # length: the point stays, the gap grows
 
 
 SIDE = 16  # stride of the two shapes in the component of a SHAPE_SIZE

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from sim.contact.collision.witness import dot
+from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.contact_law import contact_impulse
-from sim.contact.pairs.pair_contact import is_absent, pair_force
+from sim.contact.pairs.pair_contact import POLE, is_absent, pair_force, shape_b
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
 from sim.derivatives.parameters.string_columns import add_moved_end
+from sim.model.columns import Frame
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
 from solvers.rotation import Vec3, cross, rotate
 from solvers.types import Vector
+
+Moved = tuple[Vec3, Vec3, Vec3]  # a shape at a contact: displacement, rotation, and the place of both from O
 
 
 @kernel
@@ -31,22 +34,54 @@ def pair_floor(data: Data, c: int, side: int, e1: Vec3, e2: Vec3) -> float:
 
 
 @kernel
-def add_moved_shape(
-    model: Model, data: Data, h: float, j: int, side: int, e: Vec3, floor: float, w: float, col: int
-) -> None:
-    """The shape of a (side 0) or b (1) of pair j moves by e, the floor of an impact rises by `floor`; a relative to b:
+def _moved_frame(model: Model, data: Data, j: int, side: int, e: Vec3, turn: Vec3, arm: Vec3) -> tuple[Vec3, Vec3]:
+    """Rotation of the frame and motion of the point of pair j where the shape of a (side 0) or b (1) moves by e and
+    turns by `turn` at the place `arm` from O; a relative to b, and b with all that moves with it.
 
-    frame turns by Omega z, the point moves by M z, gap n.z       slip as in pair_jacobian
+    Omega zeta and M zeta (pair_jacobian.py). The tangents follow the normal in the frame of b, which does not turn.
+    """
+    Omega, M, F = data.pair_turn[j], data.pair_shift[j], data.pair_frame[j]
+    x = cross(turn[0], turn[1], turn[2], arm[0], arm[1], arm[2])
+    v = (e[0] - x[0], e[1] - x[1], e[2] - x[2])
+    s = 1.0 if side == 0 else -1.0
+    z, w = (s * v[0], s * v[1], s * v[2]), (s * turn[0], s * turn[1], s * turn[2])
+    dt = (
+        dot(row(Omega, 0), z) + dot(row(Omega, 3), w),
+        dot(row(Omega, 6), z) + dot(row(Omega, 9), w),
+        dot(row(Omega, 12), z) + dot(row(Omega, 15), w),
+    )
+    dp = (
+        dot(row(M, 0), z) + dot(row(M, 3), w),
+        dot(row(M, 6), z) + dot(row(M, 9), w),
+        dot(row(M, 12), z) + dot(row(M, 15), w),
+    )
+    if side == 0:
+        return dt, dp
+    p, o, n = row(F, Frame.POINT), data.origin, row(F, 0)
+    x = cross(turn[0], turn[1], turn[2], p[0] - o[0], p[1] - o[1], p[2] - o[2])
+    a = rotate(data.shape_rot, shape_b(model, j), POLE[0], POLE[1], POLE[2])
+    b = cross(n[0], n[1], n[2], a[0], a[1], a[2])
+    dn = cross(turn[0], turn[1], turn[2], n[0], n[1], n[2])
+    spin = dot(b, dn) / max(1.0 + dot(a, n), 1e-12)
+    dt = (dt[0] + turn[0] + spin * n[0], dt[1] + turn[1] + spin * n[1], dt[2] + turn[2] + spin * n[2])
+    return dt, (dp[0] + v[0] + x[0], dp[1] + v[1] + x[1], dp[2] + v[2] + x[2])
+
+
+@kernel
+def add_moved_shape(
+    model: Model, data: Data, h: float, j: int, side: int, moved: Moved, floor: float, w: float, col: int
+) -> None:
+    """The shape of a (side 0) or b (1) of pair j moves, the floor of an impact rises by `floor`.
+
+    gap n.e, of a relative to b       frame and point as in _moved_frame, slip as in pair_jacobian
     """
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
+    e = moved[0]
     z = e if side == 0 else (-e[0], -e[1], -e[2])
-    Omega, M, F = data.pair_turn[j], data.pair_shift[j], data.pair_frame[j]
-    turn = (dot(row(Omega, 0), z), dot(row(Omega, 6), z), dot(row(Omega, 12), z))
-    dp = (dot(row(M, 0), z), dot(row(M, 6), z), dot(row(M, 12), z))
-    if side == 1:
-        dp = (dp[0] + e[0], dp[1] + e[1], dp[2] + e[2])
+    F = data.pair_frame[j]
+    turn, dp = _moved_frame(model, data, j, side, *moved)
     u = _relative_velocity(data, h, a, b, row(F, 9))
     v = turning(data, h, a, dp)
     if b >= 0:
@@ -122,5 +157,5 @@ def add_shapes_shift(model: Model, data: Data, h: float, first: int, k: int, w: 
             if is_taut(model, data, j):
                 add_moved_end(model, data, j, side, e2, e3, floor, w, col)
             else:
-                add_moved_shape(model, data, h, j, side, e3, floor, w, col)
+                add_moved_shape(model, data, h, j, side, (e3, NOWHERE, NOWHERE), floor, w, col)
         j += 1

@@ -3,24 +3,25 @@
 Distance, normal and point depend on a shape by the surface that is touched, and near it by the corner, edge, face or
 ball that is there. When a size grows by ds, that element moves by e ds, as if the whole shape did: a corner of a box
 away from the middle, an edge with it (along itself it may move as it likes), the surface of a ball along its normal. So
-a size costs as much as a shift, with an e of its own for every point, and no pair of shapes needs more derivatives.
+a size costs as much as a shift, with an e of its own for every point, and no pair of shapes needs more derivatives. The
+surface of an ellipsoid also turns where it is touched: to first order that is all that a change of shape does there.
 """
 
 from __future__ import annotations
 
-from sim.contact.collision.witness import dot
+from sim.contact.collision.witness import NOWHERE, dot
 from sim.contact.pairs.pair_contact import gap_normal
 from sim.contact.pairs.pair_pose import place_shape
 from sim.contact.pairs.string import is_taut
-from sim.derivatives.parameters.directions import SIDE, Size
+from sim.derivatives.parameters.directions import SIDE
 from sim.derivatives.parameters.pair_columns import add_moved_shape, is_felt, pair_floor, row
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.model.columns import Bounce, Witness
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.model.shape_kinds import SWAPPED, Pair
+from sim.model.shape_kinds import SWAPPED, Pair, Size
 from solvers.compiler import kernel
-from solvers.rotation import Vec3
+from solvers.rotation import Vec3, cross
 from solvers.types import Vector
 
 
@@ -29,7 +30,10 @@ def shape_sizes(model: Model, j: int, side: int) -> tuple[float, float]:
     """(radius, half length) of the shape of a (side 0) or b, of a capsule or cylinder."""
     kind = model.pair_kind[j]
     o = 4 * side if kind < SWAPPED else 4 * (1 - side)
-    if kind % SWAPPED == Pair.POLYTOPE_POLYTOPE or (kind % SWAPPED == Pair.POLYTOPE_CYLINDER and o == 0):
+    kind %= SWAPPED
+    if kind == Pair.POLYTOPE_POLYTOPE or (
+        o == 0 and (kind == Pair.POLYTOPE_CYLINDER or kind == Pair.POLYTOPE_ELLIPSOID)
+    ):
         return model.pair_sizes[j, o + 1], 0.0
     return model.pair_sizes[j, o], model.pair_sizes[j, o + 1]
 
@@ -67,11 +71,38 @@ def element_shift(
     x = (p[0] + out * r * n[0] - o[0], p[1] + out * r * n[1] - o[1], p[2] + out * r * n[2] - o[2])
     if way == Size.SCALE:
         return x
+    if way >= Size.SEMI_X:
+        axis, d = semi_axis(model, data, j, which)
+        k = dot(axis, x) / d
+        return k * axis[0], k * axis[1], k * axis[2]
     axis, end = axis_and_side(data, s, way - Size.SIDE_X.value if Size.SIDE_X <= way <= Size.SIDE_Z else 2, x)
     if way == Size.RIM:
         z = end * half
         return (x[0] - z * axis[0]) / radius, (x[1] - z * axis[1]) / radius, (x[2] - z * axis[2]) / radius
     return end * axis[0], end * axis[1], end * axis[2]
+
+
+@kernel
+def semi_axis(model: Model, data: Data, j: int, which: int) -> tuple[Vec3, float]:
+    """Direction, world axes, and length of the semi-axis of an ellipsoid that is the size `which`."""
+    side, k = which // SIDE, which % SIDE - Size.SEMI_X.value
+    R = data.shape_rot[2 * (j - model.pair_feature[j]) + side]
+    o = 4 * side if model.pair_kind[j] < SWAPPED else 4 * (1 - side)
+    return (R[k], R[3 + k], R[6 + k]), model.pair_sizes[j, o + k]
+
+
+@kernel
+def element_turn(model: Model, data: Data, j: int, which: int, n: Vec3) -> Vec3:
+    """By how much the surface of a shape turns where it is touched, world axes: dn = turn x n.
+
+    Points of an ellipsoid move by E x, E = u u^T/d along a semi-axis of length d; its normals by -(I - n n^T) E n, as
+    if it turned by E n x n.
+    """
+    if which % SIDE < Size.SEMI_X:
+        return NOWHERE
+    u, d = semi_axis(model, data, j, which)
+    k = dot(u, n) / d
+    return cross(k * u[0], k * u[1], k * u[2], n[0], n[1], n[2])
 
 
 @kernel
@@ -89,7 +120,7 @@ def add_shapes_size(model: Model, data: Data, h: float, first: int, which: int, 
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         if is_felt(model, data, j):
-            c = model.contact_height.shape[0] + j
+            c, o = model.contact_height.shape[0] + j, data.origin
             b = data.bounce[c]
             floor = 0.0
             if b[Bounce.RESTITUTION] > 0.0:
@@ -100,5 +131,9 @@ def add_shapes_size(model: Model, data: Data, h: float, first: int, which: int, 
             if is_taut(model, data, j):  # where it pulls along stays
                 add_moved_end(model, data, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
             else:
-                add_moved_shape(model, data, h, j, which // SIDE, e, floor, w, col)
+                n, r = gap_normal(model, data, j), 0.5 * data.pair_out[j, Witness.GAP]
+                r = r if which < SIDE else -r  # from the middle to the surface
+                x = (p[0] + r * n[0] - o[0], p[1] + r * n[1] - o[1], p[2] + r * n[2] - o[2])
+                moved = (e, element_turn(model, data, j, which, n), x)
+                add_moved_shape(model, data, h, j, which // SIDE, moved, floor, w, col)
         j += 1

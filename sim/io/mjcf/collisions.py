@@ -3,7 +3,7 @@
 Two geoms meet where MuJoCo lets them: contype and conaffinity fit, they move relative to one another, neither body is
 the parent of the other (but the world), the file does not <exclude> their bodies; or a <pair> names them. Friction is
 the larger of both, or that of the geom with priority, or of the <pair>; condim 1 is without. Planes are left to
-sim/io/mjcf/contacts.py.
+sim/io/mjcf/contacts.py, but for geoms that have no balls or points to stand on: those collide with a half-space.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import Any
 
-from sim.io.mjcf.contacts import KINDS, PLANE, meet, mixed
-from sim.io.mjcf.groups import GeomGroup, Where, name_of, solid_of
+from sim.io.mjcf.contacts import STANDING, fixed_planes, label_on, meet, mixed, plane_pose
+from sim.io.mjcf.groups import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid_of
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD
-from sim.mechanism.shapes import Shape
+from sim.mechanism.shapes import HalfSpace, Shape
 
 Settings = tuple[float | None, str, int]
 
@@ -31,13 +31,33 @@ def find_collisions(model: Any, where: Where, settings: Settings, notes: Notes) 
         first, second = (_solid(model, where, g) for g in (a, b))
         for g, name, solid in zip((a, b), names, (first, second), strict=True):
             if solid is None:
-                notes.add(f"no collisions of geoms of kind {KINDS[int(model.geom_type[g])]}", [name], warn=True)
+                notes.add(f"no collisions of geoms of kind {NO_SHAPE[int(model.geom_type[g])]}", [name], warn=True)
         if first is None or second is None:
             continue
         one, other = (group.name if group else WORLD for group in (_owner(model, where, a), _owner(model, where, b)))
         mu = friction if chosen is None else chosen
         name = f"{names[0]}-{names[1]}"
         out.append(Collision(one, other, first, second, mu, "impact" if slippery else law, name))
+    return out
+
+
+def find_on_planes(model: Any, where: Where, settings: Settings) -> list[Collision]:
+    """The collisions of geoms without balls and points with all planes that they touch."""
+    chosen, law, _ = settings
+    planes = fixed_planes(model, where)
+    out = []
+    for g in range(model.ngeom):
+        group, solid = _owner(model, where, g), _solid(model, where, g)
+        if group is None or solid is None or int(model.geom_type[g]) in STANDING:
+            continue
+        touched = [p for p in planes if meet(model, g, p)]
+        for p in touched:
+            plane = plane_pose(model, p)
+            friction, slippery = mixed(model, g, p)
+            ground = HalfSpace(center=plane.point, orientation=plane.quaternion)
+            mu = friction if chosen is None else chosen
+            name = label_on(model, g, p, touched)
+            out.append(Collision(group.name, None, solid, ground, mu, "impact" if slippery else law, name))
     return out
 
 

@@ -4,6 +4,7 @@
     capsule     two balls
     box         its eight corners
     cylinder    points on both rims
+    ellipsoid   none: the point that touches moves over it; a collision with a half-space (collisions.py)
 
 A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it. Friction
 is the larger of both, or that of the geom with priority; condim 1 is without.
@@ -17,15 +18,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.mjcf.groups import BOX, CAPSULE, CYLINDER, SPHERE, GeomGroup, Where, name_of, pose_of
+from sim.io.mjcf.groups import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    NO_SHAPE,
+    PLANE,
+    SPHERE,
+    GeomGroup,
+    Where,
+    name_of,
+    pose_of,
+)
 from sim.io.urdf.report import Notes
 from sim.mechanism.parts import Contact
 from sim.mechanism.pose import Pose
 
 Floats = NDArray[np.float64]
-PLANE = 0  # mjtGeom
+STANDING = (SPHERE, CAPSULE, BOX, CYLINDER)  # on balls and points
 _UNLESS = "are no obstacles (collisions=True makes them)"
-KINDS = {1: "height field", 4: "ellipsoid", 7: "mesh", 8: "signed distance field"}
 
 
 def find_contacts(
@@ -35,7 +46,7 @@ def find_contacts(
 
     collisions: whether the other fixed geoms are obstacles, by sim/io/mjcf/collisions.py.
     """
-    planes = [g for g in range(model.ngeom) if _owner(model, where, g) is None and model.geom_type[g] == PLANE]
+    planes = fixed_planes(model, where)
     out: list[Contact] = []
     for g in range(model.ngeom):
         group, frame = where[int(model.geom_bodyid[g])]
@@ -48,17 +59,38 @@ def find_contacts(
         if not touched:
             continue
         kind = int(model.geom_type[g])
-        if kind in KINDS:
-            notes.add(f"no contact from geoms of kind {KINDS[kind]}", [name_of(model, "geom", g)], warn=True)
+        if kind in NO_SHAPE:
+            notes.add(f"no contact from geoms of kind {NO_SHAPE[kind]}", [name_of(model, "geom", g)], warn=True)
+        if kind not in STANDING:
             continue
         balls = _balls(model, g, frame, settings[2])
         for p in touched:
-            label = name_of(model, "geom", g) + (f"@{name_of(model, 'geom', p)}" if len(touched) > 1 else "")
+            label = label_on(model, g, p, touched)
             names = [label if len(balls) == 1 else f"{label}_{k}" for k in range(len(balls))]
             out += [
                 _contact(model, (g, p), group, ball, name, settings) for ball, name in zip(balls, names, strict=True)
             ]
     return out
+
+
+def fixed_planes(model: Any, where: Where) -> list[int]:
+    """The planes that are fixed to the world."""
+    return [g for g in range(model.ngeom) if _owner(model, where, g) is None and model.geom_type[g] == PLANE]
+
+
+def label_on(model: Any, g: int, p: int, touched: list[int]) -> str:
+    """Name of the contact of a geom with a plane: that of the geom, and of the plane where it touches others."""
+    return name_of(model, "geom", g) + (f"@{name_of(model, 'geom', p)}" if len(touched) > 1 else "")
+
+
+def plane_pose(model: Any, p: int) -> Pose:
+    """Where a plane is, which may be on a body that is welded to the world."""
+    plane = pose_of(model.geom_pos[p], model.geom_quat[p])
+    body = int(model.geom_bodyid[p])
+    while body:
+        plane = pose_of(model.body_pos[body], model.body_quat[body]).then(plane)
+        body = int(model.body_parentid[body])
+    return plane
 
 
 def _owner(model: Any, where: Where, g: int) -> GeomGroup | None:
@@ -85,12 +117,7 @@ def _contact(
     """One ball of a geom against a plane."""
     g, p = pair
     chosen, law, _ = settings
-    plane = pose_of(model.geom_pos[p], model.geom_quat[p])
-    if model.geom_bodyid[p]:  # on a body that is welded to the world
-        body = int(model.geom_bodyid[p])
-        while body:
-            plane = pose_of(model.body_pos[body], model.body_quat[body]).then(plane)
-            body = int(model.body_parentid[body])
+    plane = plane_pose(model, p)
     normal = plane.rotation[:, 2]
     friction, slippery = mixed(model, g, p)
     return Contact(

@@ -12,11 +12,12 @@ from sim.io.urdf.drawing import Named, largest
 from sim.io.urdf.inertia import RigidInertia, combined
 from sim.io.urdf.report import Notes
 from sim.mechanism.pose import HERE, Pose
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
 
-SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
+PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # mjtGeom
+NO_SHAPE = {1: "height field", 7: "mesh", 8: "signed distance field"}
 
 
 @dataclass
@@ -95,7 +96,7 @@ def drawn(model: Any, group: GeomGroup, notes: Notes) -> Shape | None:
 
 
 def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | None:
-    """A geom as a shape in its body, from the centre of mass com; None for a mesh, a plane or an ellipsoid."""
+    """A geom as a shape in its body, from the centre of mass com; None for a mesh or a plane."""
     at = frame.then(pose_of(model.geom_pos[g], model.geom_quat[g]))
     r, s, t = (float(x) for x in model.geom_size[g])
     center, turn = at.point - com, at.quaternion
@@ -108,4 +109,6 @@ def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | No
         return Cylinder(r, 2.0 * s, center=center, orientation=turn)
     if kind == BOX:
         return Box(2.0 * r, 2.0 * s, 2.0 * t, center=center, orientation=turn)
+    if kind == ELLIPSOID:
+        return Ellipsoid(r, s, t, center=center, orientation=turn)
     return None

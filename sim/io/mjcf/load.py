@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sim.io.mjcf.collisions import find_collisions
+from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.drives import find_inputs, left_out
 from sim.io.mjcf.equalities import find_gears, find_loops
@@ -22,7 +22,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Body, Joint
 from sim.mechanism.pose import Pose
-from sim.mechanism.stance import gaps, lifted
+from sim.mechanism.stance import gaps, lifted, plane_heights
 
 
 def load_mjcf(
@@ -50,7 +50,7 @@ def load_mjcf(
             their range in its middle, and a floating base high enough that nothing penetrates
         rim_points: points per rim of a cylinder
         collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
-            them: its spheres, capsules, boxes and cylinders (sim/io/mjcf/collisions.py)
+            them: its spheres, capsules, boxes, cylinders and ellipsoids (sim/io/mjcf/collisions.py)
         gravity: [m/s^2]; None: that of the file
 
     Returns:
@@ -79,7 +79,10 @@ def load_mjcf(
         gravity=model.opt.gravity if gravity is None else gravity,
         name=Path(file).stem,
         neutral=_neutral(model, keyframe, notes),
-        collisions=find_collisions(model, where, touching, notes) if collisions else (),
+        collisions=[
+            *(find_on_planes(model, where, touching) if ground else []),
+            *(find_collisions(model, where, touching, notes) if collisions else []),
+        ],
         gears=find_gears(model, homes, notes),
     )
     mech = _without_constant_gaps(mech, notes)
@@ -185,7 +188,10 @@ def _without_constant_gaps(mech: MjcfMechanism, notes: Notes) -> MjcfMechanism:
 def _clear(mech: MjcfMechanism) -> MjcfMechanism:
     """The mechanism with its floating base, if it has one, lifted out of the ground."""
     bases = [j.name for j in mech.joints if j.kind == "floating"]
-    if len(bases) != 1 or not mech.contacts or gaps(mech, np.asarray(mech.neutral)).min() >= 0.0:
+    if len(bases) != 1:
+        return mech
+    q = np.asarray(mech.neutral)
+    if min([0.0, *gaps(mech, q), *(gap for gap, _ in plane_heights(mech, q))]) >= 0.0:
         return mech
     return replace(mech, neutral=lifted(mech, bases[0]))
 

@@ -49,7 +49,7 @@ class MjcfMechanism(Mechanism):
 
     The coordinates q and velocities v are MuJoCo's qpos and qvel. Represented: bodies (welded ones as one), free, ball,
     slide and hinge joints with damping, armature (an inertia of its coordinate alone: exact; not on balls), springs and
-    ranges (not on balls); spheres, capsules, boxes, cylinders against planes that do not move, and with
+    ranges (not on balls); spheres, capsules, boxes, cylinders, ellipsoids against planes that do not move, and with
     `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, u =
     report.gear * ctrl, and on sites as wrenches that move with the body; connect and weld as joints that close loops,
     and linear couplings of two joints as gears, all of them rigid (equalities.py). Not represented, and listed

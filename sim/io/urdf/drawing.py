@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ def largest(found: Sequence[Named], notes: Notes | None = None) -> Shape | None:
     """The shape with the largest volume; the others are left out, with a note that names them."""
     if not found:
         return None
-    kept = max((shape for _, shape in found), key=_volume)
+    kept = max((shape for _, shape in found), key=lambda shape: shape.volume())
     others = [f"{name} ({type(shape).__name__.lower()})" for name, shape in found if shape != kept]
     if notes is not None and others:
         notes.add(
@@ -56,13 +55,3 @@ def _solid(shape: Geometry, pose: Pose, com: Floats) -> Shape | None:
         return Box(*shape.sizes, center=center, orientation=turn)
     kind = Cylinder if shape.kind == "cylinder" else Capsule
     return kind(*shape.sizes, center=center, orientation=turn)
-
-
-def _volume(shape: Shape) -> float:
-    """[m^3]."""
-    if isinstance(shape, Box):
-        return shape.x * shape.y * shape.z
-    ball = 4.0 / 3.0 * pi * shape.radius**3
-    if isinstance(shape, Sphere):
-        return ball
-    return pi * shape.radius**2 * shape.length + (ball if isinstance(shape, Capsule) else 0.0)
