@@ -16,12 +16,12 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 from command import deliver, number, parser, progress
 from numpy.typing import NDArray
+from urdf_zoo import package_files
 
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
@@ -93,15 +93,10 @@ def dropped(file: Path, time_step: float, seconds: float) -> Motion:
 
 
 def _files() -> list[tuple[str, Callable[[], Motion]]]:
+    """Robots from files that ended early before."""
     found: list[tuple[str, Callable[[], Motion]]] = []
-    for package, pattern in (
-        ("pybullet_data", "laikago/laikago_toes.urdf"),
-        ("example_robot_data", "**/g1*hand*.urdf"),
-    ):
-        spec = find_spec(package)
-        roots = [] if spec is None or spec.origin is None else [Path(spec.origin).parent]
-        roots += [Path(sys.prefix) / "share/example-robot-data"] if package == "example_robot_data" else []
-        for file in sorted({f for root in roots for f in root.glob(pattern)})[:1]:
+    for file in package_files():
+        if file.name in ("laikago_toes.urdf", "g1_29dof_with_hand_rev_1_0.urdf"):
             for h in (0.005, 0.01):
                 found.append((f"{file.stem} falls, {1e3 * h:g} ms", lambda f=file, h=h: dropped(f, h, 2.0)))
     return found
@@ -125,7 +120,7 @@ def motions() -> list[tuple[str, Callable[[], Motion]]]:
 
 def clocked(sim: dojo.Simulator, x: Vector, us: Vector) -> tuple[dojo.Trajectory, float]:
     """(motion, processor time of a step [us])."""
-    sim.rollout(x, us[:2])
+    sim.rollout(x, us)  # compiles what it divides with
     begin = time.process_time()
     motion = sim.rollout(x, us)
     return motion, 1e6 * (time.process_time() - begin) / max(motion.knot, 1)
