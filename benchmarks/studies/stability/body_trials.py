@@ -17,7 +17,7 @@ def spin(inertia: Three, omega: Three, time_step: float, *, refusal: str = "") -
     return StabilityTrial(
         "spin",
         f"inertia {moments}, {max(omega):g} rad/s for 1 s at {1e3 * time_step:g} ms",
-        f"refused: {refusal}" if refusal else "angular momentum within 1e-10 of its size",
+        f"refused as a whole: {refusal}" if refusal else "angular momentum within 1e-10 of its size",
         mechanism,
         (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
         (0.0, 0.0, 0.0, *omega),
@@ -39,6 +39,8 @@ def trials() -> list[StabilityTrial]:
         spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-3),
         spin((0.1, 0.2, 0.3), (600.0, 500.0, 400.0), 1e-3),
         spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-2, refusal="half a turn"),
+        spin((0.1, 0.2, 0.3), (2.0, 1000.0, 2.0), 1e-2),
+        spin((0.1, 0.2, 0.3), (2.0, 3000.0, 2.0), 1e-2),
         spin((1e-6, 1.0, 1.0), (1000.0, 2.0, 2.0), 1e-3),
         spin((1e-6, 1.0, 1.0), (2.0, 1000.0, 2.0), 1e-3),
         spin((1.0, 1.0, 1e-6), (600.0, 500.0, 400.0), 1e-3),

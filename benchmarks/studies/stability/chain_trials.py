@@ -69,7 +69,7 @@ def heavy_tip(ratio: float, time_step: float, *, angle: float, refusal: str = ""
     return StabilityTrial(
         "mass ratio",
         f"tip {ratio:g} times heavier, from {np.rad2deg(angle):.0f} degrees, 5 s at {1e3 * time_step:g} ms",
-        "refused: a step does not reach its tolerance" if refusal else "energy off by at most 1 % of m g L",
+        "refused as a whole: a step does not reach its tolerance" if refusal else "energy off by at most 1 % of m g L",
         mechanism,
         np.r_[-angle, np.zeros(9)],
         np.zeros(10),

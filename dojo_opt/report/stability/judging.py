@@ -50,7 +50,7 @@ def _measure(
     trial: StabilityTrial, peers: Sequence[PhysicsEngine], verdicts: dict[str, list[TrialVerdict]]
 ) -> dict[str, Any]:
     """One trial by every engine; verdicts are appended, numbers returned."""
-    ours = Ours(kappa=trial.kappa or KAPPA, tolerance=trial.tolerance, rounds=1)
+    ours = Ours(kappa=trial.kappa or KAPPA, tolerance=trial.tolerance, divide=not trial.refusal, rounds=1)
     numbers: dict[str, Any] = {"group": trial.group, "name": trial.name, "rule": trial.rule, "bar": trial.bar}
     for engine in [ours, *peers]:
         own = engine is ours
