@@ -16,7 +16,7 @@ Rng = np.random.Generator
 KINDS = (
     "fixed", "prismatic", "planar", "fixed_orientation", "revolute", "cylindrical", "planar_axis", "free_revolute",
     "orbital", "prismatic_orbital", "planar_orbital", "free_orbital", "spherical", "cylindrical_free", "planar_free",
-    "floating",
+    "floating", "screw",
 )  # fmt: skip
 COMMON = ("revolute", "revolute", "revolute", "spherical", "prismatic")
 SIZE = 0.3  # [m] of a body
@@ -51,7 +51,7 @@ def cloud_inertia(rng: Rng, mass: float) -> Vector:
 def random_shape(rng: Rng) -> Any:
     """Any shape that collides."""
     r = SIZE * rng.uniform(0.1, 0.4)
-    kind = rng.integers(5)
+    kind = rng.integers(6)
     if kind == 0:
         return dojo.Sphere(r)
     if kind == 1:
@@ -60,6 +60,8 @@ def random_shape(rng: Rng) -> Any:
         return dojo.Box(*(SIZE * rng.uniform(0.2, 1.0, size=3)))
     if kind == 3:
         return dojo.Cylinder(r, SIZE * rng.uniform(0.2, 1.0))
+    if kind == 4:
+        return dojo.Ellipsoid(*(SIZE * rng.uniform(0.1, 0.5, size=3)))
     return dojo.Polytope.about_centroid(rng.normal(size=(rng.integers(5, 9), 3)) * SIZE * 0.3)
 
 
@@ -76,6 +78,8 @@ def random_joint(rng: Rng, i: int, recipe: Recipe) -> dojo.Joint:
             more["spring"] = 10.0 ** rng.uniform(-1.0, 4.0)
         if kind in ("revolute", "prismatic") and rng.random() < 0.4:
             more["limits"] = (-(10.0 ** rng.uniform(-2.0, 0.2)), 10.0 ** rng.uniform(-2.0, 0.2))
+    if kind == "screw":  # a displacement per turn of up to the size of a body, either way
+        more["pitch"] = float(rng.choice([-1.0, 1.0]) * SIZE * 10.0 ** rng.uniform(-1.5, 0.0))
     points = {"parent_point": rng.normal(size=3) * SIZE / 2, "child_point": rng.normal(size=3) * SIZE / 2}
     return dojo.Joint(kind, f"b{rng.integers(i)}", f"b{i}", f"j{i}", axis=unit(rng), **points, **more)
 

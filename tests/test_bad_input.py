@@ -71,6 +71,7 @@ PARTS = {
     "ball without volume": (lambda: dojo.Sphere(0.0), "Sphere(radius", "0"),
     "box without volume": (lambda: dojo.Box(1.0, 1.0, 0.0), "Box(z", "0"),
     "capsule of negative length": (lambda: dojo.Capsule(0.1, -1.0), "Capsule(length", "-1"),
+    "ellipsoid without volume": (lambda: dojo.Ellipsoid(0.1, 0.0, 0.2), "Ellipsoid(y", "0"),
     "cylinder without volume": (lambda: dojo.Cylinder(0.0, 1.0), "Cylinder(radius", "0"),
     "flat polytope": (lambda: dojo.Polytope([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]), "Polytope", "no volume"),
     "polytope of three": (lambda: dojo.Polytope(np.eye(3)), "Polytope", "at least 4", "3"),

@@ -13,9 +13,9 @@ from sim.mechanism.shapes import Solid
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Polytope, HalfSpace; by default that of the body. With String on
-                       both sides the bodies are tied together instead: their points keep within its length, and
-                       there is no friction; taut, it moves as a rod does (string.py), and jerked taut it
+    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope, HalfSpace; by default that of the body.
+                       With String on both sides the bodies are tied together instead: their points keep within its
+                       length, and there is no friction; taut, it moves as a rod does (string.py), and jerked taut it
                        takes the energy of the jerk. A HalfSpace on a body moves with it.
     b                  the world by default; shape_b is then placed in world axes: an obstacle, a step, a slope
     friction, law, restitution     as in Contact

@@ -58,8 +58,7 @@ class Body:
         if self.mass != 0 or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         if self.shape is not None and not isinstance(self.shape, Solid):
-            known = "Sphere, Box, Cylinder, Capsule or Polytope"
-            raise ValueError(f"{call}, shape=...): expected {known}, got {self.shape!r}")
+            raise ValueError(f"{call}, shape=...): expected a shape, as Sphere(0.1), got {self.shape!r}")
         object.__setattr__(self, "inertia", inertia_of(call, self))
 
 

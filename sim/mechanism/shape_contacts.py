@@ -17,11 +17,11 @@ from sim.mechanism.shapes import rotation_matrix
 
 
 def shape_contacts(call: str, body: Body, **options: Any) -> list[Contact]:
-    """Contacts of the shape of a body; options: of Contact.   ValueError: it has none, or a cylinder."""
+    """Contacts of the shape of a body; options: of Contact.   ValueError: it has none, a cylinder or an ellipsoid."""
     shape = body.shape
     stance = None if shape is None else shape.stance()
     if shape is None or stance is None:
-        found = "has no shape" if shape is None else f"is a {type(shape).__name__}"
+        found = "has no shape" if shape is None else f"has the shape {type(shape).__name__}"
         raise ValueError(f"{call}: body {body.name!r} {found}; expected a Sphere, Capsule, Box or Polytope")
     part, points, radius = stance
     places = points @ rotation_matrix(shape.orientation).T + np.asarray(shape.center)

@@ -11,6 +11,7 @@ import dojo_opt as dojo
 from dojo_opt.viewer import animation
 from dojo_opt.viewer.motion import motion
 from dojo_opt.viewer.page import page as page_of
+from sim.mechanism.shapes import rotation_matrix
 
 # a browser process that is closed leaves sockets to the garbage collector
 pytestmark = [
@@ -127,6 +128,23 @@ def test_obstacles_are_drawn():
     commands = animation._scene(motion(sim.rollout(x, np.zeros((3, 0)))))
     drawn = [command.path.lower() for command in commands if "obstacles" in command.path.lower()]
     assert sum("floor" in path for path in drawn) == 2 and sum("wall" in path for path in drawn) == 2
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # MeshCat loads its server, and that an old part of zmq
+def test_an_ellipsoid_is_a_ball_with_three_radii():
+    stone = dojo.Body("stone", 1.0, shape=dojo.Ellipsoid(0.3, 0.2, 0.1, orientation=(0.6, 0.8, 0.0, 0.0)))
+    mech = dojo.Mechanism([stone], [dojo.Joint("floating", None, "stone")])
+    sim = dojo.Simulator(mech, time_step=0.01)
+    drawn = [c.lower() for c in animation._scene(motion(sim.rollout(sim.neutral(), np.zeros((1, 0)))))]
+    (ball,) = [c for c in drawn if "object" in c]
+    assert ball["object"]["geometries"][0]["type"] == "SphereGeometry"
+    radius = ball["object"]["geometries"][0]["radius"]
+    scale = np.reshape(ball["object"]["object"]["matrix"], (4, 4))
+    np.testing.assert_allclose(radius * np.diag(scale)[:3], [0.3, 0.2, 0.1])
+    outline = dojo.plots.thumbnail(mech).axes[0].patches[0].get_xy()
+    right = np.array([np.cos(np.radians(30.0)), np.sin(np.radians(30.0)), 0.0])  # of the picture
+    width = 2.0 * stone.shape.support(rotation_matrix(stone.shape.orientation).T @ right)
+    assert np.ptp(outline, axis=0)[0] == pytest.approx(width, rel=0.03)
 
 
 HOSTILE = "</title></script><script>hit('{}')</script><img src=x onerror=\"hit('{}')\">'\"&{{viewer}}$\\frac/{}"

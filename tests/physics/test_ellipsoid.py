@@ -111,3 +111,15 @@ def test_it_comes_to_rest_on_its_shortest_axis(seed: int) -> None:
     assert np.abs(run.x[-1, 7:]).max() < 1e-3
     normal = np.linalg.norm(run.contacts.impulse[-1, 0]) / 0.02
     assert normal == pytest.approx(MASS * G, rel=1e-3)
+
+
+def test_on_terrain_it_is_refused_and_a_plane_is_not() -> None:
+    mech = scene(0.01).mechanism
+    hills = dojo.Terrain(np.zeros((4, 4)))
+    with pytest.raises(
+        ValueError, match="body 'e' has the shape Ellipsoid; expected a Sphere, Capsule, Box or Polytope"
+    ):
+        mech.on(hills, bodies=["e"])
+    tied = dojo.Mechanism(mech.bodies, mech.joints, collisions=[dojo.Collision("e", shape_b=dojo.String(1.0))])
+    with pytest.raises(ValueError, match="there is no collision of Ellipsoid and String"):
+        dojo.Simulator(tied, time_step=0.01)

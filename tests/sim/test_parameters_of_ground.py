@@ -181,7 +181,9 @@ def test_a_shape_tumbles_on_hills(name: str, rng: np.random.Generator) -> None:
 
 def test_bodies_that_cannot_stand_are_refused() -> None:
     mech = alone(dojo.Cylinder(0.1, 0.2))
-    with pytest.raises(ValueError, match=r"body 'it' is a Cylinder; expected a Sphere, Capsule, Box or Polytope"):
+    with pytest.raises(
+        ValueError, match=r"body 'it' has the shape Cylinder; expected a Sphere, Capsule, Box or Polytope"
+    ):
         mech.on(WAVES, bodies=["it"])
     with pytest.raises(ValueError, match=r"Mechanism.on\(bodies=...\): 'leg' is not one of: it"):
         mech.on(WAVES, bodies=["leg"])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Shape, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere, rotation_matrix
 
 
 def inside(shape: Shape, p: np.ndarray) -> np.ndarray:
@@ -19,12 +19,22 @@ def inside(shape: Shape, p: np.ndarray) -> np.ndarray:
         return (abs(x) < shape.x / 2) & (abs(y) < shape.y / 2) & (abs(z) < shape.z / 2)
     if isinstance(shape, Cylinder):
         return (x**2 + y**2 < shape.radius**2) & (abs(z) < shape.length / 2)
+    if isinstance(shape, Ellipsoid):
+        return (x / shape.x) ** 2 + (y / shape.y) ** 2 + (z / shape.z) ** 2 < 1.0
     beyond = np.maximum(abs(z) - shape.length / 2, 0.0)
     return x**2 + y**2 + beyond**2 < shape.radius**2
 
 
 @pytest.mark.parametrize(
-    "shape", [Sphere(0.3), Box(0.2, 0.4, 0.6), Cylinder(0.2, 0.5), Capsule(0.2, 0.3), Capsule(0.3, 0.01)]
+    "shape",
+    [
+        Sphere(0.3),
+        Box(0.2, 0.4, 0.6),
+        Cylinder(0.2, 0.5),
+        Capsule(0.2, 0.3),
+        Capsule(0.3, 0.01),
+        Ellipsoid(0.4, 0.3, 0.2),
+    ],
 )
 def test_inertia_is_the_integral(shape: Shape) -> None:
     axis = np.linspace(-0.5, 0.5, 101)[:-1] + 0.005
@@ -69,3 +79,19 @@ def test_a_tetrahedron_about_its_centroid() -> None:
     expected = 2.0 * diagonal * np.eye(3) - across * (np.ones((3, 3)) - np.eye(3))
     np.testing.assert_allclose(solid.inertia(1.0), expected, atol=1e-14)
     np.testing.assert_allclose(np.sort(np.linalg.eigvalsh(expected)), solid.principal(1.0), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.3), Box(0.2, 0.4, 0.6), Cylinder(0.2, 0.5), Capsule(0.2, 0.3), Ellipsoid(0.4, 0.3, 0.2)]
+)
+def test_outline_support_volume_and_radius_are_of_one_solid(shape: Shape, rng: np.random.Generator) -> None:
+    axis = np.linspace(-0.5, 0.5, 101)[:-1] + 0.005
+    p = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    p = p[inside(shape, p)]
+    assert len(p) * 1e-6 == pytest.approx(shape.volume(), rel=0.02)
+    assert shape.bounding_radius() == pytest.approx(np.linalg.norm(p, axis=1).max(), abs=0.02)
+    for n in rng.normal(size=(20, 3)):
+        n /= np.linalg.norm(n)
+        assert shape.support(n) == pytest.approx((p @ n).max(), abs=0.02)
+        low, high = (shape.outline() @ n).max(), shape.support(n)
+        assert high - 0.05 * shape.bounding_radius() < low <= high + 1e-12

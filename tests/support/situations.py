@@ -13,7 +13,7 @@ from sim.dynamics.bodies import rotated
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import KINDS as JOINTS
 from sim.mechanism.parts import Body, Contact, Input, Joint
-from sim.mechanism.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere, String
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Sphere, String
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator
 from support.case import Case, turned
@@ -161,5 +161,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "colliding, capsules": lambda: touching(Capsule(0.1, 0.4), Capsule(0.15, 0.3), -0.01),
     "colliding, polytopes": lambda: touching(STONE, STONE, -0.01),
     "rolling": lambda: touching(Cylinder(0.2, 0.1), HalfSpace(), -0.01),
+    "rolling, ellipsoid": lambda: touching(Ellipsoid(0.3, 0.2, 0.15), HalfSpace(), -0.01),
+    "colliding, ellipsoid and box": lambda: touching(Box(0.3, 0.3, 0.4), Ellipsoid(0.3, 0.2, 0.15), -0.01),
     "tied": lambda: touching(String(0.5), String(0.5), -0.01),
 }
