@@ -157,7 +157,8 @@ class DividingEngine(Engine):
                     knot, whole = knot + done, done == len(rest.us)
                     piece = min(2 * piece, _LARGEST_PIECE) if whole else _PIECE
         except KeyboardInterrupt as stop:
-            raise Interrupted(knot + (stop.result if isinstance(stop, Interrupted) else 0)) from None
+            done = stop.result if isinstance(stop, Interrupted) else 0
+            raise Interrupted(knot + (done if isinstance(done, int) else 0)) from None  # not half a divided step
         return knot
 
     def _divide_row(self, motion: MotionBuffers, knot: int, kappa: float | None, division: Division) -> bool:

@@ -242,3 +242,18 @@ def test_what_division_cannot_solve_keeps_its_reason() -> None:
     assert result.substeps == 1
     with pytest.raises(TypeError, match="divide"):
         dojo.Simulator(models.quadruped(), divide=3)  # type: ignore[arg-type]
+
+
+def test_ctrl_c_inside_a_division_keeps_the_steps_before(
+    whip: tuple[dojo.Simulator, Floats], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sim, x = whip
+
+    def stop(*_: object, **__: object) -> None:
+        raise dojo.Interrupted(None)
+
+    monkeypatch.setattr(engine(sim), "in_parts", stop)
+    with pytest.raises(dojo.Interrupted) as stopped:
+        sim.rollout(x, steps=20)
+    assert stopped.value.result.knot == 1
+    assert stopped.value.result.status == dojo.Status.INTERRUPTED
