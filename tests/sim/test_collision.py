@@ -138,6 +138,7 @@ MUJOCO = {
     Shape.CAPSULE: ("capsule", 2),
     Shape.BOX: ("box", 3),
     Shape.CYLINDER: ("cylinder", 2),
+    Shape.ELLIPSOID: ("ellipsoid", 3),
 }
 
 
