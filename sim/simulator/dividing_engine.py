@@ -35,7 +35,7 @@ __all__ = ["LARGEST_DIVISION", "DividingEngine"]
 
 LARGEST_DIVISION = 1024  # parts of a step
 
-_WHOLE = 0.05  # largest gain or loss of energy in a whole step, of the energies that change
+_WHOLE = 0.1  # largest gain or loss of energy in a whole step, of the energies that change
 _PART = 1e-3  # in a part
 _PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
 
@@ -61,8 +61,14 @@ class DividingEngine(Engine):
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings._replace(gain=_WHOLE, loss=_WHOLE))
         self.intervals = Intervals(self)
-        self._engines: dict[int, Engine] = {}  # of parts, by their number
+        self._engines: dict[int, Engine] = {}  # by the number of parts of a step
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided
+
+    def whole(self) -> Engine:
+        """As Engine.whole."""
+        if 1 not in self._engines:
+            self._engines[1] = Engine(self.model, self.settings._replace(loss=math.inf))
+        return self._engines[1]
 
     def part(self, parts: int) -> Engine:
         """The engine of the parts of a step."""

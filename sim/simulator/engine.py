@@ -274,6 +274,10 @@ class Engine:
         """None: this engine refuses steps that it cannot solve. See dividing_engine.py."""
         return None
 
+    def whole(self) -> Engine:
+        """The engine that refuses steps which it cannot solve as a whole."""
+        return self
+
     def interval(self, x: Vector) -> float:
         """That of the velocity of the state x [s]: the time step, but for engines that divide steps."""
         return self.settings.time_step

@@ -345,10 +345,13 @@ class Simulator(StateSpace):
         return tuple(name for name, far in zip(self.mechanism.contact_names, self._engine.far(), strict=True) if far)
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
-        """Rollouts and derivatives of trajectories of so many knots, for a planner: see horizon.py."""
+        """Rollouts and derivatives of trajectories of so many knots, for a planner: see horizon.py.
+
+        Of whole steps: a planner is better off with a refusal of wild steps than with their parts.
+        """
         call = "Simulator.horizon"
         return Horizon(
-            self._engine,
+            self._engine.whole(),
             self._arguments,
             whole_number(f"{call}(knots=...)", knots),
             whole_number(f"{call}(substeps=...)", substeps),

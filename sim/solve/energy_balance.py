@@ -2,8 +2,8 @@
 
 The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
 and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
-up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy. Simulators that divide
-steps ask for more, a twentieth, and a thousandth in the parts of a step, since a refusal costs them little.
+up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy, or, as a part of a divided
+step, a thousandth.
 
     K23 - K12 - W > 0.1 max(K12, |G|) + |D| + slack
 

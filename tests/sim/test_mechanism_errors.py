@@ -45,7 +45,7 @@ ERRORS: list[tuple[Callable[[], object], str]] = [
     (lambda: Body("x", "heavy", shape=BALL), r"Body\('x', mass=\.\.\.\): expected real numbers, got 'heavy'"),
     (lambda: Body("x", [1.0, 2.0], shape=BALL), r"Body\('x', mass=\.\.\.\): expected one number"),
     (lambda: Body("x"), r"Body\('x'\): give inertia"),
-    (lambda: Body("x", shape="ball"), r"Body\('x', shape=\.\.\.\): expected Sphere, Box"),
+    (lambda: Body("x", shape="ball"), r"Body\('x', shape=\.\.\.\): expected a shape, as Sphere"),
     (
         lambda: Body("x", shape=Box(1, 1, 1, center=(1, 0, 0))),
         r"Body\('x'\): give inertia=\.\.\.; the shape is not centred",
