@@ -2,8 +2,8 @@
 
 The equations of a step have several solutions. One is reached as the step grows from zero; in others, bodies turn far,
 and constraints that do no work along the motion do work along arcs: joints and impulses of contacts wind one another
-up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy, or, as a part of a divided
-step, a thousandth.
+up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy, or a thousandth as a part
+of a divided step.
 
     K23 - K12 - W > 0.1 max(K12, |G|) + |D| + slack
 
