@@ -21,7 +21,7 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.layout import CARRY
 from sim.model.model import Model
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Law
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Law, Rolled
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted
@@ -53,6 +53,14 @@ def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
         motion.A[first:last],
         motion.B[first:last],
     )
+
+
+def _chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
+    """Derivatives by state and held input of the end of a rollout, whose first state has the derivative A."""
+    B = np.zeros((len(A), rolled.B.shape[2]))
+    for dx, du in zip(rolled.A, rolled.B, strict=True):
+        A, B = dx @ A, dx @ B + du
+    return A, B
 
 
 class DividingEngine(Engine):
@@ -132,10 +140,8 @@ class DividingEngine(Engine):
 
     def slopes(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
         """(A, B) of a divided step from x: the product of the derivatives of its parts and of both conversions."""
-        A, back = self.conversions(x, divided)
-        B = np.zeros((self.ndx, self.nu))
-        for dx, du in zip(divided.rolled.A, divided.rolled.B, strict=True):
-            A, B = dx @ A, dx @ B + du
+        ahead, back = self.conversions(x, divided)
+        A, B = _chained(ahead, divided.rolled)
         return back @ A, back @ B
 
     def last(self) -> Data:
@@ -258,10 +264,8 @@ class DividingEngine(Engine):
             reports[t] = rolled.reports[min(rolled.knot, substeps - 1)]
             if rolled.knot < substeps:
                 continue
-            A[t], B[t], x_next[t] = np.eye(self.ndx), 0.0, rolled.xs[-1]
+            (A[t], B[t]), x_next[t] = _chained(np.eye(self.ndx), rolled), rolled.xs[-1]
             reports[t, 5] = rolled.reports[:, 5].max()
-            for dx, du in zip(rolled.A, rolled.B, strict=True):
-                A[t], B[t] = dx @ A[t], dx @ B[t] + du
         return A, B, x_next, reports
 
     # -- single states -------------------------------------------------------------------------------------------------
