@@ -85,7 +85,11 @@ box, box2d = block, block2d
 
 
 def catalogue() -> list[Entry]:
-    """All models, by name."""
+    """All models with their sizes, sorted by name.
+
+    Returns:
+        One `Entry` per model, built with its default parameters.
+    """
     return [entry(globals()[name]) for name in sorted(__all__)]
 
 

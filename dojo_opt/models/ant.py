@@ -35,9 +35,21 @@ def ant(
         __(o)__        back_left, back_right: hip about the vertical, ankle across the leg [rad]
           / \\      u  (8,) torques of the hinges in the same order [N m]
 
-    spring [N m/rad] and damper [N m s/rad] of the hinges; limits: whether they have stops; friction of the nine
-    contacts (feet, knees, torso); law: see Contact. Masses, lengths and stops are those of gym's ant, as Dojo has
-    them; parts welded to the torso belong to it. It stands with its ankles bent by one radian.
+    Masses, lengths and stops are those of gym's ant, as Dojo has them. The parts welded to the torso belong to it.
+
+    Args:
+        spring: spring constant of the eight hinges [N m/rad], with its rest at zero.
+        damper: damper of the eight hinges [N m s/rad].
+        limits: whether the hinges have stops.
+        friction: coefficient of friction of the nine contacts: feet, knees and torso.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands with its ankles bent by one radian.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     torso = Link(0.3272, (0.0, 0.0, 0.0), np.full(3, 0.4 * 0.3272 * 0.25**2), Sphere(0.25))
     out = {leg: np.array([x, y, 0.0]) for leg, (x, y, _) in LEGS.items()}

@@ -108,17 +108,31 @@ def atlas(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Thirty-one links and thirty hinges; it stands on four balls under each foot.
+    """Thirty-one links and thirty hinges, 174 kg; it stands on four balls under each foot.
 
         q  (37,) position of the pelvis' frame [m], its quaternion; back_bkz, bky, bkx, neck_ay; then left and right:
            leg_hpz, hpx, hpy, kny, aky, akx; then, with arms, left and right: arm_shz, shx, ely, elx, uwy, mwx, lwy;
            all hinges in rad
         u  (30,) torques of the hinges in the same order [N m]
 
-    spring [N m/rad] and damper [N m s/rad] of the hinges; limits: whether they have stops (60 bounds);
-    arms=False leaves them out, 17 links; crouch: half the bend of the knees in the neutral state [rad]; friction of the
-    eight contacts; law: see Contact. Masses, inertias, dimensions and stops are those of the public model atlas_v5
-    (Open Source Robotics Foundation, for the DARPA Robotics Challenge), contacts those of Dojo. 174 kg.
+    Masses, inertias, dimensions and stops are those of the public model atlas_v5 (Open Source Robotics Foundation, for
+    the DARPA Robotics Challenge). The contacts are those of Dojo.
+
+    Args:
+        spring: spring constant of the hinges [N m/rad], with its rest at zero.
+        damper: damper of the hinges [N m s/rad].
+        limits: whether the hinges have stops, 60 bounds.
+        arms: whether the robot has arms; 17 links and 16 hinges without.
+        crouch: half the bend of the knees in the neutral state [rad], at least 0.
+        friction: coefficient of friction of the eight contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands with bent knees.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     checks.number("atlas(crouch=...)", crouch, at_least=0.0)
     links = dict(TRUNK)

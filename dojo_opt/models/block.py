@@ -20,13 +20,25 @@ def block(
     radius: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A uniform cube whose eight corners touch the ground z = 0; it stands on it at (0, 0, edge/2).
+    """A uniform cube whose eight corners touch the ground z = 0.
 
         +-----+     q  (7,) position of the centre [m], quaternion
         |  o  |     u  (3,) force at the centre of mass along x, y, z of the world [N]
         +-----+ edge
 
-    edge [m], mass [kg]; the corners are balls of `radius` [m] that fit inside the cube; law: see Contact.
+    Args:
+        edge: length of an edge [m].
+        mass: mass [kg].
+        friction: coefficient of friction of the eight contacts.
+        law: contact law, see `dojo.Contact`.
+        radius: radius of the balls at the corners, which fit inside the cube [m]; 0 for points.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands at (0, 0, edge/2).
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     half = edge / 2 - radius
     corners = [(half * x, half * y, half * z) for x, y, z in product((1, -1), repeat=3)]

@@ -20,13 +20,25 @@ def block2d(
     radius: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A uniform cube that stays in the plane x = 0 and touches the ground z = 0 with four corners.
+    """A uniform cube that stays in the plane x = 0. Four corners touch the ground z = 0.
 
         +-----+     q  (3,) position y, z of the centre [m], angle about x [rad]
         |  o  |     u  (3,) forces along y and z [N], torque about x [N m]
         +-----+ edge
 
-    edge [m], mass [kg]; the corners are balls of `radius` [m] that fit inside the cube; law: see Contact.
+    Args:
+        edge: length of an edge [m].
+        mass: mass [kg].
+        friction: coefficient of friction of the four contacts.
+        law: contact law, see `dojo.Contact`.
+        radius: radius of the balls at the corners, which fit inside the cube [m]; 0 for points.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands at y = 0, z = edge/2.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     half = edge / 2 - radius
     corners = [(0.0, half * y, half * z) for y, z in product((1, -1), repeat=2)]

@@ -23,15 +23,28 @@ def cartpole(
     damper: ArrayLike = (0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """The pole hangs down at angle zero and is upright at pi.
+    """A pole hinged to a cart on a rail. The pole hangs at an angle of zero and is upright at pi.
 
         --[cart]-- rail along y, z = 0     q  (2,) cart position [m], pole angle about x [rad]
              o                             u  (1,) force on the cart along y [N]
              |  pole
 
-    The default masses and inertias are MuJoCo's. Inertias about the centres of mass, body axes, z along the pole
-    [kg m^2]; the centre of mass of the pole is half a pole length from the hinge. damper: (rail, hinge)
-    [N s/m, N m s/rad].
+    The default masses and inertias are MuJoCo's.
+
+    Args:
+        cart_mass: mass of the cart [kg].
+        pole_mass: mass of the pole [kg].
+        pole_length: length of the pole [m]; its centre of mass is half of it from the hinge.
+        cart_inertia: (3,) or (3, 3) inertia of the cart about its centre of mass, body axes [kg m^2].
+        pole_inertia: (3,) or (3, 3) likewise of the pole, z along the pole [kg m^2].
+        damper: (2,) dampers of the rail [N s/m] and of the hinge [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state hangs, with the cart at y = 0.
+
+    Raises:
+        ValueError: for an argument of the wrong shape or out of range; the message names the part.
     """
     rail, hinge = checks.vector("cartpole(damper=...)", damper, 2)
     bodies = [

@@ -11,7 +11,20 @@ from sim.mechanism.pack import mechanism_sizes
 
 @dataclass(frozen=True)
 class Entry:
-    """One model: its sizes as built with default parameters, and a description."""
+    """One model: its sizes as built with default parameters, and a description.
+
+    Attributes:
+        name: name of the builder in `dojo.models`.
+        bodies: number of bodies.
+        nq: number of coordinates.
+        nv: number of degrees of freedom.
+        nu: number of inputs.
+        contacts: number of contacts.
+        limits: number of bounds of joints.
+        mass: total mass [kg].
+        what: the first line of the builder's description.
+        builder: the builder.
+    """
 
     name: str
     bodies: int
@@ -25,7 +38,11 @@ class Entry:
     builder: Callable[..., Mechanism] = field(repr=False)
 
     def build(self) -> Mechanism:
-        """The mechanism with default parameters."""
+        """The mechanism of the model.
+
+        Returns:
+            The mechanism with default parameters.
+        """
         return self.builder()
 
 

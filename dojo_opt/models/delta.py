@@ -37,11 +37,31 @@ def delta(
         motor o---arm---o    z up    q  (19,) of arm 0 to 2: its angle from the horizontal, downwards [rad], and the
                        //                 swings of its two rods (2 each) [rad]; then the attitude of the platform to
         platform ====o//                  the first rod, a quaternion (4)
-                                     u  (3,) torque of each motor [N m], positive lowers the arm
+                                     u  (3,) torque of each motor [N m]; a positive torque lowers the arm
 
-    Rods have universal joints at the arm and ball joints at the platform; five of the latter close loops, which leave
-    the platform its three translations. Lengths and radii [m], `gap` between the rods of an arm; masses [kg] of one
-    part; angle [rad] of the arms in the neutral state; damper [N m s/rad] and limits [rad] of each motor.
+    Rods have universal joints at the arm and ball joints at the platform. Five of the latter close loops, which leave
+    the platform its three translations.
+
+    Args:
+        base_radius: distance of the motors from the vertical axis of the robot [m].
+        platform_radius: distance of the ends of the arms, seen from the middle of the platform [m].
+        arm: length of an arm [m].
+        forearm: length of a rod [m].
+        gap: distance between the two rods of an arm [m].
+        angle: angle of the arms below the horizontal in the neutral state [rad].
+        arm_mass: mass of one arm [kg].
+        rod_mass: mass of one rod [kg].
+        platform_mass: mass of the platform [kg].
+        damper: damper of each motor [N m s/rad].
+        limits: (lowest, highest) angle of each arm [rad]; None for no stops.
+        height: height of the motors over the origin [m].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state holds the platform level below the middle of the motors.
+
+    Raises:
+        ValueError: for an argument out of range, or arms and rods that do not reach the platform.
     """
     out = base_radius + arm * np.cos(angle) - platform_radius  # from the end of an arm to the platform
     drop = float(np.sqrt(forearm**2 - out**2))

@@ -17,13 +17,25 @@ def double_pendulum(
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Two equal links; both angles zero is hanging straight down.
+    """Two equal links on a pivot. They hang straight down at angles of zero.
 
         pivot o  z = 2.2 length       q  (2,) angle of link_0 to the vertical, of link_1 to link_0, about x [rad]
               |                       u  (2,) torques at pivot and elbow [N m]
               |
 
-    mass [kg] and length [m] of one link, spring [N m/rad], damper [N m s/rad].
+    Args:
+        mass: mass of one link [kg].
+        length: length of one link [m].
+        width: edge of the square cross-section of the links [m].
+        spring: spring constant of both joints [N m/rad], with its rest at zero.
+        damper: damper of both joints [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state hangs straight down.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     return npendulum(
         2, mass=mass, length=length, width=width, spring=spring, damper=damper, gravity=gravity, name="double_pendulum"

@@ -24,9 +24,23 @@ def dzhanibekov(
         ----|       u  (0,) nothing drives it
             |
 
-    mass [kg] and length [m] of the bar (between the centres of its caps), and of the stem; radius [m]. The moments of
-    inertia of the whole are .029 about y, .062 about x, the axis to spin it about, and .087 kg m^2 about z. (Dojo's bar
-    has the moments .03, .001, .1 kg m^2, which no rigid body has: the largest exceeds the sum of the others.)
+    The moments of inertia of the whole are .029 about y, .062 about x, the axis to spin it about, and .087 kg m^2 about
+    z. (Dojo's bar has the moments .03, .001, .1 kg m^2, which no rigid body has: the largest exceeds the sum of the
+    others.)
+
+    Args:
+        mass: mass of the bar [kg].
+        length: length of the bar between the centres of its caps [m].
+        stem_mass: mass of the stem [kg].
+        stem_length: length of the stem between the centres of its caps [m].
+        radius: radius of both capsules [m].
+        gravity: (3,) acceleration of gravity [m/s^2]; zero by default, in space.
+
+    Returns:
+        The mechanism.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     bar = Body("bar", mass, shape=Capsule(radius, length, orientation=(0.5**0.5, 0.5**0.5, 0.0, 0.0)))
     stem = Body("stem", stem_mass, shape=Capsule(radius, stem_length, orientation=(0.5**0.5, 0.0, 0.5**0.5, 0.0)))

@@ -28,13 +28,25 @@ def exoskeleton(
     arm: bool = True,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Four hinges: shoulder abduction, flexion, internal rotation, and elbow flexion; its base is fixed.
+    """Four hinges on a fixed base: shoulder abduction, flexion and internal rotation, and elbow flexion.
 
         q  (4,) sAA, sFE, sIE, eFE [rad]
         u  (4,) torques in the same order [N m]
 
-    spring [N m/rad] and damper [N m s/rad] of the hinges; limits: 0..90, 0..90, -80..25, -125..0 degrees; arm: whether
-    the wearer's arm (2.25 and 1.5 kg) is in it. Masses, inertias and dimensions are those of the model in Dojo.
+    Masses, inertias and dimensions are those of the model in Dojo.
+
+    Args:
+        spring: spring constant of the hinges [N m/rad], with its rest at zero.
+        damper: damper of the hinges [N m s/rad].
+        limits: whether the hinges have stops: 0..90, 0..90, -80..25, -125..0 degrees.
+        arm: whether the wearer's arm (2.25 and 1.5 kg) is in it.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state has the angles (pi/4, pi/4, 0, -pi/4).
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     quarter = pi / 2
     links = dict(UNITS)

@@ -27,7 +27,7 @@ def fivebar(
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """It hangs below its motors, which are `base` apart; the forearms meet at a pin that closes the loop.
+    """A planar arm that hangs below two motors; its forearms meet at a pin that closes the loop.
 
         motor_l o---o motor_r      z up, x to the right
                /     \\             q  (4,) angles about y [rad]: of the cranks from pointing down, left and right;
@@ -36,9 +36,24 @@ def fivebar(
                  \\ /
                   o pin
 
-    Lengths [m], density [kg/m] of the links; angle [rad] by which the cranks open outwards in the neutral state, and
-    limits of that angle [rad]: with the forearms in one line, or on one another, the arm is singular. spring
-    [N m/rad, rest at the neutral angle] and damper [N m s/rad] of the motors.
+    Args:
+        crank: length of a crank [m].
+        forearm: length of a forearm [m].
+        base: distance of the two motors [m].
+        density: mass per length of the links [kg/m].
+        width: edge of the square cross-section of the links [m].
+        angle: angle by which the cranks open outwards in the neutral state [rad].
+        limits: (least, largest) such angle [rad]; None for no stops. The arm is singular with its forearms in one line,
+            or on one another.
+        spring: spring constant of the motors [N m/rad], with its rest at the neutral angle.
+        damper: damper of the motors [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state is symmetric, with the pin below the middle of the motors.
+
+    Raises:
+        ValueError: for an argument out of range, or forearms too short to meet.
     """
     up = {"crank": (0.0, 0.0, crank / 2), "forearm": (0.0, 0.0, forearm / 2)}
     down = {"crank": (0.0, 0.0, -crank / 2), "forearm": (0.0, 0.0, -forearm / 2)}

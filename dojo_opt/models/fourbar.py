@@ -22,7 +22,7 @@ def fourbar(
     damper: float = 1.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A rhombus that swings and folds: four equal links, two degrees of freedom left by its loop.
+    """A rhombus of four equal links that swings and folds. Its loop leaves two degrees of freedom.
 
                o pivot         z up, y to the right
         link_1 / \\ link_3      q  (5,) angles about x [rad]: of the ring, of link_3 to link_1, of link_2 to link_1,
@@ -30,8 +30,19 @@ def fourbar(
         link_2 \\ / link_4      u  (5,) torque at each of these joints [N m]
                 o
 
-    mass [kg] and length [m] of one link, opening [rad] of link_1 from the vertical in the neutral state; damper
-    [N m s/rad] of every joint, the closing one included.
+    Args:
+        mass: mass of one link [kg].
+        length: length of one link [m].
+        width: edge of the square cross-section of the links [m].
+        opening: angle of link_1 from the vertical in the neutral state [rad].
+        damper: damper of every joint, the closing one included [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state hangs symmetrically below the pivot, at z = 2.2 length.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     up, down = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)
     shape = Box(width, width, length)

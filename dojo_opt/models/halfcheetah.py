@@ -45,10 +45,23 @@ def halfcheetah(
         <   \\         fthigh, fshin, ffoot about y [rad]
          <   |     u  (6,) torques of the hinges in the same order [N m]
 
-    springs, dampers: factors on gym's springs (240 to 60 N m/rad) and dampers (6 to 1.5 N m s/rad); base_damper of the
-    torso's motion along x, z and about y; limits: whether the hinges have stops; friction of the nine contacts; law:
-    see Contact. Masses, lengths, stops are gym's. The torso's moments of inertia are those of its two capsules (Dojo's,
-    .089, .884, 1.018 kg m^2, are those of no rigid body).
+    Masses, lengths and stops are gym's. The torso's moments of inertia are those of its two capsules (Dojo's, .089,
+    .884, 1.018 kg m^2, are those of no rigid body).
+
+    Args:
+        springs: factor of gym's springs, 240 to 60 N m/rad.
+        dampers: factor of gym's dampers, 6 to 1.5 N m s/rad.
+        base_damper: damper of the torso's motion along x, z [N s/m] and about y [N m s/rad].
+        limits: whether the hinges have stops.
+        friction: coefficient of friction of the nine contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands at angles of zero, the lowest contact on the ground.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     # torso and head: masses of capsules go with their length plus a radius, as in the limbs
     share = (NECK + RADIUS) / (SPINE + NECK + 2 * RADIUS)

@@ -21,15 +21,28 @@ def hopper(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Torso, thigh, leg and foot in the plane y = 0; it stands upright at angles zero.
+    """Torso, thigh, leg and foot in the plane y = 0. It stands upright at angles of zero.
 
         |        q  (6,) position x, z of the middle of the torso [m], its pitch about y, then thigh, leg, foot about y
         |           [rad]; thigh and leg fold back at positive angles
         |_       u  (3,) torques of thigh, leg and foot [N m]
 
-    spring [N m/rad] and damper [N m s/rad] of the three hinges, base_damper of the torso's motion along x, z and
-    about y [N s/m, N m s/rad] (Dojo has 10, 1 and 50); limits: whether the hinges have stops; friction of the
-    five contacts; law: see Contact. Masses, lengths and stops are gym's.
+    Masses, lengths and stops are gym's. Dojo has a spring of 10, a damper of 1 and a base damper of 50.
+
+    Args:
+        spring: spring constant of the three hinges [N m/rad], with its rest at zero.
+        damper: damper of the three hinges [N m s/rad].
+        base_damper: damper of the torso's motion along x, z [N s/m] and about y [N m s/rad].
+        limits: whether the hinges have stops.
+        friction: coefficient of friction of the five contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands upright.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = {
         "torso": rod(3.53429, 0.4, 0.05, (0.0, 0.0, 0.2), DOWN),

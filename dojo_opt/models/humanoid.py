@@ -83,16 +83,27 @@ def humanoid(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Thirteen links; it stands with the capsules of its feet on the ground z = 0.
+    """Thirteen links, 40.84 kg; it stands with the capsules of its feet on the ground z = 0.
 
         q  (28,) position of the torso's frame [m], its quaternion; abdomen_yz (2), abdomen_x; then for right, left: hip
            (quaternion), knee, ankle, shoulder (2), elbow [rad]
         u  (19,) torques in the same order [N m]: 2, 1, then 3, 1, 1, 2, 1 for each side
 
-    Joints written with (2) are orbital: the rotation vector across their axis, see sim/dynamics/joints/swing.py. spring
-    [N m/rad] and damper [N m s/rad] of all joints; friction of the four contacts, a heel and a toe per foot; law: see
-    Contact.
-    40.84 kg; masses, inertias and dimensions are those of the model in Dojo, after gym's.
+    Joints written with (2) are orbital: their coordinates are the rotation vector across their axis, see
+    sim/dynamics/joints/swing.py. Masses, inertias and dimensions are those of the model in Dojo, after gym's.
+
+    Args:
+        spring: spring constant of all joints [N m/rad], with its rest at zero.
+        damper: damper of all joints [N m s/rad].
+        friction: coefficient of friction of the four contacts, a heel and a toe per foot.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands at angles of zero.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = {**_trunk(), **_side(1.0), **_side(-1.0)}
     made = joints(links, _mounts(), spring=spring, damper=damper)

@@ -31,7 +31,7 @@ def minitaur_leg(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """It moves in the x-z plane, the hip of the leg at the centre of mass of its body; the knees point fore and aft.
+    """A hopper in the x-z plane: the hip of its leg is at the centre of mass of the body, its knees point fore and aft.
 
           [body]         z up, x forward
         back / \\ front    q  (7,) position x, z [m] and pitch of the body about y [rad]; angle of the front and of the
@@ -39,10 +39,31 @@ def minitaur_leg(
              \\ /              thigh [rad]
               o foot     u  (2,) torque of the front and of the back motor, about y [N m]
 
-    Both motors turn together: the leg swings; against each other: it stretches. Lengths [m] and masses [kg] of one
-    thigh and one shank; angle [rad] of the thighs from the vertical where it stands; damper [N m s/rad] and rotor
-    inertia behind the gear [kg m^2] of each motor. The shanks meet at the foot, where a pin closes the loop. The knees
-    stop [rad] before the leg is straight or folded, where the two halves would lie on each other and part ways.
+    The leg swings when both motors turn together, and stretches when they turn against each other. The shanks meet at
+    the foot, where a pin closes the loop. The knees stop before the leg is straight or folded, where the two halves
+    would lie on each other and part ways.
+
+    Args:
+        body_mass: mass of the body [kg].
+        upper: length of a thigh [m].
+        lower: length of a shank [m].
+        upper_mass: mass of one thigh [kg].
+        lower_mass: mass of one shank [kg].
+        angle: angle of the thighs from the vertical in the neutral state [rad].
+        damper: damper of each motor [N m s/rad].
+        rotor: inertia of the rotor of each motor, seen behind the gear [kg m^2].
+        straight: least angle of a knee [rad]; 0 would be a straight leg.
+        folded: largest angle of a knee [rad]; pi would be a folded leg.
+        foot_radius: radius of the ball at the foot [m].
+        friction: coefficient of friction of the foot and of the body.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands on the foot, the body above it.
+
+    Raises:
+        ValueError: for an argument out of range, or shanks too short to meet.
     """
     reach = upper * np.cos(angle) + np.sqrt(lower**2 - (upper * np.sin(angle)) ** 2)
     knee = angle + float(np.arcsin(upper * np.sin(angle) / lower))

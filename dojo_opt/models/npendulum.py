@@ -22,14 +22,29 @@ def npendulum(
     gravity: ArrayLike = (0.0, 0.0, -9.81),
     name: str = "npendulum",
 ) -> Mechanism:
-    """`n` equal links; all angles zero is hanging straight down.
+    """A chain of `n` equal links on a pivot. It hangs straight down at angles of zero.
 
             pivot o  z = 1.1 n length         y ->   z up,  x towards the reader
                   |  link_0                   q  (n,) angle of each link to the one before, about x [rad]
                   |  link_1                   u  (n,) torque at each joint [N m]
 
-    mass [kg] and length [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. `joint` may be any kind
-    without translation, e.g. "spherical"; its coordinates are then quaternions, and u three torques per joint.
+    Args:
+        n: number of links, at least 1.
+        mass: mass of one link [kg].
+        length: length of one link [m].
+        width: edge of the square cross-section of the links [m].
+        spring: spring constant of each joint [N m/rad], with its rest at zero.
+        damper: damper of each joint [N m s/rad].
+        joint: kind of all joints, any one without translation. With "spherical", say, the coordinates are quaternions
+            and u has three torques per joint.
+        gravity: (3,) acceleration of gravity [m/s^2].
+        name: name of the mechanism.
+
+    Returns:
+        The mechanism. Its neutral state hangs straight down.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     n = whole_number("npendulum(n)", n)
     half = (0.0, 0.0, length / 2)

@@ -26,7 +26,20 @@ def nslider(
         |||     u  (n,) force of each rail along z [N]
           |
 
-    mass [kg], length and radius [m] of one rod; spring [N/m] and damper [N s/m] of each rail.
+    Args:
+        n: number of rods, at least 1.
+        mass: mass of one rod [kg].
+        length: length of one rod [m].
+        radius: radius of the rods, and distance from one to the next [m].
+        spring: spring constant of each rail [N/m], with its rest at zero.
+        damper: damper of each rail [N s/m].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. In its neutral state the upper ends of all rods are at z = 0.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     n = whole_number("nslider(n)", n)
     rods = [Body(f"rod_{i}", mass, shape=Cylinder(radius, length)) for i in range(n)]

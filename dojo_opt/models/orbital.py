@@ -20,14 +20,26 @@ def orbital(
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """`n` links that hang from one another by orbital joints, the first one fixed to the world.
+    """`n` links that hang from one another by orbital joints; the first one is fixed to the world.
 
         #  fixed, z = 0      q  (2 (n - 1),) rotation vector of each joint along x and y [rad]
         |                    u  (2 (n - 1),) torques along the same coordinates [N m]
         |
 
-    mass [kg], length and width [m] of one link; spring [N m/rad] and damper [N m s/rad] of each joint. All coordinates
-    zero is hanging straight down.
+    Args:
+        n: number of links, at least 2.
+        mass: mass of one link [kg].
+        length: length of one link [m].
+        width: edge of the square cross-section of the links [m].
+        spring: spring constant of each joint [N m/rad], with its rest at zero.
+        damper: damper of each joint [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state hangs straight down, all coordinates zero.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     n = whole_number("orbital(n)", n, 2)
     upper, lower = (0.0, 0.0, length / 2), (0.0, 0.0, -length / 2)

@@ -53,15 +53,26 @@ def panda(
     gripper: bool = True,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Seven hinges and two fingers; its base is fixed at the origin, its neutral state the maker's ready pose.
+    """Seven hinges and two fingers; its base is fixed at the origin.
 
         q  (9,) joint1 .. joint7 [rad], finger1, finger2 [m]
         u  (9,) torques [N m] and forces [N] in the same order
 
-    spring and damper of every joint [N m/rad, N m s/rad; N/m, N s/m]; limits: whether they have stops; gripper=False
-    leaves out hand and fingers. Dimensions and stops are the maker's; masses and inertias were identified by Gaz,
-    Cognetti, Oliva, Robuffo Giordano, De Luca, RA-L 2019; those of the hand and the fingers are those of the model in
-    Dojo.
+    Dimensions and stops are the maker's. Masses and inertias were identified by Gaz, Cognetti, Oliva, Robuffo Giordano,
+    De Luca, RA-L 2019. Those of the hand and the fingers are those of the model in Dojo.
+
+    Args:
+        spring: spring constant of every joint [N m/rad; of the fingers N/m], with its rest at zero.
+        damper: damper of every joint [N m s/rad; of the fingers N s/m].
+        limits: whether the joints have stops.
+        gripper: whether the arm has a hand and fingers; q and u are (7,) without.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state is the maker's ready pose.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = dict(LINKS)
     mounts = [

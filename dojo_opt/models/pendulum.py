@@ -17,12 +17,24 @@ def pendulum(
     damper: float = 0.0,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A uniform link; angle zero is hanging down, pi is upright.
+    """A uniform link on a pivot. It hangs at an angle of zero and is upright at pi.
 
         pivot o  z = 1.1 length       q  (1,) angle about x [rad]
               |                       u  (1,) torque at the pivot [N m]
 
-    mass [kg], length and width [m], spring [N m/rad], damper [N m s/rad].
+    Args:
+        mass: mass of the link [kg].
+        length: length of the link [m].
+        width: edge of the square cross-section of the link [m].
+        spring: spring constant of the joint [N m/rad], with its rest at zero.
+        damper: damper of the joint [N m s/rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state hangs.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     return npendulum(
         1, mass=mass, length=length, width=width, spring=spring, damper=damper, gravity=gravity, name="pendulum"

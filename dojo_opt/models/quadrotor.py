@@ -24,15 +24,26 @@ def quadrotor(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """One rigid body with four rotors that push along its z axis; it stands on the ground z = 0.
+    """One rigid body with four rotors that push along its z axis, 1.04 kg; it stands on the ground z = 0.
 
           2         q  (7,) position of the centre of mass [m], quaternion
         3-+-1  x    u  (4,) thrusts of the rotors at +x, +y, -x, -y [N]
           4
 
-    torque_per_thrust: reaction torque of a rotor over its thrust [m], positive about z for rotors on x, negative for
-    those on y; friction of the eight contacts (rotor guards, corners below); law: see Contact. 1.04 kg. Masses,
-    inertias and dimensions are those of the model by Furrer et al. (RotorS) that Dojo uses.
+    Masses, inertias and dimensions are those of the model by Furrer et al. (RotorS) that Dojo uses.
+
+    Args:
+        torque_per_thrust: reaction torque of a rotor over its thrust [m]. The torque about z is positive for the rotors
+            on x, negative for those on y.
+        friction: coefficient of friction of the eight contacts: rotor guards, and corners below.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands on the ground.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     ends = [np.array([ARM * x, ARM * y, HEIGHT]) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
     links = {"frame": FRAME.welded(*((ROTOR, end) for end in ends))}

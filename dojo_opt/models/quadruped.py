@@ -45,16 +45,30 @@ def quadruped(
     stance: tuple[float, float] = (pi / 4, -pi / 2),
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Thirteen bodies, twelve hinges; it stands on the ground with its feet under its hips.
+    """Thirteen bodies and twelve hinges; it stands on the ground with its feet under its hips.
 
         x forward, y left, z up      q  (19,) position of the trunk's centre of mass [m], its quaternion, then for
         legs FR FL RR RL                FR, FL, RR, RL: hip about x, thigh about y, calf about y [rad]
                                      u  (12,) torques of the hinges in the same order [N m]
 
-    All angles zero is legs straight down; a positive thigh moves the knee back, the calf is bent at negative angles.
-    damper [N m s/rad] and spring [N m/rad] of every hinge; contacts: "feet" (4 balls) or "all" (12: feet,
-    knees, shoulders); limits: whether hinges have stops (24); stance: thigh and calf angle of the neutral state;
-    law: see Contact.
+    The legs are straight down at angles of zero. A positive thigh moves the knee back; the calf is bent at negative
+    angles.
+
+    Args:
+        damper: damper of every hinge [N m s/rad].
+        spring: spring constant of every hinge [N m/rad], with its rest at hip 0, thigh 0.9, calf -1.425 rad.
+        friction: coefficient of friction of the contacts.
+        law: contact law, see `dojo.Contact`.
+        contacts: "feet", 4 balls, or "all", 12: feet, knees and shoulders.
+        limits: whether the hinges have stops, 24 bounds.
+        stance: (2,) angles of thighs and calves in the neutral state [rad].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands, its hips straight.
+
+    Raises:
+        ValueError: for an unknown choice of contacts, or an argument out of range; the message names the part.
     """
     checks.one_of("quadruped(contacts=...)", contacts, ("feet", "all"))
     thigh, calf = checks.vector("quadruped(stance=...)", stance, 2)

@@ -25,16 +25,34 @@ def raiberthopper(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """It stands at (0, 0, leg_length + foot_radius) = (0, 0, 0.55), the leg straight down.
+    """A body on a sliding leg, both balls. The leg is straight down in the neutral state.
 
         (body)    z up      q  (8,) position of the body [m], its quaternion, leg length [m]
            |                v  (7,) velocity (world), angular velocity (body), leg rate
            | leg            u  (3,) torque on the body about its x and y axes [N m], leg force [N], positive extends
          (foot)
 
-    The torques act on the body alone, as from reaction wheels. Masses [kg], radii and lengths [m]. The leg has a
-    spring [N/m] with its rest at leg_length, a damper [N s/m], and limits (shortest, longest) [m]. Both balls touch the
-    ground; law: see Contact.
+    The torques act on the body alone, as from reaction wheels. Both balls touch the ground.
+
+    Args:
+        body_mass: mass of the body [kg].
+        foot_mass: mass of the foot [kg].
+        body_radius: radius of the body [m].
+        foot_radius: radius of the foot [m].
+        leg_length: length of the leg in the neutral state, from centre to centre [m].
+        spring: spring constant of the leg [N/m], with its rest at `leg_length`.
+        damper: damper of the leg [N s/m].
+        limits: (shortest, longest) leg [m]; None for no stops.
+        friction: coefficient of friction of both balls.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands with the body at (0, 0, leg_length + foot_radius), by default
+        (0, 0, 0.55).
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     return Mechanism(
         bodies=[

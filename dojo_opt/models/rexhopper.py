@@ -70,15 +70,27 @@ def rexhopper(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A body with three wheels on a leg of four links, whose two shanks are pinned together; it stands on its foot.
+    """A body with three wheels on a leg of four links, whose two shanks are pinned together, 8.14 kg.
 
         q  (14,) position of the body's frame [m], its quaternion; joint0, joint1 (front thigh, shank), joint2, joint3
            (rear thigh, shank); joint_rw0, joint_rw1, joint_rwz, the wheels [rad]
         u  (5,) torques of the two thighs and of the three wheels [N m]
 
-    damper [N m s/rad] of the hinges of the leg; limits: whether the knees have stops; friction of the contacts: foot,
-    two ankles, and both sides of the body; law: see Contact. 8.14 kg. Masses, inertias and dimensions are those of the
-    model in Dojo, of the RExHopper of the Robotic Exploration Lab; the products of inertia of its wheels are left out.
+    Masses, inertias and dimensions are those of the model in Dojo, of the RExHopper of the Robotic Exploration Lab. The
+    products of inertia of its wheels are omitted.
+
+    Args:
+        damper: damper of the hinges of the leg [N m s/rad]; the wheels have none.
+        limits: whether the knees have stops.
+        friction: coefficient of friction of the five contacts: foot, two ankles, and both sides of the body.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands on its foot.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = {"base": BASE, **LEG, **WHEELS}
     made = joints(links, MOUNTS, damper=damper, limits=limits)

@@ -23,7 +23,19 @@ def slider(
         |#|     q  (1,) height of the upper end of the link [m]
         |#|     u  (1,) force along z [N]
 
-    mass [kg], length and width [m], spring [N/m], damper [N s/m].
+    Args:
+        mass: mass of the link [kg].
+        length: length of the link [m].
+        width: edge of the square cross-section of the link [m].
+        spring: spring constant of the rail [N/m], with its rest at zero.
+        damper: damper of the rail [N s/m].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. In its neutral state the upper end is at z = 0.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     link = Body("link", mass, shape=Box(width, width, length))
     rail = Joint("prismatic", None, "link", name="rail", child_point=(0, 0, length / 2), spring=spring, damper=damper)

@@ -24,13 +24,30 @@ def snake(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """`n` boxes end to end along x, the first one free; each touches the ground z = 0 with both ends of its axis.
+    """A chain of `n` boxes along x, the first one free; each touches the ground z = 0 with both ends of its axis.
 
         q  (7 + ...,) position of link_0 [m], its quaternion, then the coordinates of each joint; spherical: quaternions
         u  (3 (n - 1),) torques of the joints in the child's axes [N m]; of another kind, one per degree of freedom
 
-    joint: kind of all joints, about or along x; mass [kg], length, width, height [m] of one box; radius of the contacts
-    [m]; spring and damper of each joint; law: see Contact.
+    Args:
+        n: number of boxes, at least 1.
+        joint: kind of all joints, about or along x.
+        mass: mass of one box [kg].
+        length: edge of one box along x [m].
+        width: edge of one box along y [m].
+        height: edge of one box along z [m].
+        radius: radius of the balls at the ends [m]; 0 for points.
+        spring: spring constant of each joint [N m/rad; of translations N/m], with its rest at zero.
+        damper: damper of each joint [N m s/rad; of translations N s/m].
+        friction: coefficient of friction of the contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state lies straight, its ends on the ground.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links, joints, front, rear = box_chain(
         "snake", n, joint, ((1.0, 0.0, 0.0),), mass, (length, width, height), spring, damper

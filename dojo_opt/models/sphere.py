@@ -17,12 +17,23 @@ def sphere(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A uniform ball that touches the ground z = 0; it rests on it at (0, 0, radius).
+    """A uniform ball that touches the ground z = 0.
 
         q  (7,) position of the centre [m], quaternion
         u  (3,) force at the centre of mass along x, y, z of the world [N]
 
-    radius [m], mass [kg]; law: see Contact.
+    Args:
+        radius: radius [m].
+        mass: mass [kg].
+        friction: coefficient of friction.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state rests at (0, 0, radius).
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     return Mechanism(
         bodies=[Body("sphere", mass, shape=Sphere(radius))],

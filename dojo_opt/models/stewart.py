@@ -31,12 +31,27 @@ def stewart(
 
         ___plate___    z up    q  (22,) of leg 0 to 5: swing of its cylinder (2) [rad] and its extension [m]; then the
          /\\ /\\ /\\                  attitude of the plate to rod 0, a quaternion (4)
-        /  X  X  \\             u  (6,) force of each slider [N], positive extends
+        /  X  X  \\             u  (6,) force of each slider [N]; a positive force extends the leg
 
-    The plate hangs on leg 0 in the tree; the ball joints of the other legs close five loops and leave its six degrees
-    of freedom. Radii of the circles of joints and height of the plate in the neutral state [m]; `spread` [rad] is half
-    the angle between neighbouring joints. leg_mass [kg] of each cylinder and each rod; spring [N/m] with its rest at
-    the neutral length, and damper [N s/m], of each slider.
+    The plate hangs on leg 0 in the tree. The ball joints of the other legs close five loops, which leave the plate its
+    six degrees of freedom.
+
+    Args:
+        base_radius: radius of the circle of the joints on the ground [m].
+        plate_radius: radius of the circle of the joints under the plate [m].
+        height: height of the plate in the neutral state [m].
+        spread: half the angle between neighbouring joints on the ground [rad]; pi/3 - spread under the plate.
+        plate_mass: mass of the plate [kg].
+        leg_mass: mass of each cylinder and of each rod [kg].
+        spring: spring constant of each slider [N/m], with its rest at the neutral length.
+        damper: damper of each slider [N s/m].
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state holds the plate level.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     feet, tops = _hexagon(base_radius, spread), _hexagon(plate_radius, np.pi / 3 - spread)
     bodies, joints, closing = [], [], []

@@ -20,7 +20,16 @@ def tennisracket(
         q  (7,) position of the centre [m], quaternion
         u  (0,) nothing drives it
 
-    mass [kg], length [m].
+    Args:
+        mass: mass [kg].
+        length: longest edge, along z [m].
+        gravity: (3,) acceleration of gravity [m/s^2]; zero by default, in space.
+
+    Returns:
+        The mechanism.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     box = Body("racket", mass, shape=Box(length / 25, length / 2, length))
     return Mechanism([box], [Joint("floating", None, "racket")], gravity=gravity, name="tennisracket")

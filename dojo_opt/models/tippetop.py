@@ -26,9 +26,24 @@ def tippetop(
          o      q  (7,) position of the centre of mass of the ball [m], its quaternion
         ( )     u  (0,) nothing drives it
 
-    mass [kg], radius [m] and inertia (about the centre of mass, body axes) [kg m^2] of the ball; its centre of mass is
-    `offset` [m] below its centre. The knob is a uniform ball scaled by `scale`: mass by its third power. Defaults are
-    Dojo's, whose moments of inertia exceed those of a uniform ball 20 times: it turns over slowly. law: see Contact.
+    The defaults are Dojo's. Their moments of inertia exceed those of a uniform ball 20 times: the top turns over
+    slowly.
+
+    Args:
+        mass: mass of the ball [kg].
+        radius: radius of the ball [m].
+        inertia: (3,) or (3, 3) inertia of the ball about its centre of mass, body axes [kg m^2].
+        scale: size of the knob, a uniform ball, relative to the ball. Its mass goes with the third power.
+        offset: distance of the ball's centre of mass below its centre [m].
+        friction: coefficient of friction of both contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands upright, the knob on top.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     knob = scale * radius
     bodies = [

@@ -31,13 +31,24 @@ def uuv(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Mechanism:
-    """One rigid body in water: weight and lift cancel, and a damper takes the place of drag.
+    """One rigid body in water, 19.24 kg: weight and lift cancel, and a damper takes the place of drag.
 
-        q  (7,) position of the centre of mass [m], quaternion; neutral one metre over the ground z = 0
+        q  (7,) position of the centre of mass [m], quaternion
         u  (6,) thrusts [N]: four in the horizontal plane, two upwards
 
-    damper: drag on every velocity [N s/m, N m s/rad]; friction of the two contacts; law: see Contact. 19.24 kg. Masses,
-    inertias and dimensions are those of the model of the University of Maryland's mini Tortuga in Dojo.
+    Masses, inertias and dimensions are those of the model of the University of Maryland's mini Tortuga in Dojo.
+
+    Args:
+        damper: drag on every velocity [N s/m] and angular velocity [N m s/rad].
+        friction: coefficient of friction of the two contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2]; zero by default, as the lift cancels it.
+
+    Returns:
+        The mechanism. Its neutral state is one metre over the ground z = 0.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = {"hull": HULL.welded(*((ROTOR, point) for point, _ in THRUSTERS))}
     com = np.asarray(links["hull"].com)

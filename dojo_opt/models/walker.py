@@ -20,15 +20,28 @@ def walker(
     law: str = "nonlinear",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """Torso and two legs of three links in the plane y = 0; it stands upright at angles zero.
+    """Torso and two legs of three links in the plane y = 0. It stands upright at angles of zero.
 
         |        q  (9,) position x, z of the middle of the torso [m], its pitch about y, then thigh, leg, foot of the
         |           right and of the left leg about y [rad]; thigh and leg fold back at positive angles
         |_       u  (6,) torques of the hinges in the same order [N m]
 
-    spring [N m/rad] and damper [N m s/rad] of the hinges, base_damper of the torso's motion along x, z and about y;
-    limits: whether the hinges have stops; friction of the nine contacts; law: see Contact. Masses, lengths and stops
-    are gym's; the two legs may pass through one another.
+    Masses, lengths and stops are gym's. The two legs may pass through one another.
+
+    Args:
+        spring: spring constant of the six hinges [N m/rad], with its rest at zero.
+        damper: damper of the six hinges [N m s/rad].
+        base_damper: damper of the torso's motion along x, z [N s/m] and about y [N m s/rad].
+        limits: whether the hinges have stops.
+        friction: coefficient of friction of the nine contacts.
+        law: contact law, see `dojo.Contact`.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state stands upright.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     y = (0.0, 1.0, 0.0)
     links = {"torso": rod(3.53429, 0.4, 0.05, (0.0, 0.0, 0.2), DOWN)}

@@ -56,15 +56,26 @@ def youbot(
     limits: bool = True,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
-    """A platform that moves in the plane, four wheels, five hinges, two fingers; upright like a candle at zero.
+    """A platform that moves in the plane, four wheels, five hinges and two fingers; its arm is upright at zero.
 
         q  (14,) position x, y of the platform [m], its heading [rad]; wheels fl, fr, bl, br; arm 1 .. 5 [rad];
            finger_l, finger_r [m]
-        u  (14,) forces and torques in the same order
+        u  (14,) forces [N] and torques [N m] in the same order
 
-    The platform is carried: the wheels turn freely and touch nothing. spring and damper of wheels, hinges and fingers
-    [N m/rad, N m s/rad; N/m, N s/m]; limits: whether hinges and fingers have stops. Masses, inertias and dimensions are
-    KUKA's, as in the youbot_description of the model in Dojo; stops are Dojo's.
+    The platform is carried: the wheels turn freely and touch nothing. Masses, inertias and dimensions are KUKA's, as in
+    the youbot_description of the model in Dojo; the stops are Dojo's.
+
+    Args:
+        spring: spring constant of wheels and hinges [N m/rad] and of fingers [N/m], with its rest at zero.
+        damper: damper of wheels and hinges [N m s/rad] and of fingers [N s/m].
+        limits: whether hinges and fingers have stops.
+        gravity: (3,) acceleration of gravity [m/s^2].
+
+    Returns:
+        The mechanism. Its neutral state holds the arm upright, the fingers open by 5 mm each.
+
+    Raises:
+        ValueError: for an argument out of range; the message names the part.
     """
     links = {"platform": PLATFORM.welded(*ON_PLATFORM)}
     mounts = []
