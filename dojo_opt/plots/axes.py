@@ -15,15 +15,29 @@ if TYPE_CHECKING:
 
 _DECADES = 300.0  # ratio of the ends of an axis
 _FEW, _MANY = 5, 14  # entries of a legend that fit into the axes, and beside them
+_ARGUMENTS = """
+    Args:
+        result: Trajectory, Plan, ClosedLoop, or the Motion of one.
+        ax: axes to draw on (default None: those of a new figure).
+        simulator: simulator of the result, for one that was read from a file (default None: that of the result).
+
+    Returns:
+        The axes.
+
+    Raises:
+        TypeError: the result is none of these.
+        ValueError: the result does not know its simulator.
+        SimulationError: a step of a plan cannot be solved again, for its forces.
+    """
 
 
 def panel(draw: Callable[[Motion, Axes], Axes]) -> Callable[..., Axes]:
-    """A figure of one panel: of a Trajectory, a Plan, a ClosedLoop or their Motion, on new axes unless some are given.
+    """Decorator of a figure of one panel: users call it with a result, on new axes unless some are given.
 
-    simulator: needed for a result that was read from a file.
+    The docstring gets the arguments that all panels share.
     """
 
-    @wraps(draw)
+    @wraps(draw, assigned=("__module__", "__name__", "__qualname__"))
     def drawn(result: Any, ax: Axes | None = None, *, simulator: Simulator | None = None) -> Axes:
         if ax is None:
             from matplotlib.figure import Figure
@@ -31,6 +45,8 @@ def panel(draw: Callable[[Motion, Axes], Axes]) -> Callable[..., Axes]:
             ax = Figure(figsize=(6, 4), layout="constrained").subplots()
         return draw(result if isinstance(result, Motion) else motion(result, simulator), ax)
 
+    del drawn.__wrapped__  # help() shows the arguments of the panel
+    drawn.__doc__ = f"{draw.__doc__}\n{_ARGUMENTS}"
     return drawn
 
 

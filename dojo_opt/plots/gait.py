@@ -18,9 +18,20 @@ _LOADED = 0.02  # of the largest force: a foot that presses harder is on the gro
 
 
 def gait(result: Any, figure: Figure | None = None, *, simulator: Simulator | None = None) -> Figure:
-    """Four panels of a Trajectory or a plan: gait diagram, normal forces, use of friction, paths of the feet.
+    """Four panels of a walking motion: gait diagram, normal forces, use of friction, paths of the feet.
 
-    figure: draw on this one. simulator: needed for a result that was read from a file.
+    Args:
+        result: Trajectory, Plan or ClosedLoop.
+        figure: figure to draw on (default None: a new one).
+        simulator: simulator of the result, for one that was read from a file (default None: that of the result).
+
+    Returns:
+        The figure.
+
+    Raises:
+        TypeError: the result is none of these.
+        ValueError: the result does not know its simulator.
+        SimulationError: a step of a plan cannot be solved again, for its forces.
     """
     if figure is None:
         from matplotlib.figure import Figure
@@ -69,7 +80,7 @@ def gait_diagram(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def normal_forces(m: Motion, ax: Axes) -> Axes:
-    """Mean normal force of every foot over each simulation step, in the colours of the gait diagram."""
+    """Mean normal force on every foot over each simulation step, in the colours of the gait diagram."""
     for row, k in enumerate(_feet(m)):
         ax.stairs(m.normal_force[:, k], _edges(m), baseline=None, color=f"C{row}", label=m.mechanism.contact_names[k])
     return finish(ax, "normal force [N]", "time [s]")
@@ -77,7 +88,7 @@ def normal_forces(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def friction_use(m: Motion, ax: Axes) -> Axes:
-    """Friction force over its limit, friction coefficient times normal force, of every foot on the ground: 1 slides."""
+    """Friction force over its limit, friction coefficient times normal force, of every foot on the ground; 1 slides."""
     loaded = _loaded(m)
     for row, k in enumerate(_feet(m)):
         limit = m.mechanism.contacts[k].friction * m.normal_force[:, k]
@@ -90,7 +101,7 @@ def friction_use(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def foot_paths(m: Motion, ax: Axes) -> Axes:
-    """Height of the underside of every foot over its path; larger while the foot is on the ground."""
+    """Height of the underside of every foot over its path, with larger marks while the foot is on the ground."""
     loaded = _loaded(m)
     substeps = max(1, len(loaded) // max(1, len(m.u)))
     for row, k in enumerate(_feet(m)):

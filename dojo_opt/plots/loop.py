@@ -39,8 +39,14 @@ def _axes(ax: Axes | None) -> Axes:
 def closed_loop(result: ClosedLoop) -> Figure:
     """Four panels of a closed loop: height and reference, distance from the reference, path of the base, tick times.
 
-    Of a robot without a base that can fall, an arm or a pendulum, coordinates and inputs instead of height and path;
-    without a reference, the inputs instead of the distance from it; without a log of ticks, the inputs instead.
+    For a robot without a base that can fall, such as an arm or a pendulum, coordinates and inputs replace height and
+    path. Inputs also replace the distance without a reference, and the tick times without a log.
+
+    Args:
+        result: the closed loop.
+
+    Returns:
+        A new figure.
     """
     from matplotlib.figure import Figure
 
@@ -73,7 +79,15 @@ def _path(result: ClosedLoop, xs: Matrix) -> Matrix:
 
 
 def base_height(result: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Height of the first body over time, and that of the reference, dashed."""
+    """Height of the first body over time; that of the reference is dashed.
+
+    Args:
+        result: the closed loop.
+        ax: axes to draw on (default None: those of a new figure).
+
+    Returns:
+        The axes.
+    """
     ax = _axes(ax)
     ax.plot(result.time, _path(result, result.x)[:, 2], label="plant")
     if result.reference is not None:
@@ -84,7 +98,18 @@ def base_height(result: ClosedLoop, ax: Axes | None = None) -> Axes:
 
 
 def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Distance from the reference over time: lengths of a base that can fall, else all coordinates."""
+    """Distance from the reference over time: lengths of a base that can fall, else all coordinates.
+
+    Args:
+        result: the closed loop, with a reference.
+        ax: axes to draw on (default None: those of a new figure).
+
+    Returns:
+        The axes.
+
+    Raises:
+        ValueError: the closed loop has no reference.
+    """
     ax = _axes(ax)
     mechanism = result.simulator.mechanism
     count = mechanism.joints[0].ntrans if stands_free(mechanism) else mechanism.nv
@@ -95,7 +120,15 @@ def tracking(result: ClosedLoop, ax: Axes | None = None) -> Axes:
 
 
 def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
-    """Path of the first body from above, or from the side where it stays in a plane; that of the reference, dashed."""
+    """Path of the first body from above, or from the side if it stays in a plane; that of the reference is dashed.
+
+    Args:
+        result: the closed loop.
+        ax: axes to draw on (default None: those of a new figure).
+
+    Returns:
+        The axes.
+    """
     ax = _axes(ax)
     path = _path(result, result.x)
     planar = result.simulator.mechanism.joints[0].kind == "planar_axis"
@@ -111,7 +144,16 @@ def base_path(result: ClosedLoop, ax: Axes | None = None) -> Axes:
 
 
 def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None = None) -> Axes:
-    """Time of every tick but the first, with median and 99 %; period [s]: also the time that there was."""
+    """Time of every tick but the first, with median and 99 %.
+
+    Args:
+        log: the ticks, as `MPC.log` or `ClosedLoop.log`.
+        period: time between two ticks [s], drawn as a line (default None: no line).
+        ax: axes to draw on (default None: those of a new figure).
+
+    Returns:
+        The axes.
+    """
     ax = _axes(ax)
     ticks = [tick for tick in log if not tick.first]
     ms = milliseconds(log)
@@ -130,7 +172,14 @@ def tick_times(log: Sequence[Tick], period: float | None = None, ax: Axes | None
 
 
 def study(result: MonteCarlo) -> Figure:
-    """Two panels of a Monte Carlo study: survival, and the times of all its ticks."""
+    """Two panels of a Monte Carlo study: survival, and the times of all its ticks.
+
+    Args:
+        result: the study, from `dojo.monte_carlo`.
+
+    Returns:
+        A new figure.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4), layout="constrained")
@@ -146,7 +195,15 @@ def study(result: MonteCarlo) -> Figure:
 
 
 def survival(studies: dict[str, MonteCarlo], ax: Axes | None = None) -> Axes:
-    """Share of the runs that still stand over time, one line per study, with Wilson's 95 % interval at the end."""
+    """Share of the runs that still stand over time, one line per study, with Wilson's 95 % interval at the end.
+
+    Args:
+        studies: the studies by the names that the legend shows.
+        ax: axes to draw on (default None: those of a new figure).
+
+    Returns:
+        The axes.
+    """
     ax = _axes(ax)
     for name, result in studies.items():
         n = len(result.outcomes)

@@ -19,10 +19,17 @@ _FILL, _EDGE, _BONE, _CONTACT, _GROUND = "#b9cde4", "#33557a", "#8a8f99", "#c844
 
 
 def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float = 2.0) -> Any:
-    """Figure of `size` inches: bodies as hulls of their shapes, joints as lines between them, contacts as red balls.
+    """A small picture of a mechanism: bodies as hulls of their shapes, joints as lines, contacts as red balls.
 
-    q: coordinates (nq,), by default those of the neutral state. Bodies without a shape are drawn as lines from
-    their joint to those that they carry.
+    Bodies without a shape are drawn as lines from their joint to those that they carry.
+
+    Args:
+        mechanism: the mechanism.
+        q: (nq,) coordinates [m, rad] (default None: those of the neutral state).
+        size: edge of the figure [inch].
+
+    Returns:
+        A new square figure.
     """
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon

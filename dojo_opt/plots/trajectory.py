@@ -28,11 +28,22 @@ def trajectory(result: Any, figure: SubFigure, *, simulator: Simulator | None = 
 def trajectory(
     result: Any, figure: Figure | SubFigure | None = None, *, simulator: Simulator | None = None
 ) -> Figure | SubFigure:
-    """Four panels of a Trajectory or a plan: state, controls, contact forces, path of body and foot.
+    """Four panels of a motion: state, controls, contact forces, path of body and feet.
 
     A mechanism without contacts shows its velocities instead of their forces.
 
-    figure: draw on this one. simulator: needed for a result that was read from a file.
+    Args:
+        result: Trajectory, Plan or ClosedLoop.
+        figure: figure to draw on (default None: a new one).
+        simulator: simulator of the result, for one that was read from a file (default None: that of the result).
+
+    Returns:
+        The figure.
+
+    Raises:
+        TypeError: the result is none of these.
+        ValueError: the result does not know its simulator.
+        SimulationError: a step of a plan cannot be solved again, for its forces.
     """
     if figure is None:
         from matplotlib.figure import Figure
@@ -60,7 +71,7 @@ def state(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def velocities(m: Motion, ax: Axes) -> Axes:
-    """Joint velocities over time, each the mean of the step that led to its knot."""
+    """Joint velocities over time, each the mean over the step that led to its knot."""
     for label, values in zip(_labels(m.mechanism), m.x[:, m.mechanism.nq :].T, strict=True):
         ax.plot(m.time, values, label=label)
     return _finish(ax, f"velocities {units(m.mechanism, 'm/s', 'rad/s')}", "time [s]")
@@ -68,7 +79,7 @@ def velocities(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def controls(m: Motion, ax: Axes) -> Axes:
-    """Inputs over time, held over each knot."""
+    """Inputs over time, each held over its knot."""
     for k, name in enumerate(m.mechanism.input_names):
         ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
     return _finish(ax, f"inputs {input_units(m.mechanism)}", "time [s]")
@@ -76,7 +87,7 @@ def controls(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def contact_forces(m: Motion, ax: Axes) -> Axes:
-    """Mean normal force over each step of every contact with load, and the size of its friction force, dashed."""
+    """Mean normal force over each step of every loaded contact; the size of its friction force is dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
     for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
@@ -89,7 +100,7 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
 
 @panel
 def paths(m: Motion, ax: Axes) -> Axes:
-    """Paths, in the vertical plane of the motion, of the first body and of the feet; without feet, of all bodies."""
+    """Paths of the first body and of the feet in the vertical plane of the motion; without feet, of all bodies."""
     side = int(np.ptp(m.position[:, :, 1], axis=0).max() > np.ptp(m.position[:, :, 0], axis=0).max())
     names = m.mechanism.body_names
     feet = [c for c in m.mechanism.contacts if c.body != names[0]]
