@@ -30,21 +30,37 @@ def step(
     settle: float = 0.4,
     after: Gait | None = None,
 ) -> Gait:
-    """Reference of one step of the body `swinging` (by default the first foot) by `length` [m] along x.
+    """One step of a biped along x, so slow that the robot is in balance all the way.
 
-    So slow that the robot is in balance all the way: in `shift` seconds the centre of mass moves over the middle of the
-    other foot, in `swing` seconds the foot moves, rising by `step_height` [m], in `shift` seconds the centre of mass
-    moves between the feet, and for `settle` seconds nothing does. The base goes down during the first shift, to `lower`
-    [m] below the neutral state, and stays there. Joints that lead to no foot keep their neutral angles.
+    In `shift` seconds the centre of mass moves over the middle of the other foot, in `swing` seconds the foot moves, in
+    `shift` seconds the centre of mass moves between the feet, and for `settle` seconds nothing moves. The base goes
+    down during the first shift, and stays there. Joints that lead to no foot keep their neutral angles.
 
-    after: a gait at whose end the step begins; both are returned, as one. Three steps of Atlas in a row:
+    Feet are the bodies at the ends of the tree that have contacts: two, with three contacts or more each, or the ankles
+    would be free. Three steps of Atlas in a row:
 
         gait = None
         for foot, length in (("l_foot", 0.2), ("r_foot", 0.4), ("l_foot", 0.2)):
             gait = dojo.gaits.step(sim, swinging=foot, length=length, lower=0.1, after=gait)
 
-    Feet are the bodies at the ends of the tree that have contacts: two, with three contacts or more each, or the
-    ankles would be free. ValueError: they are not two, or a foot cannot reach its place.
+    Args:
+        sim: simulator of a biped on a floating base.
+        swinging: name of the body that swings (default None: the first foot).
+        length: displacement of the foot along x [m].
+        step_height: lift of the foot [m].
+        lower: distance of the base below the neutral state from the first shift on [m].
+        shift: duration of each shift of the weight [s].
+        swing: duration of the swing [s].
+        settle: time at rest at the end [s].
+        after: gait at whose end the step begins (default None: the step begins in the neutral state).
+
+    Returns:
+        The gait: that of `after`, then the step.
+
+    Raises:
+        TypeError: `after` is not a Gait.
+        ValueError: for an argument out of range, a robot that has not two feet, a foot that cannot reach its place, or
+            an `after` of another robot or time step.
     """
     for name, value in (("length", length), ("step_height", step_height), ("lower", lower)):
         checks.number(f"gaits.step({name}=...)", value)

@@ -27,32 +27,57 @@ _EVEN = 1e-4  # weight of small foot forces against the balance of the base
 class Gait:
     """A motion along the time steps of a simulator. It is a reference: feet and base agree, forces need not.
 
-    The velocity of row t is that of the interval from t - 1 to t, as in every state; x[0] has that of the interval
+    The velocity of row t is that of the interval from t - 1 to t, as in every state. x[0] has that of the interval
     before the motion, which for a periodic gait is the last one of a period.
+
+    Attributes:
+        name: name of the gait.
+        simulator: simulator of the robot.
+        time: (T + 1,) times of the rows [s].
+        x: (T + 1, nx) states.
+        feet: (T + 1, k, 3) centres of the feet, world axes [m].
+        contact: (T + 1, k) whether a foot is on the ground.
+        foot_names: names of the k contacts.
     """
 
     name: str
     simulator: Simulator
-    time: Array  # (T + 1,) [s]
-    x: Array  # (T + 1, nx)
-    feet: Array  # (T + 1, k, 3) centres of the feet [m]
-    contact: Booleans  # (T + 1, k) whether a foot is on the ground
-    foot_names: tuple[str, ...]  # names of the contacts
+    time: Array
+    x: Array
+    feet: Array
+    contact: Booleans
+    foot_names: tuple[str, ...]
 
     __repr__ = brief_repr
 
     def then(self, other: Gait) -> Gait:
-        """This motion, and after it `other`, which begins where this one ends."""
+        """This motion, followed by another one that begins where this one ends.
+
+        Args:
+            other: the motion that follows, of the same robot and time step.
+
+        Returns:
+            A gait of both motions; its name and simulator are those of this one.
+        """
         x, feet, contact = (np.concatenate([getattr(self, f), getattr(other, f)[1:]]) for f in ("x", "feet", "contact"))
         time = np.concatenate([self.time, self.time[-1] + other.time[1:]])
         return replace(self, time=time, x=x, feet=feet, contact=contact)
 
     def torques(self, *, iterations: int = 3) -> Array:
-        """(T, nu) inputs by inverse dynamics: they move the joints along the reference while the feet carry the robot.
+        """Inputs by inverse dynamics: they move the joints along the reference while the feet carry the robot.
 
         The generalised forces of the motion come from steps of the same mechanism in the air with an input on every
-        degree of freedom. Those of the base are balanced, as far as they can be, by small forces inside the friction
+        degree of freedom. Those of the base are balanced, as far as possible, by small forces inside the friction
         pyramids of the feet that are on the ground.
+
+        Args:
+            iterations: number of Newton iterations for the generalised forces.
+
+        Returns:
+            (T, nu) inputs [N, N m].
+
+        Raises:
+            ValueError: the reference cannot be followed at a step.
         """
         sim = self.simulator
         tau = self._generalised_forces(iterations)

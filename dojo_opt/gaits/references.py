@@ -33,57 +33,153 @@ _KEYWORDS = "speed period duty lateral heading_rate cycles step_height height fo
 
 
 def trot(sim: Simulator, *, speed: float = 0.2, period: float = 1.0, duty: float = 0.5, **gait: Any) -> Gait:
-    """A trot: diagonal feet together. Keywords of all periodic gaits:
+    """A trot: diagonal feet together.
 
-    speed, lateral [m/s]   of the base, forward and to the left
-    heading_rate [rad/s]   positive turns left
-    period [s]             a whole number of time steps
-    duty                   share of the period that a foot is on the ground
-    cycles                 number of periods
-    step_height [m]        lift of a swinging foot
-    height [m]             of the base, on average; default: that of the neutral state
-    footholds (k, 2) [m]   from the base in the middle of a stance, forward and to the left; default: as in the neutral
-                           state
-    tilt [rad]             largest roll and pitch of the base due to the change of its feet
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        speed: forward speed of the base [m/s].
+        period: length of a cycle, a whole number of time steps [s].
+        duty: share of the period that a foot is on the ground, between 0 and 1.
+        **gait: keywords that all periodic gaits have:
+
+            lateral        speed of the base to the left [m/s] (default 0)
+            heading_rate   rate of turning, positive to the left [rad/s] (default 0)
+            cycles         number of periods (default 2)
+            step_height    lift of a swinging foot [m] (default 0.05)
+            height         height of the base, on average [m] (default None: that of the neutral state)
+            footholds      (k, 2) places of the feet from the base in the middle of a stance, forward and to the left
+                           [m] (default None: those of the neutral state)
+            tilt           largest roll and pitch of the base due to the change of its feet [rad] (default 0.2)
 
     Returns:
-        Gait with states and contact schedule.
+        The gait: states and contact schedule, one row per time step.
 
     Raises:
-        ValueError: a foot cannot reach its place, or a joint would exceed its limits.
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, or a joint
+            that would exceed its limits.
     """
     return _periodic(sim, "trot", _TROT, speed=speed, period=period, duty=duty, **gait)
 
 
 def pace(sim: Simulator, *, speed: float = 0.2, period: float = 0.4, duty: float = 0.5, **gait: Any) -> Gait:
-    """A pace: feet of the same side together; keywords as for `trot`."""
+    """A pace: feet of the same side together.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        speed: forward speed of the base [m/s].
+        period: length of a cycle, a whole number of time steps [s].
+        duty: share of the period that a foot is on the ground, between 0 and 1.
+        **gait: keywords of all periodic gaits, see `trot`.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: as for `trot`.
+    """
     return _periodic(sim, "pace", _PACE, speed=speed, period=period, duty=duty, **gait)
 
 
 def bound(
     sim: Simulator, *, speed: float = 0.5, period: float = 0.36, duty: float = 1 / 3, tilt: float = 0.4, **gait: Any
 ) -> Gait:
-    """A bound: hind feet, flight (for duty < 0.5), front feet, flight; keywords as for `trot`."""
+    """A bound: hind feet, flight (for duty < 0.5), front feet, flight.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        speed: forward speed of the base [m/s].
+        period: length of a cycle, a whole number of time steps [s].
+        duty: share of the period that a foot is on the ground, between 0 and 1.
+        tilt: largest roll and pitch of the base due to the change of its feet [rad].
+        **gait: keywords of all periodic gaits, see `trot`.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: as for `trot`.
+    """
     return _periodic(sim, "bound", _BOUND, speed=speed, period=period, duty=duty, tilt=tilt, **gait)
 
 
 def walk(sim: Simulator, *, speed: float = 0.1, period: float = 1.0, duty: float = 0.75, **gait: Any) -> Gait:
-    """A walk: left hind, left front, right hind, right front foot; keywords as for `trot`."""
+    """A walk: left hind, left front, right hind, right front foot.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        speed: forward speed of the base [m/s].
+        period: length of a cycle, a whole number of time steps [s].
+        duty: share of the period that a foot is on the ground, between 0 and 1.
+        **gait: keywords of all periodic gaits, see `trot`.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: as for `trot`.
+    """
     return _periodic(sim, "walk", _WALK, speed=speed, period=period, duty=duty, **gait)
 
 
 def hop(sim: Simulator, *, speed: float = 0.0, period: float = 0.5, duty: float = 0.5, **gait: Any) -> Gait:
-    """A hop: all feet together; keywords as for `trot`."""
+    """A hop: all feet together.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        speed: forward speed of the base [m/s].
+        period: length of a cycle, a whole number of time steps [s].
+        duty: share of the period that a foot is on the ground, between 0 and 1.
+        **gait: keywords of all periodic gaits, see `trot`.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: as for `trot`.
+    """
     return _periodic(sim, "hop", _HOP, speed=speed, period=period, duty=duty, **gait)
 
 
 def turn(sim: Simulator, *, heading_rate: float = 0.5, period: float = 0.5, **gait: Any) -> Gait:
-    """A trot that turns, by default on the spot; keywords as for `trot`."""
+    """A trot that turns, by default on the spot.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        heading_rate: rate of turning, positive to the left [rad/s].
+        period: length of a cycle, a whole number of time steps [s].
+        **gait: `speed` (default 0), `duty`, and keywords of all periodic gaits, see `trot`.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator, or a keyword is unknown.
+        ValueError: as for `trot`.
+    """
     return trot(sim, **{"speed": 0.0, **gait}, heading_rate=heading_rate, period=period)
 
 
 def stand(sim: Simulator, *, duration: float = 1.0, height: float | None = None) -> Gait:
-    """Stand for `duration` [s] with the feet below those of the neutral state and the base at `height` [m]."""
+    """A robot that stands still, its feet below those of the neutral state.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        duration: length of the motion, a whole number of time steps [s].
+        height: height of the base [m] (default None: that of the neutral state).
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator.
+        ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, or a joint
+            that would exceed its limits.
+    """
     _check_legs("gaits.stand", sim)
     steps = _whole("gaits.stand(duration=...)", duration, sim.time_step)
     feet, ground = Feet(sim), _ground(sim)
@@ -104,10 +200,27 @@ def jump(
     before: float = 0.3,
     after: float = 0.4,
 ) -> Gait:
-    """A jump from standing to standing `distance` [m] ahead; the base rises by `height` [m].
+    """A jump from standing to standing.
 
-    The base sinks by `crouch` [m] within `before` [s], is pushed at constant acceleration back to where it stood, flies
-    with its feet drawn in by `clearance` [m], and comes to rest in the same way, within `after` [s].
+    The base sinks within `before`, is pushed at constant acceleration back to where it stood, flies with its feet drawn
+    in, and comes to rest in the same way, within `after`.
+
+    Args:
+        sim: simulator of a robot with legs on a floating base.
+        distance: displacement along x [m].
+        height: rise of the base over its first height [m], above 0.
+        crouch: drop of the base before the push [m], above 0.
+        clearance: distance by which the feet are drawn in during the flight [m].
+        before: time in which the base sinks [s], above 0.
+        after: time in which the base comes to rest [s], above 0.
+
+    Returns:
+        The gait: states and contact schedule, one row per time step.
+
+    Raises:
+        TypeError: `sim` is not a Simulator.
+        ValueError: for an argument out of range, a robot without legs, a foot that cannot reach its place, or a joint
+            that would exceed its limits.
     """
     call = "gaits.jump"
     _check_legs(call, sim)

@@ -20,12 +20,25 @@ __all__ = ["block", "hop", "swingup"]
 
 
 def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.5, **model: Any) -> Problem:
-    """Raibert's hopper jumps from rest to `target` [m] (x, y from its start) in one second, 20 knots of 50 ms.
+    """Raibert's hopper jumps from rest to rest in one second, 20 knots of 50 ms.
 
-    A knot is one step of 50 ms, or `substeps` shorter ones. Knots 0 to 9 track the target `height` above the ground it
-    stands on, the others the target itself; squares of position weigh 1, attitude .1, leg 1, velocity and angular
-    velocity .01, leg rate .01, and impulses .01 per (N s)^2. At the end the pose is a constraint. The guess is the leg
-    force that balances the weight.   Howell et al. 2022, Dojo, hopper example.
+    Knots 0 to 9 track `height` above the ground that the hopper stands on, the others the target itself. Squares of
+    position weigh 1, attitude .1, leg 1, velocity and angular velocity .01, leg rate .01, and impulses .01 per (N s)^2.
+    At the end the pose is a constraint. The guess is the leg force that balances the weight.   Howell et al. 2022,
+    Dojo, hopper example.
+
+    Args:
+        target: (2,) displacement along x and y [m].
+        substeps: time steps per knot.
+        height: height of the first half of the reference above the standing robot [m].
+        **model: parameters of `models.raiberthopper`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown parameter of the model.
+        ValueError: for an argument of the wrong shape or out of range.
     """
     knot, horizon = 0.05, 20
     place = np.array(checks.vector("problems.hop(target=...)", target, 2))
@@ -54,11 +67,23 @@ def hop(target: ArrayLike = (0.5, 0.5), *, substeps: int = 1, height: float = 0.
 
 
 def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Problem:
-    """A half-metre cube of 1 kg is brought from rest on the ground to rest one metre to the right, or one metre up.
+    """A half-metre cube of 1 kg moves from rest on the ground to rest one metre to the right, or one metre up.
 
-    Ten knots of 0.1 s, three forces at the centre, zero at first: "up" has no gradient there without smoothing. Half of
-    the squares of position, velocity and angular velocity, a quarter of that for the rotation vector, and 1e-2 per N^2;
-    the full state at the end is a constraint.
+    Ten knots of 0.1 s, three forces at the centre. They are zero at first: without smoothing, "up" has no gradient
+    there. Half of the squares of position, velocity and angular velocity, a quarter of that for the rotation vector,
+    and 1e-2 per N^2 are the cost. The full state at the end is a constraint.
+
+    Args:
+        goal: "right" or "up".
+        friction: coefficient of friction of the corners.
+        **model: further parameters of `models.block`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown parameter of the model.
+        ValueError: for another goal, or a parameter out of range.
     """
     shifts = {"right": (1.0, 0.0, 0.0), "up": (0.0, 0.0, 1.0)}
     if goal not in shifts:
@@ -73,10 +98,20 @@ def block(goal: str = "right", *, friction: float = 0.5, **model: Any) -> Proble
 
 
 def swingup(name: str = "cartpole") -> Problem:
-    """Pendulum, cart-pole or acrobot from hanging at rest to upright at rest, which is a constraint.
+    """A pendulum, cart-pole or acrobot swings from hanging at rest to upright at rest, which is a constraint.
 
-    pendulum: 51 states, 50 ms, |torque| <= 200 N m, weights .1 and .01. cartpole: 26 states, 100 ms, .1 and .001.
-    acrobot: 51 states, 100 ms, .1 on the velocities and .1 on the torque.
+        pendulum   51 states, 50 ms, |torque| <= 200 N m; squares of the state weigh .1, of the torque .01
+        cartpole   26 states, 100 ms; .1 and .001
+        acrobot    51 states, 100 ms; .1 on the velocities and .1 on the torque
+
+    Args:
+        name: "pendulum", "cartpole" or "acrobot".
+
+    Returns:
+        The problem.
+
+    Raises:
+        ValueError: for another name.
     """
     weight: ArrayLike
     if name == "pendulum":

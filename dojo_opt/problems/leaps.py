@@ -34,19 +34,36 @@ def leap(
     refinement: int = 5,
     **model: Any,
 ) -> Problem:
-    """The quadruped gets `distance` [m] ahead from rest, its base rising by `height` [m]: no gait, no contact sequence.
+    """The quadruped leaps ahead from rest, with neither a gait nor a contact sequence to follow.
 
-    As in `hop`, the cost asks for a few poses: for a fifth of `duration` [s] the standing one lowered by `crouch` [m],
-    for two fifths that half-way to the goal, `height` up, then that at the goal. Squares of place weigh 1, 1, 20,
-    attitude 2, angles .05 per second, the rest as in `follow`, and the pose of the base at the end is a constraint. The
-    guess is a robot that stands still, at the smoothing of the planner's first stage: states and torques. Its torques
-    alone are not a guess: under them it has fallen on its back at the end, and plans that begin there may stay there.
+    As in `hop`, the cost asks for a few poses: for a fifth of `duration` the standing one lowered by `crouch`, for two
+    fifths the one half-way to the goal, `height` up, then the one at the goal. Squares of place weigh 1, 1, 20,
+    attitude 2, angles .05 per second, the rest as in `follow`. The pose of the base at the end is a constraint. The
+    guess is a robot that stands still at the smoothing of the planner's first stage: states and torques. Torques alone
+    are not a guess: under them the robot has fallen on its back at the end, and plans that begin there may stay there.
 
-    Legs that push from where they stand reach their torque limits below .27 m: hence the crouch, which no planner finds
-    from a goal that is up. `ilqr` ends with every step cut into `refinement`, since most leaps planned with steps of
-    20 ms stumble at their landing in shorter ones, and there the height is a constraint, too: half-way between the
-    crouch and the landing the base is that much higher than at first, or the plan fails. With refinement=1, the
-    plan may miss the height by some centimetres.
+    Legs that push from the standing pose reach their torque limits below .27 m. Hence the crouch, which no planner
+    finds from a goal that is up. Most leaps planned with steps of 20 ms stumble at their landing in shorter ones, hence
+    the refinement. In the refined problem the height is a constraint, too: half-way between the crouch and the landing
+    the base is that much higher than at first, or the plan fails.
+
+    Args:
+        distance: displacement along x [m].
+        height: rise of the base [m].
+        duration: length of the motion [s].
+        crouch: drop of the base before the leap [m], at least 0.
+        damping: damper of the joints [N m s/rad].
+        time_step: length of a knot [s].
+        refinement: number of parts of every time step in the second half of `ilqr`; with 1, the plan may miss the
+            height by some centimetres.
+        **model: further parameters of `models.quadruped`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown parameter of the model.
+        ValueError: for an argument out of range.
     """
     call = "problems.leap"
     distance = checks.number(f"{call}(distance=...)", distance)

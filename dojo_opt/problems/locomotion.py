@@ -43,17 +43,31 @@ def follow(
     effort: float = EFFORT,
     periodic: bool = False,
 ) -> Problem:
-    """Follow a gait; place and attitude of the base at its end are constraints.
+    """Follow a gait to its final pose.
 
-    A knot spans `substeps` time steps of the gait. guess: "reference" starts from the states of the gait and its
-    torques by inverse dynamics, whose gaps the solve closes; "standing" from a robot that stands
-    still, in equilibrium at the smoothing of the planner's first stage. Weights are per second, of
-    squares: place [1/m^2] along x, y, z, attitude [1/rad^2] and effort [1/(N m)^2]; angles weigh .2, velocities of the
-    base .01, joint rates .001.
+    The cost tracks the states of the gait: squares of joint angles weigh .2, velocities of the base .01, joint rates
+    .001, all per second. Place and attitude of the base at the end are constraints.
 
-    periodic: instead of a start at the first state of the gait and a goal, the start is free except its place along x
-    and y and its heading, and the end must equal the start plus the displacement of the gait over one period. The
-    gains of the plan are periodic, and `plan.repeated(5)` continues the walk.
+    Args:
+        gait: the gait, with its simulator.
+        guess: "reference" begins with the states of the gait and its torques by inverse dynamics, whose gaps the solve
+            closes; "standing" with a robot that stands still, in equilibrium at the smoothing of the planner's first
+            stage.
+        substeps: time steps of the gait per knot; their number is a multiple of it.
+        control_limits: (lower, upper), numbers or (nu,) [N m]; None for no limits.
+        place: weight of squares of the base's place, a number or (3,) along x, y, z [1/(m^2 s)].
+        attitude: weight of squares of the base's attitude [1/(rad^2 s)].
+        effort: weight of squares of the inputs [1/((N m)^2 s)].
+        periodic: whether the end must equal the start plus the displacement of the gait over one period, instead of a
+            fixed start and a goal. The start is then free except its place along x and y and its heading. The gains of
+            the plan are periodic, and `plan.repeated(5)` continues the walk.
+
+    Returns:
+        The problem.
+
+    Raises:
+        ValueError: for an argument out of range, a gait that cannot be followed or, with `periodic`, one that does not
+            end as it began.
     """
     sim = gait.simulator
     checks.one_of("problems.follow(guess=...)", guess, ("reference", "standing"))
@@ -124,14 +138,30 @@ def trot(
     time_step: float = 0.05,
     **settings: Any,
 ) -> Problem:
-    """A quadruped of the A1's size trots at `speed` [m/s] for two periods of one second, 40 knots of 50 ms.
+    """A quadruped of the A1's size trots for two periods of one second, 40 knots of 50 ms.
 
-    With periodic=True a plan is one period long, unless `cycles` is given.
     The defaults are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), friction of
-    .8, and less damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of
-    the base at the end is a constraint, torques are limited to 33.5 N m. speed=0 trots on the spot.
+    .8, and less damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of the
+    base at the end is a constraint. Torques are limited to 33.5 N m.
 
-    settings: of `gaits.trot` (period, duty, cycles, heading_rate, ...), of `follow` (guess, ...), friction.
+    Args:
+        speed: forward speed [m/s]; 0 trots on the spot.
+        damping: damper of the joints [N m s/rad].
+        step_height: lift of a swinging foot [m].
+        height: height of the base, on average [m]; None for that of the neutral state.
+        footholds: (4, 2) places of the feet FR, FL, RR, RL from the base, forward and to the left [m]; None for those
+            of the neutral state.
+        time_step: length of a knot [s].
+        **settings: further arguments of `gaits.trot` (period, duty, cycles, heading_rate, ...) and of `follow` (guess,
+            periodic, ...), and `friction` and `contacts` of `models.quadruped`. With periodic=True a plan is one period
+            long, unless `cycles` is given.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
     """
     return _quadruped(
         gaits.trot,
@@ -146,27 +176,81 @@ def trot(
 
 
 def turn(*, heading_rate: float = 0.5, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
-    """The quadruped turns on the spot at `heading_rate` [rad/s], trotting; settings as for `trot`."""
+    """The quadruped turns on the spot, trotting.
+
+    Args:
+        heading_rate: rate of the turn [rad/s]; positive turns left.
+        damping: damper of the joints [N m s/rad].
+        time_step: length of a knot [s].
+        **settings: further arguments of `gaits.turn` and of `follow`, and of the model, as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
+    """
     return _quadruped(gaits.turn, time_step, damping, settings, heading_rate=heading_rate)
 
 
 def pace(*, speed: float = 0.2, damping: float = 0.5, time_step: float = 0.02, **settings: Any) -> Problem:
-    """The quadruped paces at `speed` [m/s], both feet of a side together; settings as for `trot`."""
+    """The quadruped paces, both feet of a side together.
+
+    Args:
+        speed: forward speed [m/s].
+        damping: damper of the joints [N m s/rad].
+        time_step: length of a knot [s].
+        **settings: further arguments of `gaits.pace` and of `follow`, and of the model, as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
+    """
     return _quadruped(gaits.pace, time_step, damping, settings, speed=speed)
 
 
 def walk(*, speed: float = 0.1, damping: float = 0.5, time_step: float = 0.05, **settings: Any) -> Problem:
-    """The quadruped walks at `speed` [m/s], one foot after the other; settings as for `trot`."""
+    """The quadruped walks, one foot after the other.
+
+    Args:
+        speed: forward speed [m/s].
+        damping: damper of the joints [N m s/rad].
+        time_step: length of a knot [s].
+        **settings: further arguments of `gaits.walk` and of `follow`, and of the model, as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
+    """
     return _quadruped(gaits.walk, time_step, damping, settings, speed=speed)
 
 
 def bound(
     *, speed: float = 0.5, damping: float = 0.5, step_height: float = 0.08, time_step: float = 0.02, **settings: Any
 ) -> Problem:
-    """The quadruped bounds at `speed` [m/s]: hind feet, flight, front feet, flight; settings as for `trot`.
+    """The quadruped bounds: hind feet, flight, front feet, flight.
 
-    A foot that swings by less than the default `step_height` [m] is so low at the beginning and the end of its swing
-    that plans drag it instead of flying.
+    Args:
+        speed: forward speed [m/s].
+        damping: damper of the joints [N m s/rad].
+        step_height: lift of a swinging foot [m]. With less than the default, a foot is so low at the beginning and the
+            end of its swing that plans drag it instead of flying.
+        time_step: length of a knot [s].
+        **settings: further arguments of `gaits.bound` and of `follow`, and of the model, as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
     """
     return _quadruped(gaits.bound, time_step, damping, settings, speed=speed, step_height=step_height)
 
@@ -180,11 +264,27 @@ def jump(
     refinement: int = 5,
     **settings: Any,
 ) -> Problem:
-    """The quadruped jumps `distance` [m] forward, its base rising by `height` [m]: standing, flight, standing.
+    """The quadruped jumps forward: standing, flight, standing.
 
-    settings: of `gaits.jump` (crouch, clearance, before, after), of `follow`, friction. Jumps planned with steps of
-    20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for `leap`, `ilqr` therefore ends
-    with every step divided by `refinement`, and jumps land within 4 mm. There the height at the top is a constraint.
+    Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
+    `leap`, `ilqr` therefore ends with divided steps, and jumps land within 4 mm. There the height at the top is a
+    constraint.
+
+    Args:
+        distance: displacement along x [m].
+        height: rise of the base [m].
+        damping: damper of the joints [N m s/rad].
+        time_step: length of a knot [s].
+        refinement: number of parts of every time step in the second half of `ilqr`; 1 for none.
+        **settings: further arguments of `gaits.jump` (crouch, clearance, before, after) and of `follow`, and of the
+            model, as for `trot`.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
     """
     problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
     tracking = problem.specs[0][0]
