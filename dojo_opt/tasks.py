@@ -38,9 +38,17 @@ class Hopping:
         stance  of `stance` [s]:  z = z0 - d sin(pi s / stance),  the foot stands half-way along the path of the body
         flight  of 2 v / g:       z = z0 + v s - g s^2 / 2,       the foot swings ahead,  v = sqrt(2 g height)
 
-    d = v stance / pi makes the velocity continuous. The body moves at the constant velocity (vx, vy) [m/s] throughout.
-    It leans as the line from the foot to it does: the leg is fixed to it, and a body kept upright drags its foot.
-    start: (15,) the hopper stands upright, heading along x.
+    d = v stance / pi makes the velocity continuous. The body moves at a constant horizontal velocity throughout. It
+    leans as the line from the foot to it does: the leg is fixed to it, and a body kept upright drags its foot.
+
+    Args:
+        start: (15,) state of the hopper that stands upright, heading along x.
+        velocity: (2,) horizontal velocity of the body [m/s].
+        height: height of the hop over the standing robot [m].
+        stance: duration of the contact [s].
+
+    Raises:
+        ValueError: for an argument of the wrong shape or out of range, or a body that is not upright.
     """
 
     def __init__(self, start: ArrayLike, velocity: ArrayLike, height: float, stance: float) -> None:
@@ -96,14 +104,28 @@ class Hopping:
 def hopper_mpc(
     velocity: ArrayLike = (0.2, 0.0), height: float = 0.25, stance: float = 0.2, *, substeps: int = 5, **settings: Any
 ) -> MPC:
-    """Raibert's hopper hops `height` [m] at a velocity [m/s]: 20 knots of 50 ms, each of `substeps` steps of the model.
+    """Raibert's hopper hops along the ground: 20 knots of 50 ms.
 
     Squares of position weigh 100, attitude 20 (yaw 1), leg 15, velocities along x and y 4, the others .01, impulses
-    .001 per (N s)^2; inputs are limited to 50 N m, 50 N m, 500 N. settings: those of `MPC`.
+    .001 per (N s)^2. Inputs are limited to 50 N m, 50 N m, 500 N.
 
-    A push in flight costs more until the foot is down: a light leg weight lets it reach down early. The weight on
-    the velocity keeps the body from leaning further than friction holds on the way back. Impulses that weigh ten times
-    as much, beside positions that weigh a tenth, are spared at the top of the hop: it is 40 mm too low then.
+    A push in flight costs more until the foot is down: a light leg weight lets it reach down early. The weight on the
+    velocity keeps the body from leaning further than friction holds on the way back. Impulses that weigh ten times as
+    much, beside positions that weigh a tenth, are spared at the top of the hop: it is 40 mm too low then.
+
+    Args:
+        velocity: (2,) horizontal velocity of the body [m/s].
+        height: height of the hop [m].
+        stance: duration of the contact [s].
+        substeps: steps of the model per knot.
+        **settings: settings of `dojo.MPC`.
+
+    Returns:
+        The controller.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument of the wrong shape or out of range.
     """
     knot, horizon = 0.05, 20
     substeps = whole_number("tasks.hopper_mpc(substeps=...)", substeps)
@@ -133,15 +155,30 @@ def quadruped_mpc(
     substeps: int = 1,
     **settings: Any,
 ) -> MPC:
-    """The quadruped trots at a speed [m/s]: 20 knots of 40 ms, the ground learnt from the feet that stand.
+    """The quadruped trots: 20 knots of 40 ms, with the ground learnt from the standing feet.
 
-    Tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the trunk weigh
-    10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2; torques are limited to 33.5 N m.
-    damper [N m s/rad] is that of the joints, of model and plant. With 0.05 it trots, too, but of 20 runs with pushes of
-    5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
-    terrain: that the model knows, whose height under the base is added to that of the reference; level ground without.
-    settings: those of `MPC`; kappa is 1e-3 here, where feet feel the ground before they touch it, and plans count on a
+    The cost tracks the gait of `gaits.trot` with its torques as reference. Squares of position and attitude of the
+    trunk weigh 10, of joint angles 1, of velocities .1 and .01, of the torques 1e-4 per (N m)^2. Torques are limited to
+    33.5 N m. Plans are made at a kappa of 1e-3, where feet feel the ground before they touch it. They count on a
     friction of .4 where the robot's feet have .8: the planned friction is available on slippery ground, too.
+
+    Args:
+        speed: forward speed [m/s].
+        period: duration of a cycle of the gait [s].
+        step_height: lift of a swinging foot [m].
+        damper: damper of the joints of model and plant [N m s/rad]. With 0.05 the robot trots, too, but of 20 runs with
+            pushes of 5 to 8 N s, payload, low friction and slope at once 5 fell, and none with 0.5.
+        terrain: ground that the model knows; its height under the base is added to that of the reference (default None:
+            level ground).
+        substeps: steps of the model per knot.
+        **settings: settings of `dojo.MPC`.
+
+    Returns:
+        The controller.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, or a foot that cannot reach its place.
     """
     knot, horizon, limit = 0.04, 20, 33.5
     substeps = whole_number("tasks.quadruped_mpc(substeps=...)", substeps)
@@ -183,9 +220,20 @@ class _OnTerrain:
 
 
 def plant(mpc: MPC, time_step: float = 1e-3, kappa: float = 1e-8, **perturbation: Any) -> Plant:
-    """The plant of an MPC: its problem's simulator with a time step [s] and kappa [N s m] of its own, perturbed.
+    """The plant of an MPC: the simulator of its problem with a time step and kappa of its own, perturbed.
 
-    perturbation: fields of `dojo.Perturbation` by name.
+    Args:
+        mpc: the controller.
+        time_step: time step of the plant [s].
+        kappa: central-path parameter of the plant [N s m].
+        **perturbation: fields of `dojo.Perturbation` by name.
+
+    Returns:
+        The plant, which starts where the problem does.
+
+    Raises:
+        TypeError: `mpc` is not an MPC, or for an unknown field.
+        ValueError: for an argument out of range.
     """
     if not isinstance(mpc, MPC):
         raise TypeError(f"tasks.plant(mpc): expected an MPC, got {mpc!r}")

@@ -28,12 +28,12 @@ class Entry:
 
     name: str
     bodies: int
-    nq: int  # coordinates
-    nv: int  # degrees of freedom
-    nu: int  # inputs
+    nq: int
+    nv: int
+    nu: int
     contacts: int
-    limits: int  # bounds of joints
-    mass: float  # [kg]
+    limits: int
+    mass: float
     what: str
     builder: Callable[..., Mechanism] = field(repr=False)
 

@@ -31,9 +31,18 @@ _SHORT = 20  # characters of a number with its unit or bound: not broken into li
 
 
 def write_page(reports: Mapping[str, Report], folder: Path, command: str) -> list[Path]:
-    """report.html, report.md, report.json and NAME.png for every report with a figure; returns the files.
+    """Write reports as one page: report.html, report.md, report.json, and NAME.png for every report with a figure.
 
-    reports: by the name of their study.  OSError: the folder cannot be written.
+    Args:
+        reports: the reports by the names of their studies, at least one.
+        folder: folder of the files, made if it is missing.
+        command: command that reproduces the page.
+
+    Returns:
+        Paths of the files.
+
+    Raises:
+        OSError: the folder cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pictures = {name: _png(report) for name, report in reports.items() if report.figure is not None}

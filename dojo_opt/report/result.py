@@ -19,13 +19,22 @@ _PACKAGES = ("dojo-opt", "numba", "numpy", "scipy", "mujoco", "drake", "pybullet
 
 @dataclass(frozen=True)
 class Row:
-    """One measured number, and the bar it is held against."""
+    """One measured number, and the bar for it.
+
+    Attributes:
+        name: the measured quantity.
+        value: the number.
+        unit: its unit.
+        bar: the bar (default None: the number is reported, not judged).
+        at_least: whether the value has to reach the bar instead of staying below it (default False).
+        note: a remark (default none).
+    """
 
     name: str
     value: float
     unit: str
-    bar: float | None = None  # None: reported, not judged
-    at_least: bool = False  # the value has to reach the bar instead of staying below it
+    bar: float | None = None
+    at_least: bool = False
     note: str = ""
 
     @property
@@ -37,13 +46,23 @@ class Row:
 
     @property
     def bound(self) -> str:
-        """The bar with its direction."""
+        """The bar with its direction, as text; empty without a bar."""
         return "" if self.bar is None else f"{'>=' if self.at_least else '<='} {self.bar:.4g}"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers side by side: one row per case, one column per engine, or setting."""
+    """Numbers side by side: one row per case, one column per engine or setting.
+
+    Attributes:
+        title: title of the table.
+        header: names of the columns.
+        rows: cells, as many per row as there are columns.
+        note: a remark (default none).
+
+    Raises:
+        ValueError: a row has another number of cells.
+    """
 
     title: str
     header: Sequence[str]
@@ -58,34 +77,62 @@ class Table:
 
 @dataclass
 class Report:
-    """The results of one study, with its machine and command."""
+    """The results of one study, with its machine and command.
+
+    Attributes:
+        title: title of the study.
+        command: command that reproduces it; `run_report` writes it.
+        rows: measured numbers with their bars.
+        tables: further numbers.
+        details: every raw number.
+        notes: remarks.
+        machine: processor, cores, load and versions (default: those of this machine).
+        summary: the subject, and its reference.
+        figure: a matplotlib Figure (default None).
+    """
 
     title: str
-    command: str = ""  # run_report writes it
+    command: str = ""
     rows: list[Row] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
-    details: dict[str, Any] = field(default_factory=dict)  # every raw number
+    details: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     machine: dict[str, Any] = field(default_factory=lambda: machine())
-    summary: str = ""  # the subject, and its reference
-    figure: Any = None  # a matplotlib Figure
+    summary: str = ""
+    figure: Any = None
 
     def met(self) -> bool:
-        """Whether no bar was missed."""
+        """Whether no bar was missed.
+
+        Returns:
+            True if every row meets its bar or has none.
+        """
         return all(row.met is not False for row in self.rows)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything but the figure, raw numbers included."""
+        """The report as a dictionary.
+
+        Returns:
+            Everything but the figure, raw numbers included.
+        """
         rows = [{**asdict(row), "met": row.met} for row in self.rows]
         fields = {name: getattr(self, name) for name in ("title", "command", "summary", "details", "notes", "machine")}
         return {**fields, "rows": rows, "tables": [asdict(table) for table in self.tables], "met": self.met()}
 
     def as_json(self) -> str:
-        """Everything but the figure, as JSON; infinities and NaN as strings, which JSON has no numbers for."""
+        """The report as JSON.
+
+        Returns:
+            Text of everything but the figure. Infinities and NaN, for which JSON has no numbers, are strings.
+        """
         return json.dumps(finite(self.as_dict()), indent=1)
 
     def as_text(self) -> str:
-        """Aligned tables."""
+        """The report as aligned tables.
+
+        Returns:
+            Text of several lines.
+        """
         lines = [self.title, "", *([self.summary, ""] if self.summary else [])]
         if self.rows:
             cells = [(r.name, f"{r.value:.4g} {r.unit}", r.bound, verdict(r.met), r.note) for r in self.rows]

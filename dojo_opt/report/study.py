@@ -31,7 +31,11 @@ STUDIES: Studies = {
 
 
 class Progress:
-    """A bar on a terminal, one line per item elsewhere; silent without a stream."""
+    """A bar on a terminal, one line per item elsewhere.
+
+    Args:
+        stream: text stream to write to (default None: silent).
+    """
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream
@@ -58,12 +62,23 @@ class Progress:
 
 
 class ReportStudy(Protocol):
-    """A study is a dataclass whose fields are its settings: `quick`, for most of them `mechanism`, and others."""
+    """A study is a dataclass whose fields are its settings: `quick`, for most of them `mechanism`, and others.
 
-    quick: bool  # fewer and shorter scenes: a check that it runs
+    Attributes:
+        quick: whether scenes are fewer and shorter, as a check that the study runs.
+    """
+
+    quick: bool
 
     def run(self, progress: Progress) -> Report:
-        """Measure."""
+        """Measure.
+
+        Args:
+            progress: display of the progress.
+
+        Returns:
+            The report.
+        """
         ...
 
 
@@ -73,13 +88,16 @@ def study(
     """Make a study.
 
     Args:
-        name: A key of `studies`.
-        quick: Fewer and shorter scenes.
-        mechanism: The robot to measure; None for the scenes of the study, or, in a study of one robot, the quadruped.
-        studies: Known studies; those of one robot by default.
+        name: key of `studies`.
+        quick: whether scenes are fewer and shorter.
+        mechanism: robot to measure (default None: the scenes of the study, or, in a study of one robot, the quadruped).
+        studies: known studies (default: those of one robot).
+
+    Returns:
+        The study; its `run` measures.
 
     Raises:
-        ValueError: The study does not exist, or does not take a mechanism.
+        ValueError: the study does not exist, or does not take a mechanism.
     """
     if name not in studies:
         raise ValueError(f"report: no report {name!r}; there are {', '.join(studies)}")
@@ -103,7 +121,21 @@ def run_report(
     verbose: bool = False,
     studies: Studies = STUDIES,
 ) -> Report:
-    """Run the study of that name; verbose shows a progress bar on stderr. Arguments as in `study`."""
+    """Run one study.
+
+    Args:
+        name: key of `studies`.
+        quick: whether scenes are fewer and shorter.
+        mechanism: robot to measure (default None: as in `study`).
+        verbose: whether to show a progress bar on stderr.
+        studies: known studies (default: those of one robot).
+
+    Returns:
+        The report.
+
+    Raises:
+        ValueError: the study does not exist, or does not take a mechanism.
+    """
     made = study(name, quick=quick, mechanism=mechanism, studies=studies)
     report = made.run(Progress(sys.stderr if verbose else None))
     report.command = f"dojo-opt report {name}{' --quick' if quick else ''}"  # the command line replaces it
@@ -118,14 +150,21 @@ def run_reports(
     verbose: bool = False,
     studies: Studies = STUDIES,
 ) -> dict[str, Report]:
-    """Run several studies; arguments as in `study`.
+    """Run several studies.
+
+    Args:
+        names: keys of `studies`.
+        quick: whether scenes are fewer and shorter.
+        mechanism: robot to measure (default None: as in `study`).
+        verbose: whether to show a progress bar on stderr.
+        studies: known studies (default: those of one robot).
 
     Returns:
-        The reports by name. Of several studies, one that fails gives a report of its error: its only bar is
-        missed, and its details have the "error".
+        The reports by name. If one of several studies fails, its report has the error: its only bar is missed, and its
+        details have the "error".
 
     Raises:
-        Exception: Whatever a single study raises.
+        Exception: whatever a single study raises.
     """
     reports: dict[str, Report] = {}
     for name in names:
