@@ -16,6 +16,7 @@ from dojo_opt.planning.term import (
     Pick,
     PickTerm,
     ResidualTerm,
+    Spec,
     StateTerm,
     Term,
     knot_list,
@@ -32,10 +33,13 @@ __all__ = ["ControlBounds", "Goal", "Periodic", "ResidualConstraint", "StateBoun
 
 
 @dataclass(frozen=True)
-class Goal:
-    """(x_t (-) target)_i = 0 for the chosen tangent components i (default all) at `knots` (default the last).
+class Goal(Spec):
+    """(x_t (-) target)_i = 0 for chosen tangent components i at chosen knots.
 
-    target: (nx,), or one row per knot. components: numbers, or names as in `Mechanism.components`: "base", "v knee".
+    Attributes:
+        target: (nx,) state, or one row per knot.
+        components: numbers of components, or names as in `Mechanism.components`: "base", "v knee" (default None: all).
+        knots: numbers of the knots; negative ones count from the end (default -1: the last).
     """
 
     target: ArrayLike
@@ -71,11 +75,17 @@ def _bounds(call: str, lower: ArrayLike, upper: ArrayLike, rows: int, chosen: In
 
 
 @dataclass(frozen=True)
-class StateBounds:
-    """lower <= component <= upper of chosen scalar tangent components (default all) at `knots` (default 1 to T).
+class StateBounds(Spec):
+    """lower <= component <= upper of chosen scalar tangent components at chosen knots.
 
-    lower, upper: scalars or one per component, infinite where free. components: numbers, or names as in
-    `Mechanism.components`: "base z", "v knee". A rotation by quaternion has no such bounds.
+    A rotation by quaternion has no such bounds.
+
+    Attributes:
+        lower: a number, one per component, or one row per knot; infinite where free [m, rad, m/s, rad/s].
+        upper: likewise.
+        components: numbers of components, or names as in `Mechanism.components`: "base z", "v knee" (default None:
+            all).
+        knots: numbers of the knots (default None: 1 to T).
     """
 
     lower: ArrayLike
@@ -101,11 +111,17 @@ class StateBounds:
 
 
 @dataclass(frozen=True)
-class ControlBounds:
-    """lower <= u_i <= upper for chosen controls (default all) at `knots` (default all), as a soft-to-hard constraint.
+class ControlBounds(Spec):
+    """lower <= u_i <= upper for chosen inputs at chosen knots, as a constraint that tightens with its penalty.
 
-    components: numbers or names of inputs.
-    `Problem(control_limits=...)` is exact at every iteration and usually better; use this to bound single knots.
+    `Problem(control_limits=...)` holds exactly at every iteration and is usually better. Use this one to bound single
+    knots.
+
+    Attributes:
+        lower: a number, one per input, or one row per knot; infinite where free [N, N m].
+        upper: likewise.
+        components: numbers or names of inputs (default None: all).
+        knots: numbers of the knots (default None: all T).
     """
 
     lower: ArrayLike
@@ -125,8 +141,17 @@ class ControlBounds:
 
 
 @dataclass(frozen=True)
-class ResidualConstraint:
-    """r(x_t, u_t) = 0, or r <= 0 with equality=False, for a compiled function of the user; see `ResidualCost`."""
+class ResidualConstraint(Spec):
+    """r(x_t, u_t) = 0, or r <= 0, for a function of the user, which is compiled; see `dojo.cost.ResidualCost`.
+
+    Attributes:
+        function: the residual, a function of x (nx,), u (nu,) and out (dimension,).
+        dimension: number of entries of the residual.
+        equality: whether r = 0; with False, r <= 0 (default True).
+        jacobian: function of x, u and out (dimension, ndx + nu), the derivative by the tangents (default None: central
+            differences on the manifold).
+        knots: numbers of the knots (default None: all T + 1).
+    """
 
     function: Callable[..., Any]
     dimension: int
@@ -145,10 +170,12 @@ class ResidualConstraint:
 
 
 @dataclass(frozen=True)
-class Periodic:
-    """(x_T (-) (x_0 (+) shift))_i = 0 for the chosen tangent components i (default all).
+class Periodic(Spec):
+    """(x_T (-) (x_0 (+) shift))_i = 0 for chosen tangent components i, in problems whose start is free.
 
-    shift: (ndx,) displacement over one period, zero in the rotations. For problems whose start is free.
+    Attributes:
+        shift: a number, or (ndx,) displacement over one period, zero in the rotations by quaternion (default 0).
+        components: numbers of components, or names as in `Mechanism.components` (default None: all).
     """
 
     shift: ArrayLike = 0.0

@@ -32,12 +32,18 @@ def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale:
 
 
 @dataclass(frozen=True)
-class Tracking:
-    """scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, tangent to the manifold: rotation vectors.
+class Tracking(Spec):
+    """Track states: scale * sum_t sum_i weight_ti (x_t (-) reference_t)_i^2, tangent to the manifold.
 
-    reference: (nx,), or one row per knot; weight: scalar, (ndx,), one row per knot, or a table by names as in
-    `Mechanism.components`, {"base": 10.0, "v": 0.1}, zero for components without a name in it; later names override
-    earlier ones. knots: default all T + 1.
+    Rotations by quaternion enter as rotation vectors.
+
+    Attributes:
+        reference: (nx,) state, or one row per knot.
+        weight: a number, (ndx,), or one row per knot [1 / square of the component's unit]; or a table by names as in
+            `Mechanism.components`, such as {"base": 10.0, "v": 0.1}. Components without a name in it weigh zero, and
+            later names override earlier ones.
+        knots: numbers of the knots (default None: all T + 1).
+        scale: factor of the whole cost (default 1).
     """
 
     reference: ArrayLike
@@ -56,10 +62,13 @@ class Tracking:
 
 
 @dataclass(frozen=True)
-class Effort:
-    """scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
+class Effort(Spec):
+    """Weigh inputs: scale * sum_t sum_i weight_ti (u_t - reference_t)_i^2.
 
-    weight: scalar, (nu,), (T, nu), or a table by names of inputs, per N^2 or (N m)^2; reference: (nu,) or (T, nu).
+    Attributes:
+        weight: a number, (nu,), (T, nu), or a table by names of inputs [1/N^2, 1/(N m)^2].
+        reference: (nu,) or (T, nu) inputs [N, N m] (default 0).
+        scale: factor of the whole cost (default 1).
     """
 
     weight: ArrayLike | Mapping[str, float]
@@ -79,14 +88,22 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class ResidualCost:
-    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a function of the user, which is compiled (see `dojo.kernel`):
+class ResidualCost(Spec):
+    """scale * sum_t sum_i weight_ti r_i(x_t, u_t)^2 for a function of the user, which is compiled (see `dojo.kernel`).
 
-        def residual(x, u, out): ...                          # out: (dimension,), all of it is to be written
+        def residual(x, u, out): ...                          # writes all of out, (dimension,)
 
-    jacobian(x, u, out) with out (dimension, ndx + nu) is optional; without it the derivative is a central difference on
-    the manifold. Either way the loop over the knots is compiled once per process (about a second), because Numba cannot
-    cache a loop around a function that it is given. At the final knot u is zero. x and u are read-only.
+    The loop over the knots is compiled once per process (about a second), because Numba cannot cache a loop around a
+    function that it is given. At the final knot u is zero. x and u are read-only.
+
+    Attributes:
+        function: the residual, a function of x (nx,), u (nu,) and out (dimension,).
+        dimension: number of entries of the residual.
+        weight: a number, (dimension,), or one row per knot (default 1).
+        jacobian: function of x, u and out (dimension, ndx + nu), the derivative by the tangents (default None: central
+            differences on the manifold).
+        knots: numbers of the knots (default None: all T + 1).
+        scale: factor of the whole cost (default 1).
     """
 
     function: Callable[..., Any]

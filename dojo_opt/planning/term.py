@@ -23,10 +23,22 @@ _ROUNDED = 1e-12  # below, it is as near to one as sums get
 
 
 class Spec(Protocol):
-    """A cost or constraint as a user writes it."""
+    """A cost or a constraint as a user writes it."""
 
     def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
-        """The same for one simulator and horizon, with its arrays."""
+        """The term of one simulator and horizon, with its arrays; `Problem` calls it.
+
+        Args:
+            sim: the simulator.
+            horizon: number T of knots.
+            layout: (ndx,) address in x of every tangent component; negative for rotations by quaternion.
+
+        Returns:
+            The term.
+
+        Raises:
+            ValueError: a field has the wrong shape, an unknown name, or a knot beyond the horizon.
+        """
         ...
 
 
