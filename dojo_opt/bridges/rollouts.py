@@ -30,7 +30,12 @@ def _threads(process: int) -> ThreadPoolExecutor:
 
 
 class Functions(NamedTuple):
-    """The functions of a bridge: step(x, u, theta=None) -> x (nx,), rollout(x0, us, theta=None) -> xs (T + 1, nx)."""
+    """The functions of a bridge.
+
+    Attributes:
+        step: step(x, u, theta=None) -> (nx,) next state.
+        rollout: rollout(x0, us, theta=None) -> (T + 1, nx) states.
+    """
 
     step: Callable[..., Any]
     rollout: Callable[..., Any]

@@ -31,21 +31,26 @@ class _ParameterGroup(NamedTuple):
 
 
 class ParameterSpace:
-    """A fit moves in theta (n,), and makes simulators of it:
+    """Parameters of a simulator as one vector theta (n,), in which a fit moves:
 
         space = dojo.ParameterSpace(sim, ("friction:*", "damper"), bodies=("trunk",))
         def errors(theta): ... space.simulator(theta).rollout(x, us).x ...
         def slopes(theta): ... space.chain(theta, space.simulator(theta).linearize(x, u, wrt=space.wrt)) ...
         scipy.optimize.least_squares(errors, space.values, slopes, bounds=(space.low, space.high))
 
-    names    parameters, as in `Simulator.parameters`; they are their own coordinates
-    bodies   whose mass, centre of mass and inertia are fitted together, in ten coordinates of which every value is a
-             body (inertia_coordinates.py); `inertia` among the names instead may leave the set of physical bodies, and
-             then `simulator` raises a ValueError
-    bounds   {name or body coordinate: (low, high)}, within those that mechanisms have: masses, sizes, friction > 0,
-             springs, dampers, armatures, radii >= 0, restitution from 0 to 1
+    The attributes `labels`, `values`, `low` and `high` (n,) belong to theta; `values` are those of `sim`.
 
-    labels, values, low, high: of theta; values are those of `sim`.  ValueError: names that are not there, or twice.
+    Args:
+        sim: the simulator.
+        names: names of parameters, as in `Simulator.parameters`; they are their own coordinates.
+        bodies: names of bodies whose mass, centre of mass and inertia are fitted together, in ten coordinates of which
+            every value is a body (inertia_coordinates.py). With `inertia` among the names instead, theta may leave the
+            set of physical bodies; `simulator` then raises a ValueError.
+        bounds: {label: (low, high)} within those that mechanisms have: masses, sizes, friction > 0, springs, dampers,
+            armatures, radii >= 0, restitution from 0 to 1 (default None: the latter).
+
+    Raises:
+        ValueError: for an unknown name, a name given twice, no name at all, or bounds that exclude the value of `sim`.
     """
 
     def __init__(
@@ -82,11 +87,21 @@ class ParameterSpace:
 
     @property
     def wrt(self) -> tuple[str, ...]:
-        """The parameters whose derivatives `chain` needs."""
+        """Names of the parameters whose derivatives `chain` needs."""
         return tuple(name for group in self._groups for name in group.names)
 
     def simulator(self, theta: ArrayLike) -> Simulator:
-        """The simulator with these parameters; everything else is that of the first one."""
+        """The simulator with other values of the parameters.
+
+        Args:
+            theta: (n,) the vector.
+
+        Returns:
+            The simulator; everything else is that of the first one.
+
+        Raises:
+            ValueError: for a wrong shape, a number that is not finite, or values that no mechanism has.
+        """
         at = checks.array("ParameterSpace.simulator(theta)", theta, self.values.shape)
         values: dict[str, Floats] = {}
         for group in self._groups:
@@ -98,9 +113,18 @@ class ParameterSpace:
         return changed
 
     def chain(self, theta: ArrayLike, blocks: Mapping[str, ArrayLike]) -> Floats:
-        """(..., n) derivatives by theta, from those by `wrt`: the blocks (..., n_k) of a simulator at theta.
+        """Derivatives by theta, from those by the parameters.
 
-        blocks: derivatives by `wrt`, as `linearize`, `vjp`, or the `parameters` of `linearize_rollout` return them.
+        Args:
+            theta: (n,) the vector.
+            blocks: derivatives (..., n_k) by the names of `wrt` of the simulator at theta, as `linearize`, `vjp`, or
+                the `parameters` of `linearize_rollout` return them.
+
+        Returns:
+            (..., n) derivatives by theta.
+
+        Raises:
+            ValueError: for a wrong shape, or a missing block.
         """
         call = "ParameterSpace.chain"
         at = checks.array(f"{call}(theta)", theta, self.values.shape)

@@ -89,11 +89,30 @@ class MPC:
         return self._again, ()
 
     def fresh(self) -> MPC:
-        """Another one, made from the same arguments."""
+        """A controller made from the same arguments, without plan, measurements and log.
+
+        Returns:
+            The new controller.
+        """
         return self._again()
 
     def monte_carlo(self, plant: Plant, sampler: Sampler, duration: float, **settings: Any) -> MonteCarlo:
-        """Closed loops under random perturbations; see `dojo_opt.plant.monte_carlo`."""
+        """Run closed loops under random perturbations, see `dojo.monte_carlo`.
+
+        Args:
+            plant: the plant; each run perturbs a copy of it.
+            sampler: generator -> Perturbation, such as `dojo.Disturbances`.
+            duration: length of each run [s].
+            **settings: further arguments of `dojo.monte_carlo`: runs, seed, executor, control_step, components.
+
+        Returns:
+            All runs, in the order of their numbers.
+
+        Raises:
+            TypeError: for an argument of the wrong kind, or a sampler that returns no Perturbation.
+            ValueError: for a number out of range.
+            Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the MonteCarlo of the finished runs.
+        """
         return monte_carlo(self, plant, sampler, duration, **settings)
 
     def reset(self) -> None:
@@ -108,7 +127,19 @@ class MPC:
         self._solver.reset()
 
     def __call__(self, time: float, x: ArrayLike) -> Vector:
-        """Input (nu,) [N, N m] for the measured state x (nx,) at `time` [s]; with a `delay`, that for time + delay."""
+        """The input for a measured state.
+
+        Args:
+            time: time of the measurement [s], not before that of the last plan.
+            x: (nx,) measured state.
+
+        Returns:
+            (nu,) input [N, N m]; with a `delay`, that for time + delay.
+
+        Raises:
+            ValueError: for a time before the last plan, or a state of the wrong shape or with numbers that are not
+                finite.
+        """
         now = checks.number("MPC(time)", time)
         if self.log and now < self.log[-1].time:
             raise ValueError(f"MPC(time): expected a time after {self.log[-1].time:g} s, got {now:g} s; see reset()")

@@ -24,11 +24,20 @@ __all__ = ["References", "Sampled"]
 
 
 class Sampled:
-    """A trajectory as a function of time: rows at `time`, on the way between two of them, the last one from then on.
+    """A trajectory as a function of time: interpolated between its rows, constant after the last one.
 
-    rows (n, nx) are states of `sim` and interpolated on their manifold; with sim=None they are any numbers. With a
-    `cycle`, a state change (ndx,) or a change of a row such as the advance of a gait, the trajectory goes round: its
-    last row is its first one, moved on, and it has neither beginning nor end.
+    Rows that are states of a simulator are interpolated on their manifold. With a `cycle`, the trajectory goes round:
+    its last row is its first one, moved on, and it has neither beginning nor end.
+
+    Args:
+        time: (n,) growing times of the rows [s], n >= 2.
+        rows: (n, nx) states, or (n, width) other numbers.
+        sim: simulator of the states (default None: the rows are any numbers).
+        cycle: (ndx,) change of the state over one period, such as the advance of a gait, or (width,) change of other
+            rows (default None: no period).
+
+    Raises:
+        ValueError: for times that do not grow, a wrong shape, or a number that is not finite.
     """
 
     def __init__(
@@ -52,7 +61,14 @@ class Sampled:
         return bool(np.abs(apart - sim.integrate(before, steps + cycle)).max() < 1e-12)
 
     def __call__(self, times: ArrayLike) -> Matrix:
-        """Rows (n, width) at the times (n,)."""
+        """The trajectory at given times.
+
+        Args:
+            times: (n,) times [s].
+
+        Returns:
+            (n, nx) states, or (n, width) numbers.
+        """
         t = np.asarray(times, dtype=np.float64)
         first, last = self.time[0], self.time[-1]
         laps = np.zeros(len(t))
@@ -72,9 +88,18 @@ class Sampled:
         return self._sim.integrate(self._sim.integrate(before, step), laps[:, None] * self.cycle)
 
     def over(self, interval: float) -> Sampled:
-        """The same states with velocities that are the mean ones over `interval` [s], such as the step of a model.
+        """The same states with their mean velocities over an interval, such as the time step of a model.
 
         A gait sampled finely has its touchdowns where they are, but the velocities of its own short steps.
+
+        Args:
+            interval: length of the interval before each row [s].
+
+        Returns:
+            The new trajectory.
+
+        Raises:
+            ValueError: the trajectory has no simulator or no cycle, or the interval is not positive.
         """
         if self._sim is None or self.cycle is None:
             raise ValueError(

@@ -146,6 +146,10 @@ class Options:
             raise ValueError(f"ilqr({name}=...): expected {what} >= 0, got {value!r}")
 
     def say(self, line: str) -> None:
-        """Print a line where the table goes, if `verbose`."""
+        """Print a line to the stream of the table of iterations, if `verbose`.
+
+        Args:
+            line: the text.
+        """
         if self.verbose:
             print(line, file=self.stream or sys.stdout)

@@ -46,30 +46,51 @@ def table_line(record: dict[str, Any]) -> str:
 class Plan:
     """A planned trajectory with its feedback; fields as in scipy's OptimizeResult where they mean the same.
 
-    u(x) = u_t + K_t (x (-) x_t)
+        u(x) = u_t + K_t (x (-) x_t)
 
-    Of a problem whose start is free and whose end is the start again (`Periodic`), K is periodic, too: see `repeated`.
+    If the start of the problem is free and its end is the start again (`Periodic`), K is periodic, too: see `repeated`.
+
+    Attributes:
+        success: whether the plan is solved: converged, consistent, and within its constraints.
+        status: reason for the end of the solve.
+        message: the reason as a sentence.
+        nit: number of iterations, those whose line search failed included.
+        fun: cost, without the terms of the constraints.
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+        K: (T, nu, ndx) gains.
+        k: (T, nu) step that the last backward pass still proposed [N, N m].
+        violation: largest violation of a constraint [unit of its residual].
+        gap: largest gap of the dynamics [m, rad, m/s, rad/s].
+        seconds: duration of the solve [s].
+        time_step: time step of the simulator [s].
+        substeps: number of time steps per knot.
+        stride: (ndx,) displacement over one period of a periodic motion (default None: not periodic).
+        history: one record per iteration, its keys as in the table of iterations.
+        multipliers: one (m, d) array per constraint.
+        penalties: likewise.
+        problem: the Problem; not saved.
     """
 
     success: bool
     status: Status
     message: str
-    nit: int  # iterations, those whose line search failed included
-    fun: float  # cost, without the terms of the constraints
-    x: Matrix  # (T + 1, nx)
-    u: Matrix  # (T, nu) [N, N m]
-    K: Stack  # (T, nu, ndx)
-    k: Matrix  # (T, nu) the step the last backward pass still proposed
-    violation: float  # of the constraints, largest
-    gap: float  # of the dynamics, largest
-    seconds: float  # that the solve took
-    time_step: float  # [s]
-    substeps: int  # simulation steps per knot
-    stride: Matrix | None = None  # (ndx,) displacement over one period of a periodic motion; K is periodic, too
-    history: list[dict[str, Any]] = field(default_factory=list)  # one record per iteration
-    multipliers: list[Matrix] = field(default_factory=list)  # one (m, d) array per constraint
+    nit: int
+    fun: float
+    x: Matrix
+    u: Matrix
+    K: Stack
+    k: Matrix
+    violation: float
+    gap: float
+    seconds: float
+    time_step: float
+    substeps: int
+    stride: Matrix | None = None
+    history: list[dict[str, Any]] = field(default_factory=list)
+    multipliers: list[Matrix] = field(default_factory=list)
     penalties: list[Matrix] = field(default_factory=list)
-    problem: Any = None  # the Problem; not saved
+    problem: Any = None
 
     def __repr__(self) -> str:
         return (
@@ -86,13 +107,13 @@ class Plan:
         return np.arange(float(len(self.x))) * (self.time_step * self.substeps)
 
     def repeated(self, count: int) -> Plan:
-        """The motion of a periodic plan `count` times in a row, with its gains.
+        """The motion of a periodic plan several times in a row, with its gains.
 
         Args:
             count: number of cycles.
 
         Returns:
-            A plan; `fun` is that of all cycles, and it has neither multipliers nor penalties.
+            The plan of all cycles: `fun` is their cost. It has neither multipliers nor penalties.
 
         Raises:
             ValueError: the plan is not periodic, or was loaded from a file and has no simulator.
@@ -107,19 +128,34 @@ class Plan:
         return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
 
     def summary(self) -> str:
-        """The table of iterations and a closing line."""
+        """The table of iterations and a closing line.
+
+        Returns:
+            Text of several lines.
+        """
         lines = [HEADER, *(table_line(r) for r in self.history)]
         return "\n".join([*lines, self.closing_line()])
 
     def closing_line(self) -> str:
-        """One line: how it ended."""
+        """The end of the solve in one line.
+
+        Returns:
+            Status, message, iterations, cost, violation, gap and time.
+        """
         return (
             f"{self.status.name}: {self.message} {self.nit} iterations, cost {self.fun:.6g}, violation "
             f"{self.violation:.1e}, gap {self.gap:.1e}, {1e3 * self.seconds:.1f} ms"
         )
 
     def save(self, path: str | Path) -> None:
-        """Write all fields to an .npz file."""
+        """Write all fields but the problem to a file.
+
+        Args:
+            path: path of the file; NumPy appends .npz to a name without it.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
         arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
         arrays |= {} if self.stride is None else {"stride": self.stride}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
@@ -130,7 +166,17 @@ class Plan:
 
     @classmethod
     def load(cls, path: str | Path) -> Plan:
-        """Read a file that `save` wrote."""
+        """Read a file that `save` wrote.
+
+        Args:
+            path: path of the file.
+
+        Returns:
+            The plan, without a problem.
+
+        Raises:
+            OSError: the file cannot be read.
+        """
         with np.load(path) as data:
             meta = json.loads(str(data["meta"]))
             meta["status"] = Status(meta["status"])

@@ -62,9 +62,9 @@ def _terms(given: Any) -> tuple[Spec, ...]:
 
 
 class Problem:
-    """min sum of costs over x (T + 1, nx), u (T, nu) with x_0 = start, the simulator's motion, constraints and limits.
+    """Minimise the sum of costs over x (T + 1, nx) and u (T, nu), from x_0 = start, along the motion of the simulator.
 
-    The attribute `refinement` is 1. Set to more, `ilqr` ends by planning `refined(refinement)` from its first plan.
+    The attribute `refinement` is 1. If it is larger, `ilqr` ends by planning `refined(refinement)` from its first plan.
     `refined_constraints` are constraints of that problem only, for those that lead nowhere from a distant guess.
 
     Args:
@@ -79,7 +79,8 @@ class Problem:
         states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
             None: the rollout of the inputs).
         free_start: tangent components of the start that the planner may change, by number or name, or True for all;
-            `start` is then a guess. With the constraint `Periodic`, such a plan is a gait that repeats itself.
+            `start` is then a guess (default None: a fixed start). With the constraint `Periodic`, such a plan is a gait
+            that repeats itself.
 
     Raises:
         TypeError: `sim` is not a Simulator, or an entry of `cost` or `constraints` is not a term.
@@ -152,6 +153,9 @@ class Problem:
 
         Returns:
             The new problem.
+
+        Raises:
+            ValueError: `count` is not a whole number >= 1.
         """
         count = whole_number("Problem.refined(count)", count)
         finer = copy.copy(self)
@@ -163,9 +167,16 @@ class Problem:
         return finer
 
     def with_own_terms(self, **settings: Any) -> Problem:
-        """The same problem, its start given, with a simulator and terms of its own, for loops that write into them.
+        """The same problem with a fixed start, and a simulator and terms of its own, for loops that write into them.
 
-        settings: of `Simulator.replace`.
+        Args:
+            **settings: settings of `Simulator.replace`.
+
+        Returns:
+            The new problem.
+
+        Raises:
+            ValueError: for an unknown setting, or one out of range.
         """
         own = copy.copy(self)
         own.sim = self.sim.replace(**settings)
@@ -191,13 +202,35 @@ class Problem:
         return float(self.sim.time_step * self.substeps)
 
     def check_controls(self, call: str, controls: ArrayLike) -> Matrix:
-        """A finite (T, nu) copy of `controls`, or an error that names `call`."""
+        """Check inputs of this problem.
+
+        Args:
+            call: the call that an error names.
+            controls: (T, nu) inputs [N, N m], or an array that broadcasts to that shape.
+
+        Returns:
+            A copy (T, nu).
+
+        Raises:
+            ValueError: for a wrong shape, or a number that is not finite.
+        """
         if np.ndim(controls) == 2 and np.shape(controls) != (self.horizon, self.sim.nu):
             raise ValueError(f"{call}: expected shape ({self.horizon}, {self.sim.nu}), got {np.shape(controls)}")
         return table(call, controls, self.horizon, self.sim.nu)
 
     def check_states(self, call: str, states: ArrayLike) -> Matrix:
-        """A finite (T + 1, nx) copy of `states` with the start in its first row, or an error that names `call`."""
+        """Check states of this problem.
+
+        Args:
+            call: the call that an error names.
+            states: (T + 1, nx) states.
+
+        Returns:
+            A copy (T + 1, nx), with the start in its first row unless that is free.
+
+        Raises:
+            ValueError: for a wrong shape, or a number that is not finite.
+        """
         if np.shape(states) != (self.horizon + 1, self.sim.nx):
             raise ValueError(f"{call}: expected shape ({self.horizon + 1}, {self.sim.nx}), got {np.shape(states)}")
         checked = table(call, states, self.horizon + 1, self.sim.nx)
@@ -206,11 +239,27 @@ class Problem:
         return checked
 
     def cost(self, xs: Matrix, us: Matrix) -> float:
-        """Sum of the costs at (xs, us), without constraints."""
+        """Sum of the costs of a trajectory, without constraints.
+
+        Args:
+            xs: (T + 1, nx) states.
+            us: (T, nu) inputs [N, N m].
+
+        Returns:
+            The cost.
+        """
         return sum(term.value(xs, us) for term in self.costs)
 
     def violation(self, xs: Matrix, us: Matrix) -> float:
-        """Largest violation of a constraint at (xs, us)."""
+        """Largest violation of a constraint along a trajectory.
+
+        Args:
+            xs: (T + 1, nx) states.
+            us: (T, nu) inputs [N, N m].
+
+        Returns:
+            The violation [unit of the residual]; 0 without constraints.
+        """
         worst = 0.0
         for term in self.constraints:
             term.update(xs, us)

@@ -39,15 +39,16 @@ def kernel(func: Callable[..., Any] | None = None, *, boundscheck: bool = True) 
         def keep_away(x, u, out):
             out[0] = 0.3 - np.hypot(x[0] - 1.0, x[1])
 
-    Costs and constraints also take plain functions, and compile them; other functions that those call have to be
+    Costs and constraints also take plain functions, and compile them. Other functions that those call have to be
     kernels. Everything that Numba supports of Python and NumPy is allowed, except writing into x and u. Functions with
     the same text and the same captured values are compiled once per process. Numba never frees code: each new text or
     captured value keeps about 2 MiB until the process ends.
 
     Args:
         func: function of (x (nx,), u (nu,), out (dimension,)).
-        boundscheck: raise an error that names function and knot for an index beyond the end of an array. Without the
-            check, a twentieth to a quarter of the time of a residual, such an index reads or writes other memory.
+        boundscheck: whether an index beyond the end of an array raises an error that names function and knot. Without
+            the check, which takes a twentieth to a quarter of the time of a residual, such an index reads or writes
+            other memory.
 
     Returns:
         The compiled function.

@@ -58,7 +58,16 @@ class Disturbances:
                     raise ValueError(f"{call}({name}=...): expected (low, high) with low <= high, got {given!r}")
 
     def __call__(self, rng: np.random.Generator) -> Perturbation:
-        """One draw; the same numbers are drawn whatever the ranges, so that studies with the same seed are paired."""
+        """Draw one perturbation.
+
+        The same numbers are drawn whatever the ranges, so that studies with the same seed are paired.
+
+        Args:
+            rng: generator of random numbers.
+
+        Returns:
+            The perturbation.
+        """
         unit = rng.uniform(size=8)
         within = [lo + (hi - lo) * r for (lo, hi), r in zip(self._ranges(), unit[2:6], strict=True)]
         push, push_time, payload, slope = within

@@ -28,20 +28,35 @@ __all__ = ["ClosedLoop", "closed_loop"]
 
 @dataclass(frozen=True, repr=False)
 class ClosedLoop:
-    """The record of a run, up to the end, a fall, or the first step of the plant that could not be solved."""
+    """The record of a run, up to the end, a fall, or the first step of the plant that could not be solved.
 
-    simulator: Simulator  # of the plant, perturbation included
-    time: Vector  # (N + 1,) [s]
-    x: Matrix  # (N + 1, nx) true states
-    u: Matrix  # (N, nu of the plant) inputs that acted, pushes included [N, N m]
-    status: Integers  # (N,) or (N + 1,) Status of every step that was tried
-    contacts: Contacts  # of every step, world axes
+    Attributes:
+        simulator: simulator of the plant, perturbation included.
+        time: (N + 1,) times of the states [s].
+        x: (N + 1, nx) true states.
+        u: (N, nu of the plant) inputs that acted, pushes included [N, N m].
+        status: (N,) or (N + 1,) Status of every step that was tried.
+        contacts: contacts of every step, world axes.
+        survived: whether the run lasted to its end.
+        message: the end of the run as a sentence.
+        softened: number of steps of the plant that needed softer contact than its own, see `Plant`.
+        log: every tick of the controller; empty for a controller without ticks.
+        reference: states over time to be tracked, a function of times (n,) [s]; None without a reference.
+        tracked: numbers of the tracked coordinates, of an MPC those with a weight; None for all.
+    """
+
+    simulator: Simulator
+    time: Vector
+    x: Matrix
+    u: Matrix
+    status: Integers
+    contacts: Contacts
     survived: bool
     message: str
-    softened: int = 0  # steps of the plant that needed softer contact than its own, see `Plant`
-    log: Sequence[Tick] = field(default=(), repr=False)  # every tick of the controller, when it has ticks
-    reference: Any = field(default=None, repr=False)  # states over time that were to be tracked
-    tracked: Integers | None = None  # numbers of the coordinates that were, of an MPC those with a weight; None: all
+    softened: int = 0
+    log: Sequence[Tick] = field(default=(), repr=False)
+    reference: Any = field(default=None, repr=False)
+    tracked: Integers | None = None
 
     def __repr__(self) -> str:
         return (
@@ -54,21 +69,37 @@ class ClosedLoop:
 
     @property
     def duration(self) -> float:
-        """How long it lasted [s]."""
+        """Length of the run [s]."""
         return float(self.time[-1])
 
     def error(self) -> Matrix:
-        """(N + 1, nv) true (-) reference coordinates over time [m, rad]."""
+        """True (-) reference coordinates over time.
+
+        Returns:
+            (N + 1, nv) errors [m, rad].
+
+        Raises:
+            ValueError: the run has no reference.
+        """
         if self.reference is None:
             raise ValueError("ClosedLoop.error: no reference was given; use closed_loop(reference=...)")
         sim = self.simulator
         return sim.difference(self.x, np.asarray(self.reference(self.time)))[:, : sim.nv]
 
     def rms(self, components: Any = None) -> float:
-        """Root of the mean square of the distance from the reference in these coordinates, by default all `tracked`.
+        """Root mean square of the distance from the reference.
 
-        components: numbers below nv, or names as in `Mechanism.components`. Of several coordinates, squares of lengths
-        [m] and of angles [rad] are added up; `by_coordinate` has each of them by itself.
+        For several coordinates, squares of lengths [m] and of angles [rad] are added up. `by_coordinate` has each of
+        them by itself.
+
+        Args:
+            components: numbers below nv, or names as in `Mechanism.components` (default None: all `tracked` ones).
+
+        Returns:
+            The root mean square [m, rad].
+
+        Raises:
+            ValueError: the run has no reference, or a name is unknown.
         """
         error = self.error()
         chosen = self.tracked
@@ -77,7 +108,14 @@ class ClosedLoop:
         return float(np.sqrt(np.mean(np.sum(error[:, chosen[chosen < error.shape[1]]] ** 2, axis=1))))
 
     def by_coordinate(self) -> dict[str, float]:
-        """Name of each tracked coordinate: root of the mean square of its distance from the reference [m or rad]."""
+        """Root mean square of the distance from the reference, by coordinate.
+
+        Returns:
+            {name of each tracked coordinate: its root mean square [m or rad]}.
+
+        Raises:
+            ValueError: the run has no reference.
+        """
         each, names = np.sqrt(np.mean(self.error() ** 2, axis=0)), self.simulator.mechanism.dof_names
         return {names[i]: float(each[i]) for i in (range(len(each)) if self.tracked is None else self.tracked)}
 

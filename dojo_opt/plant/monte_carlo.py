@@ -29,26 +29,43 @@ __all__ = ["MonteCarloRun", "MonteCarlo", "monte_carlo", "wilson_interval"]
 
 @dataclass(frozen=True)
 class MonteCarloRun:
-    """One run."""
+    """One run.
+
+    Attributes:
+        survived: whether the run lasted to its end.
+        message: the end of the run as a sentence.
+        duration: length of the run [s].
+        rms: `ClosedLoop.rms` of the components of the study [m, rad]; NaN without a reference.
+        x: (nx,) last state.
+        log: every tick of the controller.
+        perturbation: perturbation of the plant.
+        softened: number of steps of the plant that needed softer contact than its own, see `Plant`.
+    """
 
     survived: bool
     message: str
-    duration: float  # [s]
-    rms: float  # `ClosedLoop.rms` of all tracked coordinates [m, rad]; NaN without a reference
-    x: Vector  # (nx,) last state
+    duration: float
+    rms: float
+    x: Vector
     log: Sequence[Tick]
     perturbation: Perturbation
-    softened: int  # steps of the plant that needed softer contact than its own, see `Plant`
+    softened: int
 
     __repr__ = brief_repr
 
 
 @dataclass(frozen=True)
 class MonteCarlo:
-    """All runs, in the order of their numbers."""
+    """All runs, in the order of their numbers.
+
+    Attributes:
+        outcomes: one record per run.
+        duration: intended length of each run [s].
+        seed: seed of all random numbers.
+    """
 
     outcomes: Sequence[MonteCarloRun]
-    duration: float  # that each run was meant to last [s]
+    duration: float
     seed: int
 
     __repr__ = brief_repr
@@ -59,26 +76,30 @@ class MonteCarlo:
 
     @property
     def survived(self) -> int:
-        """Number of runs that lasted."""
+        """Number of runs that lasted to their end."""
         return sum(outcome.survived for outcome in self.outcomes)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of the probability to survive."""
+        """Wilson's 95 % interval (low, high) of the probability to survive."""
         return wilson_interval(self.survived, len(self.outcomes))
 
     @property
     def milliseconds(self) -> Vector:
-        """Times of all ticks but the first of every run [ms]."""
+        """(ticks,) times of all ticks but the first of every run [ms]."""
         return np.concatenate([milliseconds(outcome.log) for outcome in self.outcomes] or [np.zeros(0)])
 
     @property
     def rms(self) -> Vector:
-        """(runs,) distances from the reference, of the runs that lasted; NaN of the others [m, rad]."""
+        """(runs,) distances from the reference of the runs that lasted [m, rad]; NaN for the others."""
         return np.array([o.rms if o.survived else np.nan for o in self.outcomes])
 
     def summary(self) -> str:
-        """One line."""
+        """The study in one line.
+
+        Returns:
+            Survival with its interval, distances from the reference, and times of ticks.
+        """
         lo, hi = self.interval
         text = f"{self.survived} of {len(self.outcomes)} survive {self.duration:g} s (95 %: {lo:.3f} to {hi:.3f})"
         ms, lasted = self.milliseconds, self.rms[np.isfinite(self.rms)]

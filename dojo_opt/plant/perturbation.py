@@ -120,7 +120,17 @@ class Perturbation:
         return np.cos(self.slope) * np.array([0.0, 0.0, 1.0]) - sine * level
 
     def pushed(self, mechanism: Mechanism) -> tuple[str, ...]:
-        """Names of the bodies that are pushed."""
+        """Names of the bodies that are pushed.
+
+        Args:
+            mechanism: mechanism of the plant.
+
+        Returns:
+            The names, each once, in the order of the pushes.
+
+        Raises:
+            ValueError: the mechanism has no body of that name.
+        """
         names = (
             checks.one_of("Push(body=...)", p.body or mechanism.body_names[0], mechanism.body_names)
             for p in self.pushes
@@ -128,7 +138,17 @@ class Perturbation:
         return tuple(dict.fromkeys(names))
 
     def mechanism(self, mechanism: Mechanism) -> Mechanism:
-        """The mechanism of the plant; three inputs, forces along x, y, z, are added for every body that is pushed."""
+        """The mechanism of the plant.
+
+        Args:
+            mechanism: mechanism of the model.
+
+        Returns:
+            The perturbed mechanism. It has three more inputs for every body that is pushed, forces along x, y, z.
+
+        Raises:
+            ValueError: the mechanism has no body of that name, or a slope meets terrain.
+        """
         bodies = list(mechanism.bodies)
         name = self.payload_body or bodies[0].name
         checks.one_of("Perturbation(payload_body=...)", name, mechanism.body_names)
@@ -155,7 +175,19 @@ class Perturbation:
         return changed if self.friction is None else with_contacts(changed, "friction", self.friction)
 
     def push_forces(self, mechanism: Mechanism, begin: float, end: float) -> Vector:
-        """Mean forces over [begin, end] of the inputs that `mechanism` adds, (3 pushed bodies,) [N]."""
+        """Mean forces of the pushes over an interval, for the inputs that `mechanism` adds.
+
+        Args:
+            mechanism: mechanism of the model.
+            begin: begin of the interval [s].
+            end: end of the interval [s].
+
+        Returns:
+            (3 pushed bodies,) forces along x, y, z of one body after the other [N].
+
+        Raises:
+            ValueError: the mechanism has no body of that name.
+        """
         names = self.pushed(mechanism)
         out = np.zeros((len(names), 3))
         for push in self.pushes:
@@ -166,7 +198,18 @@ class Perturbation:
         return out.ravel()
 
     def on_ground(self, mechanism: Mechanism, x: Vector) -> Vector:
-        """The state x of a robot on level ground, moved and turned with the ground: the same feet touch it."""
+        """The state of a robot on level ground, moved and turned with the ground: the same feet touch it.
+
+        Args:
+            mechanism: mechanism of the robot.
+            x: (nx,) state on level ground.
+
+        Returns:
+            (nx,) state; x itself on level ground at height zero.
+
+        Raises:
+            ValueError: the ground is moved, and the robot has no floating base.
+        """
         if not (self.slope or self.ground_height):
             return x
         first = mechanism.joints[0]

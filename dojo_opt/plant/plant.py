@@ -84,7 +84,17 @@ class Plant:
         self.reset()
 
     def perturbed(self, perturbation: Perturbation) -> Plant:
-        """The same robot under another perturbation."""
+        """The same robot under another perturbation.
+
+        Args:
+            perturbation: the perturbation, instead of that of this plant.
+
+        Returns:
+            A new plant at its start.
+
+        Raises:
+            ValueError: a value is out of range, or a delay is not a multiple of the time step.
+        """
         return Plant(self.sim, self.start, perturbation)
 
     def reset(self) -> None:
@@ -101,13 +111,25 @@ class Plant:
         return self.steps * self.sim.time_step
 
     def measure(self) -> Vector:
-        """The state (nx,) with noise."""
+        """The state with noise.
+
+        Returns:
+            (nx,) measured state; without noise, the array of the plant itself.
+        """
         if not self._noise.any():
             return self.x
         return self.sim.integrate(self.x, self._noise * self._random.standard_normal(self.sim.ndx))
 
     def step(self, command: Vector) -> tuple[Vector, StepResult]:
-        """(inputs that acted, result) of one time step; a step that is not solved leaves the state as it was."""
+        """One time step; an unsolved step leaves the state unchanged.
+
+        Args:
+            command: (nu,) input that the controller commands [N, N m]. It acts after the delay, within the limits of
+                the actuators.
+
+        Returns:
+            (inputs that acted, those of the pushes included [N, N m], result of the step).
+        """
         self._waiting.append(command)
         if len(self._waiting) > self._late:
             acting = self._waiting.popleft()
@@ -137,7 +159,11 @@ class Plant:
     def fallen(self, x: Vector) -> bool:
         """Whether a robot lies: its base below half its first height, or tilted by more than 60 degrees from the start.
 
-        A robot whose base neither floats nor moves in a vertical plane never does.
+        Args:
+            x: (nx,) state.
+
+        Returns:
+            True if it lies. Always False for a robot whose base neither floats nor moves in a vertical plane.
         """
         if not stands_free(self.sim.mechanism):
             return False

@@ -18,21 +18,37 @@ __all__ = ["Tick", "milliseconds"]
 
 @dataclass(frozen=True)
 class Tick:
-    """One planning instant. When `fallback` is true the plan before it stays in force, with its gains."""
+    """One planning instant. When `fallback` is true the plan before it stays in force, with its gains.
 
-    time: float  # of the measurement [s]
-    milliseconds: float  # that the tick took, by the clock
-    cpu_milliseconds: float  # processor time, which other programs on the machine hardly change
-    iterations: int  # of the planner, rejected ones included
-    cost: float  # of the plan that is in force, when it was made
-    alpha: float  # last step size; 0 when it was rejected
-    gap: float  # largest entry of x (-) the state that the plan before expected
+    Attributes:
+        time: time of the measurement [s].
+        milliseconds: duration of the tick by the clock [ms].
+        cpu_milliseconds: processor time of the tick [ms], which other programs on the machine hardly change.
+        iterations: iterations of the planner, rejected ones included.
+        cost: cost of the plan that is in force, at the time when it was made.
+        alpha: last step size; 0 after a rejected step.
+        gap: largest entry of x (-) the state that the plan before expected [m, rad, m/s, rad/s].
+        status: status of the planner.
+        fallback: whether the plan before stays in force.
+        contacts: names of the contacts that touch the ground.
+        error: (nv,) coordinates of x (-) reference [m, rad]; empty without a reference.
+        x: (nx,) start of the plan: measured, as the model means it, after the delay.
+        first: whether the others are warm-started from this plan.
+    """
+
+    time: float
+    milliseconds: float
+    cpu_milliseconds: float
+    iterations: int
+    cost: float
+    alpha: float
+    gap: float
     status: Status
     fallback: bool
-    contacts: tuple[str, ...]  # that touch the ground
-    error: Vector = field(repr=False)  # (nv,) coordinates of x (-) reference [m, rad]; empty without a reference
-    x: Vector = field(repr=False)  # (nx,) start of the plan: measured, as the model means it, after the delay
-    first: bool = False  # the plan from which the others are warm-started
+    contacts: tuple[str, ...]
+    error: Vector = field(repr=False)
+    x: Vector = field(repr=False)
+    first: bool = False
 
     __repr__ = brief_repr
 

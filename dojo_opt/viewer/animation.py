@@ -35,11 +35,17 @@ def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = No
 
     Args:
         result: Trajectory, Plan or ClosedLoop.
-        path: of the HTML file.
-        simulator: for a result read from a file; that of the result by default.
+        path: path of the HTML file.
+        simulator: simulator of the result, for one that was read from a file (default None: that of the result).
 
     Returns:
         The path.
+
+    Raises:
+        TypeError: the result is none of these.
+        ValueError: the result does not know its simulator.
+        SimulationError: a step of a plan cannot be solved again, for its forces.
+        OSError: the file cannot be written.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq

@@ -19,30 +19,60 @@ Array = Vector
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses of the bodies and forces of the contacts over time."""
+    """Poses of the bodies and forces of the contacts over time.
+
+    Attributes:
+        mechanism: the mechanism.
+        time: (T + 1,) times of the states [s].
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+        position: (T + 1, nbody, 3) centres of mass [m].
+        quaternion: (T + 1, nbody, 4) orientations.
+        contact_time: (N,) end of each simulation step [s].
+        normal_force: (N, ncontact) mean normal force over the step [N].
+        friction_force: (N, ncontact) size of the mean friction force over the step [N].
+    """
 
     mechanism: Mechanism
-    time: Array  # (T + 1,) [s]
-    x: Array  # (T + 1, nx)
-    u: Array  # (T, nu) [N, N m]
-    position: Array  # (T + 1, nbody, 3) [m]
-    quaternion: Array  # (T + 1, nbody, 4)
-    contact_time: Array  # (N,) end of each simulation step [s]
-    normal_force: Array  # (N, ncontact) mean over the step [N]
-    friction_force: Array  # (N, ncontact) likewise, its size
+    time: Array
+    x: Array
+    u: Array
+    position: Array
+    quaternion: Array
+    contact_time: Array
+    normal_force: Array
+    friction_force: Array
 
     __repr__ = brief_repr
 
     def points(self, body: int, point: Any) -> Array:
-        """Path (T + 1, 3) of a point given in the axes of a body, from its centre of mass [m]."""
+        """Path of a point of a body.
+
+        Args:
+            body: number of the body.
+            point: (3,) place from the centre of mass, body axes [m].
+
+        Returns:
+            (T + 1, 3) places, world axes [m].
+        """
         R = np.array([rotation_matrix(q) for q in self.quaternion[:, body]])
         return np.asarray(self.position[:, body] + R @ np.asarray(point, dtype=np.float64))
 
 
 def motion(result: Any, simulator: Simulator | None = None) -> Motion:
-    """Motion of a Trajectory, a closed loop, or a plan; the contact forces of a plan come from its steps, solved again.
+    """Motion of a result. The contact forces of a plan come from its steps, solved again.
 
-    simulator: the one the result was made with; only needed for a result that was read from a file.
+    Args:
+        result: Trajectory, Plan or ClosedLoop.
+        simulator: simulator of the result, for one that was read from a file (default None: that of the result).
+
+    Returns:
+        The motion.
+
+    Raises:
+        TypeError: the result is none of these.
+        ValueError: the result does not know its simulator.
+        SimulationError: a step of a plan cannot be solved again, for its forces.
     """
     sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
     if sim is None:
