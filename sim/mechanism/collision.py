@@ -13,15 +13,26 @@ from sim.mechanism.shapes import Solid
 class Collision:
     """Bodies a and b keep apart: their shapes touch, and rub, but do not overlap.
 
-    shape_a, shape_b   Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope, HalfSpace; by default that of the body.
-                       With String on both sides the bodies are tied together instead: their points keep within its
-                       length, and there is no friction; taut, it moves as a rod does (string.py), and jerked taut it
-                       takes the energy of the jerk. A HalfSpace on a body moves with it.
-    b                  the world by default; shape_b is then placed in world axes: an obstacle, a step, a slope
-    friction, law, restitution     as in Contact
+    With a String on both sides, the bodies are tied together instead: their points keep within its length, and there is
+    no friction. A taut string moves as a rod does (string.py), and one that is jerked taut takes the energy of the
+    jerk.
 
     A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
     time step, and adds the energy that this takes.
+
+    Attributes:
+        a: name of the first body.
+        b: name of the second body (default None: the world, whose shape is an obstacle, a step or a slope).
+        shape_a: Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope or HalfSpace; a HalfSpace moves with its body
+            (default None: the shape of the body).
+        shape_b: likewise of b; of the world, it is placed in world axes (default None: the shape of the body).
+        friction: coefficient of friction (default 0.5).
+        law: contact law, see `dojo.Contact` (default "nonlinear").
+        name: name of the collision (default "a-b").
+        restitution: share of the normal velocity that an impact gives back, 0 to 1 (default 0).
+
+    Raises:
+        ValueError: for one body on both sides, an obstacle without a shape, or a value out of range.
     """
 
     a: str

@@ -15,8 +15,20 @@ from sim.mechanism.parts import Joint
 class Gear:
     """q[joint] = ratio q[other] + offset: toothed wheels, belts, a rack, a joint that mimics another one.
 
-    ratio [rad/rad, m/rad, ...], offset [m, rad]. dof, other_dof: which coordinate, of joints with several; quaternions
-    have none. The gear acts on both coordinates as two motors would: on their children, and back on their parents.
+    The gear acts on both coordinates as two motors would: on their children, and back on their parents. Quaternions
+    have no gears.
+
+    Attributes:
+        joint: name of the joint that follows.
+        other: name of the joint that leads.
+        ratio: ratio of the coordinates [rad/rad, m/rad, ...] (default 1).
+        offset: offset of the coordinate that follows [m, rad] (default 0).
+        dof: number of the coordinate of `joint`, for joints with several (default 0).
+        other_dof: number of the coordinate of `other` (default 0).
+        name: name of the gear (default that of `joint`).
+
+    Raises:
+        ValueError: for an empty name, or a number that is not finite.
     """
 
     joint: str

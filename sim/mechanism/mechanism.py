@@ -31,10 +31,22 @@ Floats = NDArray[np.float64]
 class Mechanism:
     """A tree of bodies. Afterwards body i hangs on joint i, and parents come before children.
 
-    inputs    the entries of u in order; by default every degree of freedom of every joint but the floating ones and
-              those that close loops
-    neutral   coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero by default,
-              or all of q
+    Attributes:
+        bodies: the bodies.
+        joints: the joints, one per body; those with close=True are moved to `loops`.
+        contacts: contacts with the ground (default none).
+        inputs: entries of u in order (default None: every degree of freedom of every joint but the floating ones and
+            those that close loops).
+        gravity: (3,) acceleration of gravity [m/s^2] (default 9.81 downwards).
+        name: name of the mechanism.
+        neutral: coordinates of the standing or hanging configuration: {joint name: its coordinates}, zero for joints
+            without a name in it, or all of q (default None: zero).
+        collisions: bodies and obstacles that keep apart (default none).
+        loops: joints that close loops (default none).
+        gears: joint coordinates that follow others (default none).
+
+    Raises:
+        ValueError: the parts are no tree, a name is unknown or used twice, or a value is out of range.
     """
 
     bodies: Sequence[Body]
@@ -143,7 +155,7 @@ class Mechanism:
         """Indices into a perturbation dx = [dq; dv] of joints and degrees of freedom.
 
         Args:
-            names: "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their
+            *names: "base" is all of a joint, "base x" one of its degrees of freedom, "v base", "v base x" their
                 velocities, "q" and "v" all coordinates and all velocities.
 
         Returns:
@@ -155,11 +167,31 @@ class Mechanism:
         return components("Mechanism.components(...)", self.joints, names)
 
     def q_slice(self, joint: str) -> slice:
-        """The slice of q with the coordinates of a joint."""
+        """Place of the coordinates of a joint.
+
+        Args:
+            joint: name of the joint.
+
+        Returns:
+            The slice of q (nq,), and of a state x (nx,).
+
+        Raises:
+            ValueError: the name is unknown; the message suggests a known one.
+        """
         return self._slices[checks.one_of("Mechanism.q_slice(joint)", joint, self._slices)][0]
 
     def v_slice(self, joint: str) -> slice:
-        """The slice of v with the velocities of a joint."""
+        """Place of the velocities of a joint.
+
+        Args:
+            joint: name of the joint.
+
+        Returns:
+            The slice of v (nv,), and of the coordinates in a perturbation dx.
+
+        Raises:
+            ValueError: the name is unknown; the message suggests a known one.
+        """
         return self._slices[checks.one_of("Mechanism.v_slice(joint)", joint, self._slices)][1]
 
     @cached_property
@@ -199,7 +231,7 @@ class Mechanism:
             contacts: names of the contacts above it; all by default.
             bodies: names of bodies whose shapes touch it too, by balls and corners that are added as contacts
                 (shape_contacts.py).
-            options: friction, law, restitution of the added contacts.
+            **options: friction, law, restitution of the added contacts.
 
         Returns:
             The new mechanism.
@@ -210,7 +242,17 @@ class Mechanism:
         return _on_terrain(self, terrain, contacts, bodies, **options)
 
     def with_collisions(self, *collisions: Collision) -> Mechanism:
-        """The same mechanism with more collisions."""
+        """The same mechanism with more collisions.
+
+        Args:
+            *collisions: the collisions.
+
+        Returns:
+            The new mechanism.
+
+        Raises:
+            ValueError: a name is unknown or used twice.
+        """
         return replace(self, collisions=[*self.collisions, *collisions])
 
     def with_obstacle(
@@ -222,7 +264,7 @@ class Mechanism:
             shape: the obstacle, placed in world axes by its centre and orientation.
             bodies: names of bodies whose shapes touch it; by default the balls of the contacts do.
             name: prefix of the names of the collisions.
-            options: friction, law, restitution of Collision.
+            **options: friction, law, restitution of Collision.
 
         Returns:
             The new mechanism.

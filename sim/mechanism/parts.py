@@ -42,9 +42,18 @@ LAWS = ("impact", "linear", "nonlinear")
 class Body:
     """A rigid body. Its frame has its origin at the centre of mass.
 
-    inertia: (3,) principal or (3, 3), about the centre of mass, body axes [kg m^2]; by default that of `shape`.
-    A body of mass 0, without inertia and shape, is the middle of a joint put together from several, as hinges one after
-    the other; something with a mass has to hang on it.
+    A body of mass 0, without inertia and shape, is the middle of a joint put together from several, such as hinges one
+    after the other. Something with a mass has to hang on it.
+
+    Attributes:
+        name: name of the body.
+        mass: mass [kg] (default 1).
+        inertia: (3,) principal moments or (3, 3) matrix, about the centre of mass, body axes [kg m^2] (default None:
+            that of `shape`).
+        shape: shape for inertia, collisions and drawings (default None: no shape).
+
+    Raises:
+        ValueError: for a value out of range, or an inertia that no rigid body has; the message names the body.
     """
 
     name: str
@@ -73,23 +82,40 @@ class Joint:
         `axis`        in the joint frame; a plane across it has its coordinates along x, y, z in this order, without
                       the one nearest to the axis (axis y: x then z)
 
-    Points are measured from the centres of mass [m]. spring [N/m, N m/rad], damper [N s/m, N m s/rad] and rest take one
-    number or one per degree of freedom; a quaternion joint has one spring constant, and its rest is a rotation vector.
-    limits: (lo, hi), or one (lo, hi) or None per degree of freedom; lo or hi may be infinite. cone: largest angle of
-    the child's axis from the parent's, for kinds with three rotations [rad]. armature [kg, kg m^2]: inertia that moves
-    with a coordinate and with nothing else, as a geared rotor's; none on the rotations of a quaternion.
+    The plane of the planar kinds is across the axis. Orbital kinds turn about all directions but the axis, those from
+    spherical to floating about all, a screw about the axis that it moves along. Springs, dampers, rests and armatures
+    are one number, or one per degree of freedom. A quaternion joint has one spring constant for its rotations, its rest
+    is a rotation vector, and its rotations have no armature.
 
-    pitch: of a screw, the way along the axis per turn [m/rev]: positive for a right-handed thread, negative for a
-    left-handed one. Its coordinate is the angle.
+    Attributes:
+        kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
+            prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating or
+            screw.
+        parent: name of the parent body; None or "world" for the world.
+        child: name of the child body.
+        name: name of the joint (default that of the child).
+        parent_point: (3,) joint point, from the centre of mass of the parent, or in the world [m] (default the origin).
+        child_point: (3,) joint point, from the centre of mass of the child [m] (default the origin).
+        axis: (3,) direction of the axis in the joint frame (default z).
+        orientation: (4,) unit quaternion (w, x, y, z) from the joint frame to the parent (default none).
+        spring: spring constant [N/m, N m/rad] (default 0).
+        damper: damper constant [N s/m, N m s/rad] (default 0).
+        rest: coordinate at which the spring is at rest [m, rad] (default 0).
+        limits: (lo, hi), or one (lo, hi) or None per degree of freedom, infinite where free [m, rad] (default None: no
+            limits).
+        cone: largest angle of the child's axis from the parent's, for kinds with three rotations [rad] (default None:
+            no limit).
+        armature: inertia that moves with a coordinate and with nothing else, as a geared rotor's [kg, kg m^2] (default
+            0).
+        close: whether the child hangs on another joint already, and this one closes a loop (default False). With a
+            spring, a damper, limits, armature, an input, a pitch or two rotations, it has coordinates of its own, and
+            the child is cut there: a second part of it, the body "child.name", hangs on this joint and is welded to the
+            first (sim/mechanism/closing.py).
+        pitch: displacement of a screw along its axis per turn, positive for a right-handed thread, negative for a
+            left-handed one [m/rev] (default 0). Its coordinate is the angle.
 
-    close: the child hangs on another joint already, and this one closes a loop. With a spring, a damper, limits,
-    armature, an input, a pitch or two rotations it has coordinates of its own, and the child is cut there: a second
-    part of it, the body "child.name", hangs on this joint and is welded to the first (sim/mechanism/closing.py).
-
-    kind: fixed, prismatic, planar, fixed_orientation, revolute, cylindrical, planar_axis, free_revolute, orbital,
-    prismatic_orbital, planar_orbital, free_orbital, spherical, cylindrical_free, planar_free, floating, screw. The
-    plane of the planar kinds is across the axis; orbital kinds turn about all but the axis, those from spherical to
-    floating about all, a screw about the axis that it moves along.
+    Raises:
+        ValueError: for a value of the wrong shape or out of range; the message names the joint.
     """
 
     kind: str
@@ -153,11 +179,25 @@ class Joint:
 
 @dataclass(frozen=True)
 class Contact:
-    """A ball on a body that cannot enter the ground, the half-space normal . x < height; radius 0 is a point.
+    """A ball on a body that cannot enter the ground, the half-space normal . x < height.
 
-    law: "nonlinear" (the friction cone), "linear" (a four-sided pyramid inside it), "impact" (no friction).
-    terrain: ground, not a half-space, raised by `height`; see Terrain, and `Mechanism.on` for all contacts at once.
-    restitution: share of the normal velocity that an impact gives back, see sim/contact/restitution.py.
+    Attributes:
+        body: name of the body.
+        point: (3,) centre of the ball, from the centre of mass, body axes [m] (default the centre of mass).
+        radius: radius of the ball; 0 is a point [m] (default 0).
+        friction: coefficient of friction (default 0.5).
+        law: "nonlinear", the friction cone; "linear", a four-sided pyramid inside it; or "impact", no friction (default
+            "nonlinear").
+        normal: (3,) outward normal of the ground, world axes (default z).
+        height: height of the ground along its normal; of terrain, its rise [m] (default 0).
+        name: name of the contact (default that of the body, numbered if the body has several).
+        terrain: ground that is not a half-space, see `dojo.Terrain`, and `Mechanism.on` for all contacts at once
+            (default None: the half-space).
+        restitution: share of the normal velocity that an impact gives back, 0 to 1, see sim/contact/restitution.py
+            (default 0).
+
+    Raises:
+        ValueError: for a value of the wrong shape or out of range; the message names the contact.
     """
 
     body: str
@@ -198,7 +238,16 @@ class Contact:
             object.__setattr__(self, "terrain", None)
 
     def gap(self, centres: ArrayLike) -> NDArray[np.float64]:
-        """Distance from the ground of the ball with its centre at `centres` (..., 3), world axes [m]."""
+        """Distance of the ball from the ground.
+
+        Above terrain it is the height over the surface times the vertical part of the normal, right to first order.
+
+        Args:
+            centres: (..., 3) centres of the ball, world axes [m].
+
+        Returns:
+            (...,) distances [m], negative below the ground.
+        """
         at = np.asarray(centres, dtype=np.float64)
         if self.terrain is None:
             return np.asarray(at @ np.asarray(self.normal) - self.radius - self.height)
@@ -206,7 +255,14 @@ class Contact:
         return (at[..., 2] - surface.height(at[..., 0], at[..., 1]) - self.height) * self.normal_at(at)[..., 2]
 
     def normal_at(self, centres: ArrayLike) -> NDArray[np.float64]:
-        """Outward normal of the ground at the ball with its centre at `centres` (..., 3), (..., 3)."""
+        """Outward normal of the ground at the ball.
+
+        Args:
+            centres: (..., 3) centres of the ball, world axes [m].
+
+        Returns:
+            (..., 3) unit normals, world axes.
+        """
         at = np.asarray(centres, dtype=np.float64)
         if self.terrain is None:
             return np.array(np.broadcast_to(np.asarray(self.normal), at.shape))
@@ -217,10 +273,23 @@ class Contact:
 class Input:
     """One entry of u: a force or torque on a joint coordinate, or a wrench on a body at its centre of mass.
 
-    Input("knee")                                 the torque of a joint with one degree of freedom [N m]
-    Input("base", dof=3)                          its fourth degree of freedom [N or N m]
-    Input(body="block", force=(1, 0, 0))          u newtons along x, world axes
-    Input(body="drone", force=(0, 0, 1), torque=(0, 0, 0.02), frame="body")
+        Input("knee")                                 the torque of a joint with one degree of freedom [N m]
+        Input("base", dof=3)                          its fourth degree of freedom [N or N m]
+        Input(body="block", force=(1, 0, 0))          u newtons along x, world axes
+        Input(body="drone", force=(0, 0, 1), torque=(0, 0, 0.02), frame="body")
+
+    Attributes:
+        joint: name of the joint (default None: the input acts on a body).
+        dof: number of the degree of freedom of the joint (default 0).
+        body: name of the body (default None: the input acts on a joint).
+        force: (3,) force on the body per unit of the input (default zero).
+        torque: (3,) torque on the body per unit of the input [m] (default zero).
+        frame: axes of force and torque, "world" or "body" (default "world").
+        name: name of the input (default that of the joint, with the number of one of several degrees of freedom, or of
+            the body).
+
+    Raises:
+        ValueError: for both a joint and a body or neither, or a value out of range.
     """
 
     joint: str | None = None

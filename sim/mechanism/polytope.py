@@ -23,10 +23,16 @@ _FLAT = 1e-9  # volume, relative to that of the box around the points, below whi
 
 @dataclass(frozen=True)
 class Polytope(Solid):
-    """The convex hull of points (n, 3) in the frame of the shape [m]; at least four, not all in one plane.
+    """The convex hull of points. `vertices` keeps the corners of the hull only.
 
-    `vertices` keeps the corners of the hull only. A body that takes its inertia from the shape has its origin at the
-    centre of mass: `Polytope.about_centroid(points)` moves it there.  ValueError: points that span no volume.
+    A body that takes its inertia from the shape has its origin at the centre of mass: `Polytope.about_centroid(points)`
+    moves it there. Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        vertices: (n, 3) points in the frame of the shape, at least four, not all in one plane [m].
+
+    Raises:
+        ValueError: for fewer points, or points that span no volume.
     """
 
     code = shape_kinds.Shape.POLYTOPE
@@ -54,7 +60,18 @@ class Polytope(Solid):
 
     @classmethod
     def about_centroid(cls, vertices: ArrayLike, **place: Any) -> Polytope:
-        """The same with the centroid of the solid at the origin; place: center and orientation."""
+        """The hull of points, moved so that the centroid of the solid is at the origin.
+
+        Args:
+            vertices: (n, 3) points [m].
+            **place: further fields of the shape, such as `center` and `orientation`.
+
+        Returns:
+            The polytope.
+
+        Raises:
+            ValueError: for fewer than four points, or points that span no volume.
+        """
         raw = cls(vertices)
         return cls(np.asarray(raw.vertices) - raw.centroid, **place)
 
@@ -78,12 +95,22 @@ class Polytope(Solid):
 
     @property
     def centroid(self) -> Floats:
-        """Centre of the solid (3,), in the frame of the shape [m]."""
+        """(3,) centre of the solid, in the frame of the shape [m]."""
         volume, first, _ = self._moments()
         return first / volume
 
     def inertia(self, mass: float) -> Floats:
-        """Inertia (3, 3) about the origin of the shape, body axes [kg m^2].  ValueError: that is not its centroid."""
+        """Inertia about the origin of the shape, which is its centroid.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+
+        Raises:
+            ValueError: the centroid is elsewhere.
+        """
         volume, first, second = self._moments()
         size = float(np.ptp(np.asarray(self.vertices), axis=0).max())
         if np.abs(first / volume).max() > 1e-9 * size:
@@ -96,32 +123,41 @@ class Polytope(Solid):
         return np.asarray(R @ (np.trace(C) * np.eye(3) - C) @ R.T)
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """Principal moments of inertia about the centroid, ascending [kg m^2]."""
+        """Principal moments of inertia about the centroid, ascending.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3,) moments [kg m^2].
+
+        Raises:
+            ValueError: the centroid is not the origin of the shape.
+        """
         a, b, c = np.linalg.eigvalsh(self.inertia(mass))
         return float(a), float(b), float(c)
 
     def sizes(self) -> tuple[float, ...]:
-        """None: its corners are in a table."""
+        """The sizes that kernels read: none, as the corners are in a table.
+
+        Returns:
+            An empty tuple.
+        """
         return ()
 
     def bounding_radius(self) -> float:
-        """Distance of its farthest corner."""
         return float(np.linalg.norm(np.asarray(self.vertices), axis=1).max())
 
     def volume(self) -> float:
-        """Of the hull."""
         return self._moments()[0]
 
     def outline(self) -> Floats:
-        """Its corners."""
         return np.asarray(self.vertices)
 
     def primitives(self) -> list[Primitive]:
-        """Itself."""
         return [Primitive("hull", np.asarray(self.vertices))]
 
     def stance(self) -> Stance:
-        """Its corners."""
         return Stance("corner", np.asarray(self.vertices), 0.0)
 
 

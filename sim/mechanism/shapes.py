@@ -69,7 +69,15 @@ PLATE = 0.002  # thickness of a drawn plane [m]
 
 @dataclass(frozen=True, kw_only=True)
 class Solid:
-    """Where a shape sits in its body: centre from the centre of mass [m], and orientation."""
+    """A solid of uniform density and its place in a body.
+
+    Attributes:
+        center: (3,) its centre, from the centre of mass of the body, body axes [m] (default that of mass).
+        orientation: (4,) unit quaternion (w, x, y, z) from its axes to those of the body (default none).
+
+    Raises:
+        ValueError: for a value of the wrong shape or out of range.
+    """
 
     code: ClassVar[shape_kinds.Shape | None] = None  # None: it cannot collide
     surface: ClassVar[dict[str, tuple[Size, float]]] = {}  # its sizes in order: effect, unit
@@ -88,47 +96,107 @@ class Solid:
             object.__setattr__(self, field, value)
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """Moments of inertia about the shape's own centre and axes [kg m^2]."""
+        """Moments of inertia about the own centre and axes of the shape.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3,) moments about x, y, z [kg m^2].
+
+        Raises:
+            ValueError: a body cannot have this shape.
+        """
         raise NotImplementedError
 
     def sizes(self) -> tuple[float, ...]:
-        """Sizes [m] in the order of shape_kinds.Shape."""
+        """The sizes that kernels read, in the order of shape_kinds.Shape.
+
+        Returns:
+            Radii and halves of lengths [m].
+        """
         return tuple(unit * getattr(self, name) for name, (_, unit) in self.surface.items())
 
     def bounding_radius(self) -> float:
-        """Radius [m] of the sphere about the centre of the shape that contains it; infinite where there is none."""
+        """Radius of the sphere about the centre of the shape that contains it.
+
+        Returns:
+            The radius [m]; infinite for a shape without an end.
+        """
         return inf
 
     def volume(self) -> float:
-        """[m^3]; infinite of a shape that does not end."""
+        """Volume of the shape.
+
+        Returns:
+            The volume [m^3]; infinite for a shape without an end.
+        """
         return inf
 
     def support(self, n: Floats) -> float:
-        """Largest n.x over the points x of the shape, in its frame, for a unit vector n (3,) [m]."""
+        """Largest n.x over the points x of the shape, in its frame.
+
+        Args:
+            n: (3,) unit vector.
+
+        Returns:
+            The support [m]; infinite for a shape without an end.
+        """
         stance = self.stance()
         return inf if stance is None else float((stance.points @ n).max()) + stance.radius
 
     def outline(self) -> Floats:
-        """Points (n, 3) in the frame of the shape whose hull is the shape, or close to it [m]."""
+        """Points whose convex hull is the shape, or close to it.
+
+        Returns:
+            (n, 3) points in the frame of the shape [m].
+
+        Raises:
+            NotImplementedError: the shape has no end.
+        """
         raise NotImplementedError
 
     def primitives(self) -> list[Primitive]:
-        """The drawing."""
+        """The drawing of the shape.
+
+        Returns:
+            Balls, cylinders, boxes and hulls; empty for a shape that is not drawn.
+        """
         return []
 
     def stance(self) -> Stance | None:
-        """The points and balls by which it stands on ground; None: it has none that do not move over it."""
+        """The points and balls by which the shape stands on ground.
+
+        Returns:
+            The stance; None for a shape whose points of contact move over it, and for obstacles.
+        """
         return None
 
     def inertia(self, mass: float) -> Floats:
-        """Inertia (3, 3) about the shape's own centre, in body axes: R diag(principal) R^T [kg m^2]."""
+        """Inertia about the own centre of the shape: R diag(principal) R^T.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+
+        Raises:
+            ValueError: a body cannot have this shape.
+        """
         R = rotation_matrix(self.orientation)
         return np.asarray((R * self.principal(mass)) @ R.T)
 
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """Ball of the given radius [m]; 2/5 m r^2."""
+    """A ball. Its moments of inertia are 2/5 m r^2.
+
+    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        radius: radius r [m].
+    """
 
     code = shape_kinds.Shape.SPHERE
     surface = {"radius": (Size.BALL, 1.0)}
@@ -140,34 +208,36 @@ class Sphere(Solid):
         self._positive("radius")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """2/5 m r^2."""
         i = 0.4 * mass * self.radius**2
         return i, i, i
 
     def bounding_radius(self) -> float:
-        """Its own."""
         return self.radius
 
     def volume(self) -> float:
-        """4/3 pi r^3."""
         return 4.0 / 3.0 * pi * self.radius**3
 
     def outline(self) -> Floats:
-        """Of the ball."""
         return self.radius * BALL
 
     def primitives(self) -> list[Primitive]:
-        """Itself."""
         return [Primitive("ball", np.array([self.radius]))]
 
     def stance(self) -> Stance:
-        """Itself."""
         return Stance("ball", np.zeros((1, 3)), self.radius)
 
 
 @dataclass(frozen=True)
 class Box(Solid):
-    """Cuboid with edges x, y, z [m]; m/12 (y^2 + z^2) and so on."""
+    """A cuboid. Its moments of inertia are m/12 (y^2 + z^2) and so on.
+
+    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        x: edge along x [m].
+        y: edge along y [m].
+        z: edge along z [m].
+    """
 
     code = shape_kinds.Shape.BOX
     surface = {"x": (Size.SIDE_X, 0.5), "y": (Size.SIDE_Y, 0.5), "z": (Size.SIDE_Z, 0.5)}
@@ -181,35 +251,36 @@ class Box(Solid):
         self._positive("x", "y", "z")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """m/12 (y^2 + z^2), and so on."""
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y)
 
     def bounding_radius(self) -> float:
-        """Half its diagonal."""
         return hypot(*self.sizes())
 
     def volume(self) -> float:
-        """x y z."""
         return self.x * self.y * self.z
 
     def outline(self) -> Floats:
-        """Its corners."""
         return 0.5 * np.array(list(product((-self.x, self.x), (-self.y, self.y), (-self.z, self.z))))
 
     def primitives(self) -> list[Primitive]:
-        """Itself."""
         return [Primitive("box", np.array([self.x, self.y, self.z]))]
 
     def stance(self) -> Stance:
-        """Its corners."""
         corners = 0.5 * np.array([self.x, self.y, self.z]) * np.array(list(product((-1.0, 1.0), repeat=3)))
         return Stance("corner", corners, 0.0)
 
 
 @dataclass(frozen=True)
 class Cylinder(Solid):
-    """Cylinder about its z axis [m]; m/12 (3 r^2 + l^2) across, m/2 r^2 along."""
+    """A cylinder about its z axis. Its moments of inertia are m/12 (3 r^2 + l^2) across and m/2 r^2 along the axis.
+
+    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        radius: radius r [m].
+        length: length l along z [m].
+    """
 
     code = shape_kinds.Shape.CYLINDER
     surface = {"radius": (Size.RIM, 1.0), "length": (Size.LENGTH, 0.5)}
@@ -222,38 +293,38 @@ class Cylinder(Solid):
         self._positive("radius", "length")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """Across twice, then along."""
         across = mass / 12 * (3 * self.radius**2 + self.length**2)
         return across, across, mass / 2 * self.radius**2
 
     def bounding_radius(self) -> float:
-        """Distance of its rims."""
         return hypot(*self.sizes())
 
     def support(self, n: Floats) -> float:
-        """r |n_xy| + l/2 |n_z|."""
         return float(self.radius * hypot(n[0], n[1]) + 0.5 * self.length * abs(n[2]))
 
     def volume(self) -> float:
-        """pi r^2 l."""
         return pi * self.radius**2 * self.length
 
     def outline(self) -> Floats:
-        """Its rims."""
         half = np.array([0.0, 0.0, self.length / 2])
         return np.concatenate([self.radius * RING + half, self.radius * RING - half])
 
     def primitives(self) -> list[Primitive]:
-        """Itself."""
         return [Primitive("cylinder", np.array([self.radius, self.length]))]
 
 
 @dataclass(frozen=True)
 class Capsule(Solid):
-    """Cylinder of the given length along z with two half balls at its ends [m].
+    """A cylinder along z with two half balls at its ends. Its moments of inertia are
 
-    across = m_c (l^2/12 + r^2/4) + m_s (2/5 r^2 + l^2/4 + 3/8 l r)
-    along  = m_c r^2/2 + m_s 2/5 r^2,     m_c : m_s = l : 4/3 r
+        across = m_c (l^2/12 + r^2/4) + m_s (2/5 r^2 + l^2/4 + 3/8 l r)
+        along  = m_c r^2/2 + m_s 2/5 r^2,     m_c : m_s = l : 4/3 r
+
+    Its place in the body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        radius: radius r [m].
+        length: length l of the cylinder, from the centre of one half ball to that of the other [m].
     """
 
     code = shape_kinds.Shape.CAPSULE
@@ -267,7 +338,6 @@ class Capsule(Solid):
         self._positive("radius", "length")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """Across twice, then along."""
         r, length = self.radius, self.length
         ball = mass * (4 / 3 * r) / (length + 4 / 3 * r)
         rod = mass - ball
@@ -275,34 +345,35 @@ class Capsule(Solid):
         return across, across, rod * r**2 / 2 + 0.4 * ball * r**2
 
     def bounding_radius(self) -> float:
-        """Distance of its ends."""
         return sum(self.sizes())
 
     def volume(self) -> float:
-        """pi r^2 l + 4/3 pi r^3."""
         return pi * self.radius**2 * self.length + 4.0 / 3.0 * pi * self.radius**3
 
     def outline(self) -> Floats:
-        """Of the balls at its ends."""
         half = np.array([0.0, 0.0, self.length / 2])
         return np.concatenate([self.radius * BALL + half, self.radius * BALL - half])
 
     def primitives(self) -> list[Primitive]:
-        """A cylinder, and the balls at its ends."""
         ends = [(0.0, 0.0, side * self.length / 2) for side in (-1, 1)]
         rod = Primitive("cylinder", np.array([self.radius, self.length]))
         return [rod, *(Primitive("ball", np.array([self.radius]), end) for end in ends)]
 
     def stance(self) -> Stance:
-        """A ball at either end."""
         return Stance("end", np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * self.length, self.radius)
 
 
 @dataclass(frozen=True)
 class Ellipsoid(Solid):
-    """Ellipsoid with the semi-axes x, y, z [m]; m/5 (y^2 + z^2) and so on.
+    """An ellipsoid. Its moments of inertia are m/5 (y^2 + z^2) and so on.
 
-    It touches ground and planes as a collision with a HalfSpace: the point it stands on moves over it.
+    It touches ground and planes as a collision with a HalfSpace: the point it stands on moves over it. Its place in the
+    body is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        x: semi-axis along x [m].
+        y: semi-axis along y [m].
+        z: semi-axis along z [m].
     """
 
     code = shape_kinds.Shape.ELLIPSOID
@@ -317,49 +388,50 @@ class Ellipsoid(Solid):
         self._positive("x", "y", "z")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """m/5 (y^2 + z^2), and so on."""
         x, y, z = self.x**2, self.y**2, self.z**2
         return mass / 5 * (y + z), mass / 5 * (x + z), mass / 5 * (x + y)
 
     def bounding_radius(self) -> float:
-        """The longest semi-axis."""
         return max(self.sizes())
 
     def support(self, n: Floats) -> float:
-        """|D n|."""
         return hypot(self.x * n[0], self.y * n[1], self.z * n[2])
 
     def volume(self) -> float:
-        """4/3 pi x y z."""
         return 4.0 / 3.0 * pi * self.x * self.y * self.z
 
     def outline(self) -> Floats:
-        """Of the ball, stretched."""
         return BALL * self.sizes()
 
     def primitives(self) -> list[Primitive]:
-        """Itself."""
         return [Primitive("ball", np.array(self.sizes()))]
 
 
 @dataclass(frozen=True)
 class HalfSpace(Solid):
-    """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, no body."""
+    """Everything below the plane z = 0 of its frame: ground, a wall, a slope. An obstacle, not the shape of a body.
+
+    Its place is given by the keywords of `sim.mechanism.shapes.Solid`.
+    """
 
     code = shape_kinds.Shape.HALFSPACE
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """None: it has no end."""
         raise ValueError("HalfSpace: a body cannot have this shape")
 
     def primitives(self) -> list[Primitive]:
-        """A plate of 10 m below its plane."""
         return [Primitive("box", np.array([10.0, 10.0, PLATE]), (0.0, 0.0, -0.5 * PLATE))]
 
 
 @dataclass(frozen=True)
 class String(Solid):
-    """One end, at its centre, of a string of the given length [m] between two bodies; no body."""
+    """One end of a string between two bodies, at the centre of this shape. It is not the shape of a body.
+
+    Its place is given by the keywords of `sim.mechanism.shapes.Solid`.
+
+    Attributes:
+        length: length of the string [m].
+    """
 
     code = shape_kinds.Shape.STRING
     surface = {"length": (Size.STRING, 1.0)}
@@ -371,7 +443,6 @@ class String(Solid):
         self._positive("length")
 
     def principal(self, mass: float) -> tuple[float, float, float]:
-        """None: it has no mass."""
         raise ValueError("String: a body cannot have this shape")
 
 

@@ -32,20 +32,25 @@ _MARGIN = 8  # level grid lines around kinks: the waves of a spline fade by .27 
 class Terrain:
     """Ground for contacts: `mechanism.on(terrain)`, or Contact(..., terrain=...) one by one.
 
-    heights    (nx, ny) above the lines of a grid, a C2 spline in between [m]; one column (nx, 1): the same for all y.
-               Beyond the grid the ground is level, at the height of the edge
-    origin     (x, y) of heights[0, 0] [m]
-    spacing    (dx, dy) of the grid [m]
-    direction  (x, y) of the first grid axis in the plane
-    plane      (normal, height) of a slope instead: no grid, and no more to compute than on level ground
-    name       in the names of its parameters, the heights: "terrain:ground[3,5]" is heights[3, 5]
-
     Derivatives by parameters of the heights follow by the chain rule. For a loss L and the rises of stairs:
 
         by_height = sim.vjp(trajectory, dL_dx, wrt=("terrain",))["terrain"]
         by_rise = [by_height @ Terrain.steps(unit, depth).heights.ravel() for unit in np.eye(len(rises))]
 
     A slope is a half-space: its parameters are contact_normal and contact_height, of all contacts "contact_normal:*".
+
+    Attributes:
+        heights: (nx, ny) above the lines of a grid [m], with a C2 spline in between; one column (nx, 1) is the same for
+            all y. Beyond the grid the ground is level, at the height of the edge (default level ground).
+        origin: (2,) place (x, y) of heights[0, 0] [m] (default the origin).
+        spacing: (2,) spacing (dx, dy) of the grid [m] (default 1).
+        direction: (2,) direction (x, y) of the first grid axis (default x).
+        plane: (normal, height [m]) of a slope, without a grid and as cheap as level ground (default None: the grid).
+        name: name of the ground in those of its parameters: "terrain:ground[3,5]" is heights[3, 5] (default "ground").
+        coefficients: (nx + 2, ny + 2) coefficients of the spline, computed.
+
+    Raises:
+        ValueError: for a value of the wrong shape or out of range.
     """
 
     heights: ArrayLike = ((0.0,),)
@@ -93,6 +98,7 @@ class Terrain:
             The terrain.
 
         Raises:
+            TypeError: `f` is not a function.
             ValueError: the grid lines are not equally spaced, or a height is not finite.
         """
         if not callable(f):
@@ -110,11 +116,14 @@ class Terrain:
 
         Args:
             angle: slope [rad], below a right angle.
-            direction: (2,) along x, y.
-            height: at x = y = 0 [m].
+            direction: (2,) direction along x, y.
+            height: height at x = y = 0 [m].
 
         Returns:
             The terrain.
+
+        Raises:
+            ValueError: for an angle of a right angle or more, or a value of the wrong shape.
         """
         angle = checks.number("Terrain.slope(angle)", angle)
         if not abs(angle) < 0.5 * np.pi:
@@ -142,10 +151,13 @@ class Terrain:
             depth: distance between rises [m].
             start: place of the first rise along `direction` [m].
             edge: width of a rise [m], at most `depth`.
-            direction: (2,) along x, y.
+            direction: (2,) direction along x, y.
 
         Returns:
             The terrain.
+
+        Raises:
+            ValueError: for an edge wider than the depth, or a value of the wrong shape or out of range.
         """
         call = "Terrain.steps"
         jumps = checks.array(f"{call}(rises)", np.atleast_1d(rises), (None,))
@@ -163,7 +175,15 @@ class Terrain:
         return Terrain(heights[:, None], (place * u, place * w), (dx, 1.0), (u, w))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Height (...,) of the ground [m] at x, y (...,) [m]."""
+        """Height of the ground.
+
+        Args:
+            x: (...,) places along x [m].
+            y: (...,) places along y [m].
+
+        Returns:
+            (...,) heights [m].
+        """
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if self.plane is not None:
             (a, b, c), d = self.plane
@@ -171,7 +191,15 @@ class Terrain:
         return self._spline(self.coefficients, x, y)[0]
 
     def normal(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Outward unit normal (..., 3) of the ground at x, y (...,) [m]."""
+        """Outward normal of the ground.
+
+        Args:
+            x: (...,) places along x [m].
+            y: (...,) places along y [m].
+
+        Returns:
+            (..., 3) unit normals, world axes.
+        """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         if self.plane is not None:
             return np.array(np.broadcast_to(np.asarray(self.plane[0]), (*x.shape, 3)))
@@ -188,17 +216,38 @@ class Terrain:
         return f, C * fs - S * ft, S * fs + C * ft
 
     def offset(self, radius: float) -> Terrain:
-        """The lower bound of the centre of a ball of this radius [m], over a grid wider by as much."""
+        """The lower bound of the centre of a ball that touches the ground.
+
+        Args:
+            radius: radius of the ball [m].
+
+        Returns:
+            The terrain of the centres, over a grid wider by the radius.
+        """
         return self._offset(radius)[0]
 
     def surface(self, radius: float) -> Terrain:
-        """`offset`, computed once per radius."""
+        """`offset`, computed once per radius.
+
+        Args:
+            radius: radius of the ball [m].
+
+        Returns:
+            The terrain of the centres.
+        """
         return self._kept(radius)[0]
 
     def height_gradient(self, radius: float, rows: Floats) -> Floats:
-        """(n, nx, ny) gradients by the heights, from those by the coefficients of the surface at this radius.
+        """Gradients by the heights, from those by the coefficients of the surface at a radius.
 
-        rows: (n, ncoefficient).  The surface at a height of its grid is as high as the ground where the ball touches.
+        The surface at a height of its grid is as high as the ground where the ball touches.
+
+        Args:
+            radius: radius of the ball [m].
+            rows: (n, ncoefficient) gradients by the coefficients of `surface(radius)`.
+
+        Returns:
+            (n, nx, ny) gradients by `heights`.
         """
         surface, touched = self._kept(radius)
         gradient = rows.reshape(len(rows), *surface.coefficients.shape)
@@ -211,7 +260,16 @@ class Terrain:
         return spline_gradient(gradient)
 
     def radius_rate(self, radius: float) -> Floats:
-        """d(coefficients of `surface`)/d(radius), with values sqrt(1 + |grad|^2) at the touched ground."""
+        """Rates of the coefficients of `surface` with the radius.
+
+        The surface rises by sqrt(1 + |grad|^2) at the touched ground per unit of the radius.
+
+        Args:
+            radius: radius of the ball [m].
+
+        Returns:
+            d(coefficients)/d(radius), of their shape.
+        """
         kept: dict[float, Floats] = self.__dict__.setdefault("_rates", {})
         if radius not in kept:
             touched = self._kept(radius)[1]
