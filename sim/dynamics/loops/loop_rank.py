@@ -8,15 +8,26 @@ _NEAR = 0.1  # `weakest` of configurations close to a singular one, over that ne
 
 
 class LoopRank(NamedTuple):
-    """The number of loop constraints of a mechanism, and of those that are independent."""
+    """The number of loop constraints of a mechanism, and of those that are independent.
 
-    constraints: dict[str, int]  # by loop joint
-    redundant: dict[str, int]  # by loop joint: constraints implied by those before it and its own
-    mobility: int  # degrees of freedom that the loops leave
-    weakest: float  # least singular value of the independent constraints, over the largest
-    leftover: float  # largest one of the redundant constraints, over the largest
-    singular: int = 0  # redundant ones that count next to this configuration: branches of the motion may meet here
-    nearby: float = 0.0  # `weakest` next to this configuration
+    Attributes:
+        constraints: number of constraints by loop joint.
+        redundant: by loop joint, number of constraints that those before it and its own imply.
+        mobility: degrees of freedom that the loops leave.
+        weakest: least singular value of the independent constraints, over the largest.
+        leftover: largest one of the redundant constraints, over the largest.
+        singular: number of redundant constraints that count next to this configuration: branches of the motion may meet
+            here.
+        nearby: `weakest` next to this configuration.
+    """
+
+    constraints: dict[str, int]
+    redundant: dict[str, int]
+    mobility: int
+    weakest: float
+    leftover: float
+    singular: int = 0
+    nearby: float = 0.0
 
     def __str__(self) -> str:
         total, idle = sum(self.constraints.values()), sum(self.redundant.values())

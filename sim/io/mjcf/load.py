@@ -37,25 +37,24 @@ def load_mjcf(
     collisions: bool = False,
     gravity: ArrayLike | None = None,
 ) -> MjcfMechanism:
-    """The model of an MJCF file, or of a text that begins with "<"; read by MuJoCo (`pip install "dojo-opt[mjcf]"`).
+    """Load the model of an MJCF file, with MuJoCo's own parser (`pip install "dojo-opt[mjcf]"`).
 
     Args:
-        source: path of the file, or its text
-        ground: whether geoms cannot enter the planes of the file
-        friction: coefficient of all contacts; None: that of the geoms
-        law: of contacts with friction, see Contact; geoms with condim 1 are without
+        source: path of the file, or its text, which begins with "<".
+        ground: whether geoms cannot enter the planes of the file.
+        friction: coefficient of friction of all contacts; None: that of the geoms.
+        law: law of contacts with friction, see `dojo.Contact`; geoms with condim 1 are without.
         merge: whether slides and a hinge in a row become one joint if there is a kind for it, with the same
             coordinates. All other joints in a row are a chain with massless bodies between them.
         keyframe: number of the keyframe whose qpos is the neutral state; None: the default one, with joints outside
-            their range in its middle, and a floating base high enough that nothing penetrates
-        rim_points: points per rim of a cylinder
+            their range in its middle, and a floating base high enough that nothing penetrates.
+        rim_points: number of points per rim of a cylinder.
         collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
-            them: its spheres, capsules, boxes, cylinders and ellipsoids (sim/io/mjcf/collisions.py)
-        gravity: [m/s^2]; None: that of the file
+            them: its spheres, capsules, boxes, cylinders and ellipsoids (sim/io/mjcf/collisions.py).
+        gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
 
     Returns:
-        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also an
-        MjcfWarning.
+        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also an MjcfWarning.
 
     Raises:
         ImportError: MuJoCo is not installed.

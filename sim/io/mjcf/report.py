@@ -22,19 +22,23 @@ class MjcfWarning(UserWarning):
 class MjcfReport:
     """The translation of an MJCF file. `str(report)` is a page of text.
 
-    bodies   where the frame of every body of the file is now
-    joints   of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them
-    gear     force or torque of every input per unit of MuJoCo's control: u = gear * ctrl
-    low      bounds of u from the control and force ranges of the actuators, infinite where there are none; and high
+    Attributes:
+        file: name of the file.
+        notes: unsupported elements, and other differences.
+        bodies: pose of the frame of every body of the file.
+        joints: of every joint of the file, the joint of the mechanism that has its coordinates, and the first of them.
+        gear: (nu,) force or torque of every input per unit of MuJoCo's control, u = gear * ctrl [N, N m].
+        low: (nu,) lower bounds of u from the control and force ranges of the actuators, infinite without any [N, N m].
+        high: (nu,) upper bounds likewise [N, N m].
     """
 
     file: str
     notes: tuple[Note, ...]
     bodies: dict[str, LinkFrame]
     joints: dict[str, tuple[str, int]]
-    gear: Floats  # (nu,)
-    low: Floats  # (nu,) [N, N m]
-    high: Floats  # (nu,)
+    gear: Floats
+    low: Floats
+    high: Floats
 
     __repr__ = brief_repr
 
@@ -55,6 +59,9 @@ class MjcfMechanism(Mechanism):
     and linear couplings of two joints as gears, all of them rigid (equalities.py). Not represented, and listed
     in `report.notes`: other equality constraints, tendons, dry friction of joints, servos, fluids, meshes, height
     fields.
+
+    Attributes:
+        report: poses of the bodies, coordinates of the joints, gears and bounds of the inputs, unsupported elements.
     """
 
     report: MjcfReport | None = field(default=None, compare=False, repr=False)

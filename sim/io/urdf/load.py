@@ -37,39 +37,39 @@ def load_urdf(
     rim_points: int = 4,
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> UrdfMechanism:
-    """The robot of a URDF file.
+    """Load the robot of a URDF file.
 
     Args:
-        path: of the file
-        floating: whether the root can move or is fixed to the world; a root link called "world" is the world in either
-            case. The joint is called "floating_base": its coordinates are the position of the root's frame and its
-            quaternion, its speeds that of the frame's origin (world) and of rotation (body)
-        ground: whether collision shapes cannot enter the half-space z < 0
-        friction: coefficient of all contacts; None: <lateral_friction> of the link where the file has it, else 0.8
-        contacts: which links touch the ground, by name; or dojo.Contact(link, point, radius), with the point in the
+        path: path of the file.
+        floating: whether the root moves freely or is fixed to the world; a root link called "world" is the world in
+            either case. The joint is called "floating_base": its coordinates are the position of the root's frame and
+            its quaternion, its speeds that of the frame's origin (world) and of rotation (body).
+        ground: whether collision shapes cannot enter the half-space z < 0.
+        friction: coefficient of friction of all contacts; None: <lateral_friction> of the link if the file has it, else
+            0.8.
+        contacts: names of the links that touch the ground, or dojo.Contact(link, point, radius), with the point in the
             frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder (points on
             both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make no contacts.
-        merge_fixed: whether links on fixed joints become one body; a link without mass always does
-        locked: joints held at their neutral coordinate, as if they were fixed
+        merge_fixed: whether links on fixed joints become one body; a link without mass always does.
+        locked: names of the joints that are held at their neutral coordinate, as if they were fixed.
         mimic: treatment of joints that follow another one: "gear" couples them (see Gear), "free" and "locked" ignore
-            that
+            that.
         repair: whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or more, and
-            a moving link without mass by a ball of 1 g and 1 cm; False refuses them
-        neutral: coordinates of the neutral state [rad, m] by joint; others are at zero, or in the middle of their range
-            when zero is outside. The base then stands so high that the lowest contact touches.
-        position: of the root's frame when it is fixed [m]
-        actuated: joints with an input, in the order of u; None: all that move, but for floating ones
-        law: of contacts with friction, see Contact
-        rim_points: points per rim of a cylinder
-        gravity: (3,) [m/s^2]
+            a moving link without mass by a ball of 1 g and 1 cm; False refuses them.
+        neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
+            if that excludes zero. The base then stands so high that the lowest contact touches.
+        position: (3,) place of the root's frame, if it is fixed [m].
+        actuated: names of the joints with an input, in the order of u; None: all that move, but for floating ones.
+        law: law of contacts with friction, see `dojo.Contact`.
+        rim_points: number of points per rim of a cylinder.
+        gravity: (3,) acceleration of gravity [m/s^2].
 
     Returns:
-        UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also a
-        UrdfWarning.
+        UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also a UrdfWarning.
 
     Raises:
-        UrdfError: a ValueError, with the file, line and element if the file cannot be read, or with the names of
-            links and joints if the robot cannot be simulated.
+        UrdfError: a ValueError, with the file, line and element if the file cannot be read, or with the names of links
+            and joints if the robot cannot be simulated.
         OSError: the file does not exist.
     """
     file, notes = Path(path), Notes()

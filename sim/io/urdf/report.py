@@ -20,11 +20,17 @@ class UrdfWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Note:
-    """One thing that the mechanism has differently than its file, and the links or joints that it is about."""
+    """One difference between the mechanism and its file.
+
+    Attributes:
+        text: the difference.
+        names: links or joints that it is about.
+        warn: whether `load_urdf` also issues a UrdfWarning.
+    """
 
     text: str
     names: tuple[str, ...]
-    warn: bool = False  # whether `load_urdf` also issues a UrdfWarning
+    warn: bool = False
 
     def __str__(self) -> str:
         shown = ", ".join(self.names[:6]) + (f" and {len(self.names) - 6} more" if len(self.names) > 6 else "")
@@ -33,28 +39,37 @@ class Note:
 
 @dataclass(frozen=True)
 class LinkFrame:
-    """Where the frame of a link is: the body it is part of (None: the world), and its pose there."""
+    """The pose of the frame of a link.
+
+    Attributes:
+        body: name of the body that the link is part of; None for the world.
+        point: (3,) origin of the link, from the centre of mass of the body, body axes [m].
+        orientation: (4,) unit quaternion (w, x, y, z) from the link to the body.
+    """
 
     body: str | None
-    point: tuple[float, ...]  # of the link's origin, from the body's centre of mass, body axes [m]
-    orientation: tuple[float, ...]  # link to body, quaternion (w, x, y, z)
+    point: tuple[float, ...]
+    orientation: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class UrdfReport:
     """The translation of a URDF file. `str(report)` is a page of text.
 
-    links     where every link of the file is now
-    effort    largest force or torque of every input [N, N m], infinite where the file gives none: as control limits
-              (-effort, effort)
-    velocity  largest speed of every input's joint [m/s, rad/s]; nothing enforces it
+    Attributes:
+        file: name of the file.
+        notes: unsupported elements, and other differences.
+        links: pose of every link of the file.
+        effort: (nu,) largest force or torque of every input, infinite where the file gives none: as control limits
+            (-effort, effort) [N, N m].
+        velocity: (nu,) largest speed of every input's joint; nothing enforces it [m/s, rad/s].
     """
 
     file: str
     notes: tuple[Note, ...]
     links: dict[str, LinkFrame]
-    effort: Floats  # (nu,)
-    velocity: Floats  # (nu,)
+    effort: Floats
+    velocity: Floats
 
     __repr__ = brief_repr
 
@@ -71,10 +86,12 @@ class UrdfMechanism(Mechanism):
     Read: inertias, joint limits and damping (revolute, continuous, prismatic, planar, floating, fixed; spherical as in
     PyBullet; planaraxis, planarfree, cylindrical, cylindricalfree, fixedorientation, orbital as in Dojo; and every kind
     of Joint by its own name, but for "planar", which turns in URDF and whose kind without is "planarfixed"), and
-    <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (loops.py). A body's frame has the
-    axes of its first link and its origin at the centre of mass; `report.links` has the pose of every link in its body,
-    `.effort` and `.velocity` the bounds of the inputs and their joints, `.notes` unsupported elements (dry friction,
-    meshes, mimics).
+    <loop_joint>, a joint that closes a loop, as Dojo and Isaac Sim write it (loops.py). A body's frame has the axes of
+    its first link and its origin at the centre of mass.
+
+    Attributes:
+        report: `links` has the pose of every link in its body, `effort` and `velocity` the bounds of the inputs and
+            their joints, `notes` unsupported elements (dry friction, meshes, mimics).
     """
 
     report: UrdfReport | None = field(default=None, compare=False, repr=False)
