@@ -54,7 +54,18 @@ class Horizon:
         self._gaps = np.zeros((knots + 1, engine.ndx))
 
     def states(self, call: str, xs: Floats) -> Floats:
-        """A copy of the states xs (..., nx) with unit quaternions; a ValueError names the call."""
+        """States that the other methods take.
+
+        Args:
+            call: the call that an error names.
+            xs: (..., nx) states.
+
+        Returns:
+            A copy with unit quaternions.
+
+        Raises:
+            ValueError: a quaternion is not of unit length, or a number is not finite.
+        """
         return self._arguments.states(call, xs)
 
     def roll(

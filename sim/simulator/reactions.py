@@ -44,18 +44,29 @@ class Reactions(Result):
     """Wrenches of the joints on their children, means over a step; the opposite wrenches act on the parents.
 
     Torques are about the joint point of the child where the step begins, whose place in the world is `point`. Axes are
-    those of the world, of the joint frame in the parent, or of the child where the step begins, as `frame` says.
-    Joints of the tree come first, then those that close loops. Of redundant constraints some carry nothing.
+    those of the world, of the joint frame in the parent, or of the child where the step begins, as `frame` says. Joints
+    of the tree come first, then those that close loops. Some of redundant constraints carry nothing.
+
+    Attributes:
+        names: names of the n joints.
+        frame: "world", "joint" or "body".
+        point: (..., n, 3) joint points in the world [m].
+        force: (..., n, 3) whole force on the child [N].
+        torque: (..., n, 3) whole torque on the child [N m].
+        constraint_force: (..., n, 3) part of the force that the constraint gives [N].
+        constraint_torque: (..., n, 3) part of the torque that the constraint gives [N m].
+        status: Status of the first unsolved step, whose rows are NaN.
+        detail: sentence about an unsolved step, with its numbers.
     """
 
     names: tuple[str, ...]
     frame: str
-    point: Floats  # (..., n, 3) [m]
-    force: Floats  # (..., n, 3) whole force on the child [N]
-    torque: Floats  # (..., n, 3) [N m]
-    constraint_force: Floats  # (..., n, 3) of which the constraint gives [N]
-    constraint_torque: Floats  # (..., n, 3) [N m]
-    status: Status  # of the first unsolved step, whose rows are NaN
+    point: Floats
+    force: Floats
+    torque: Floats
+    constraint_force: Floats
+    constraint_torque: Floats
+    status: Status
     detail: str = ""
 
     __repr__ = brief_repr

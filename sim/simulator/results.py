@@ -27,7 +27,11 @@ STATUSES = tuple(Status)  # by number: twice as fast as Status(number)
 
 
 class SimulationError(RuntimeError):
-    """A time step that did not reach its tolerance; `status` is the reason."""
+    """A time step that did not reach its tolerance; `status` is the reason.
+
+    Attributes:
+        status: Status of the step.
+    """
 
     def __init__(self, message: str, status: Status) -> None:
         super().__init__(message)
@@ -35,11 +39,12 @@ class SimulationError(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a long call, which ends within a fifth of a second; `result` is the partial result.
+    """Ctrl-C during a long call, which ends within a fifth of a second.
 
-    result    the return value of the call so far: the Trajectory, Shot or Batch of a rollout with the
-              steps that were solved, the Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of
-              `closed_loop`; None where nothing was done yet. Calls that only differentiate raise KeyboardInterrupt
+    Attributes:
+        result: return value of the call so far: the Trajectory, Shot or Batch of a rollout with the solved steps, the
+            Plan of `ilqr` with the trajectory of its last iteration, the ClosedLoop of `closed_loop`; None if nothing
+            was done yet. Calls that only differentiate raise KeyboardInterrupt.
     """
 
     def __init__(self, result: Any = None) -> None:
@@ -51,10 +56,15 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Result:
-    """How a call ended. `status` is one Status, or an array with that of each knot or rollout."""
+    """How a call ended.
+
+    Attributes:
+        status: one Status, or an array with that of each knot or rollout.
+        detail: sentence about an unsolved step, with its numbers.
+    """
 
     status: Any
-    detail: str = ""  # the sentence about an unsolved step, with its numbers
+    detail: str = ""
 
     @property
     def success(self) -> bool:
@@ -67,7 +77,11 @@ class Result:
         return self.detail or MESSAGES[self._end()]
 
     def check(self) -> None:
-        """SimulationError unless all steps were solved."""
+        """Raise an error unless all steps were solved.
+
+        Raises:
+            SimulationError: a step was not solved.
+        """
         if not self.success:
             raise SimulationError(self.message, self._end())
 
@@ -91,15 +105,25 @@ def ended(result: Ended, throw: bool) -> Ended:
 
 @dataclass(frozen=True, repr=False)
 class Contacts:
-    """Contacts over one step, (ncontact, ...), or over the steps of a trajectory, (T, ncontact, ...). World axes."""
+    """Contacts over one step, (ncontact, ...), or over the steps of a trajectory, (T, ncontact, ...). World axes.
+
+    Attributes:
+        names: names of the contacts.
+        normals: (..., ncontact, 3) normals into the body; of a collision, from its second body to its first.
+        time_step: time step [s].
+        impulse: (..., ncontact, 3) impulse on the body [N s].
+        point: (..., ncontact, 3) its point of action at the end of the step [m].
+        gap: (..., ncontact) distance from the ground at the end of the step [m].
+        slip: (..., ncontact) sliding speed [m/s].
+    """
 
     names: tuple[str, ...]
-    normals: Floats  # (..., ncontact, 3) into the body; of a collision, from its second body to its first
-    time_step: float  # [s]
-    impulse: Floats  # (..., ncontact, 3) impulse on the body [N s]
-    point: Floats  # (..., ncontact, 3) where it acts, at the end of the step [m]
-    gap: Floats  # (..., ncontact) distance from the ground at the end of the step [m]
-    slip: Floats  # (..., ncontact) sliding speed [m/s]
+    normals: Floats
+    time_step: float
+    impulse: Floats
+    point: Floats
+    gap: Floats
+    slip: Floats
 
     def __repr__(self) -> str:
         if self.impulse.ndim > 2:
@@ -126,21 +150,33 @@ class Contacts:
 
 @dataclass(frozen=True)
 class StepResult(Result):
-    """One time step. When it was not solved, x is the state before it."""
+    """One time step. If it was not solved, x is the state before it.
 
-    x: Floats  # (nx,)
+    Attributes:
+        x: (nx,) state.
+        status: Status of the step.
+        iterations: iterations of Newton's method; of all solves, if loops solve the step again.
+        residual: largest error of a balance or gap equation [N s, m].
+        violation: largest |product - kappa| of the complementary pairs [N s m].
+        scene: mechanism, time step, and rows of the contacts, for `contacts`.
+        substeps: number of steps that it was divided into.
+        share: share of the momentum of bodies against each other that a divided step handed on.
+        detail: sentence about an unsolved step, with its numbers.
+    """
+
+    x: Floats
     status: Status
-    iterations: int  # of Newton's method; of all solves, if loops solve the step again
-    residual: float  # largest error of a balance or gap equation [N s, m]
-    violation: float  # largest |product - kappa| of the complementary pairs
-    scene: tuple[Mechanism, float, Floats] = field(repr=False)  # mechanism, time step, rows of the contacts
-    substeps: int = 1  # that it was divided into
-    share: float = 1.0  # of the momentum of bodies against each other that a divided step handed on
+    iterations: int
+    residual: float
+    violation: float
+    scene: tuple[Mechanism, float, Floats] = field(repr=False)
+    substeps: int = 1
+    share: float = 1.0
     detail: str = ""
 
     @cached_property
     def contacts(self) -> Contacts:
-        """Its contacts, (ncontact, ...)."""
+        """Contacts of the step, (ncontact, ...)."""
         return contacts_of(*self.scene)
 
     __repr__ = brief_repr
@@ -148,21 +184,37 @@ class StepResult(Result):
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Result):
-    """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows."""
+    """A rollout. It ends at the first step that was not solved: then x has knot + 1 rows, u and the rest knot rows.
 
-    simulator: Any  # the Simulator that made it
-    x: Floats  # (T + 1, nx)
-    u: Floats  # (T, nu) [N, N m]
-    time: Floats  # (T + 1,) [s]
+    Attributes:
+        simulator: the Simulator that made it.
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+        time: (T + 1,) times of the states [s].
+        status: Status of the rollout.
+        knot: number of solved steps.
+        residual: largest error of an equation in the last step that was tried [N s, m].
+        iterations: (T,) iterations of each step.
+        contacts: contacts of each step, (T, ncontact, ...).
+        substeps: (T,) number of steps that each step was divided into.
+        shares: (T,) share of the momentum of bodies against each other that each step handed on: 1, but in whips.
+        detail: sentence about an unsolved step, with its numbers.
+        wrenches: (T, nbody, 6) external wrenches [N, N m]; None without any.
+    """
+
+    simulator: Any
+    x: Floats
+    u: Floats
+    time: Floats
     status: Status
-    knot: int  # number of solved steps
-    residual: float  # of the last step that was tried
-    iterations: Integers  # (T,)
+    knot: int
+    residual: float
+    iterations: Integers
     contacts: Contacts
-    substeps: Integers  # (T,) that each step was divided into
-    shares: Floats  # (T,) of the momentum of bodies against each other that each step handed on: 1, but in whips
+    substeps: Integers
+    shares: Floats
     detail: str = ""
-    wrenches: Floats | None = None  # (T, nbody, 6) external ones, if there were any [N, N m]
+    wrenches: Floats | None = None
 
     def __repr__(self) -> str:
         sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
@@ -172,20 +224,36 @@ class Trajectory(Result):
 
 @dataclass(frozen=True)
 class Shot(Result):
-    """A closed-loop rollout; x and u end at the first knot that was not solved."""
+    """A closed-loop rollout; x and u end at the first knot that was not solved.
 
-    x: Floats  # (T + 1, nx)
-    u: Floats  # (T, nu) [N, N m]
+    Attributes:
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+        status: Status of the rollout.
+        knot: number of solved knots.
+        residual: largest error of an equation in the last step that was tried [N s, m].
+        detail: sentence about an unsolved step, with its numbers.
+    """
+
+    x: Floats
+    u: Floats
     status: Status
-    knot: int  # number of solved knots
-    residual: float  # of the last step that was tried
+    knot: int
+    residual: float
     detail: str = ""
 
     __repr__ = brief_repr
 
     @classmethod
     def of(cls, found: tuple[int, Path]) -> Shot:
-        """From (number of solved knots, all of them)."""
+        """The result of a rollout.
+
+        Args:
+            found: (number of solved knots, all of them).
+
+        Returns:
+            The result.
+        """
         knot, path = found
         return cls(path.xs[: knot + 1], path.us[:knot], Status(int(path.report[0])), knot, float(path.report[2]))
 
@@ -194,15 +262,23 @@ class Shot(Result):
 class Jacobian(Result):
     """Derivatives of one step: `A, B = jacobian`; with names (wrt=...), a table of blocks by these names.
 
-    Taking out A, B or a block raises SimulationError where the step was not solved.
+    A, B and blocks of an unsolved step raise SimulationError when they are taken out.
+
+    Attributes:
+        blocks: "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n).
+        x_next: (nx,) state after the step.
+        status: Status of the step.
+        accuracy: estimate of the error, relative to the largest entry.
+        detail: sentence about an unsolved step, with its numbers.
+        by_name: whether the blocks were requested by names.
     """
 
-    blocks: Mapping[str, Floats]  # "state" (ndx, ndx), "input" (ndx, nu), parameters (ndx, n)
-    x_next: Floats  # (nx,)
+    blocks: Mapping[str, Floats]
+    x_next: Floats
     status: Status
-    accuracy: float = 0.0  # estimate of the error, relative to the largest entry
+    accuracy: float = 0.0
     detail: str = ""
-    by_name: bool = False  # requested by names
+    by_name: bool = False
 
     __repr__ = brief_repr
 
@@ -231,31 +307,62 @@ class Jacobian(Result):
         return self.blocks[("state", "input")[name] if isinstance(name, int) else name]
 
     def keys(self) -> Iterable[str]:
-        """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them."""
+        """Names of the blocks, in the order of wrt=...; `dict(jacobian)` is a table of them.
+
+        Returns:
+            The names.
+
+        Raises:
+            SimulationError: the step was not solved.
+        """
         self.check()
         return self.blocks.keys()
 
     def values(self) -> Iterable[Floats]:
-        """The blocks."""
+        """The blocks.
+
+        Returns:
+            Blocks (ndx, n), in the order of the names.
+
+        Raises:
+            SimulationError: the step was not solved.
+        """
         self.check()
         return self.blocks.values()
 
     def items(self) -> Iterable[tuple[str, Floats]]:
-        """Names and blocks."""
+        """Names and blocks.
+
+        Returns:
+            Pairs (name, block (ndx, n)).
+
+        Raises:
+            SimulationError: the step was not solved.
+        """
         self.check()
         return self.blocks.items()
 
 
 @dataclass(frozen=True)
 class Linearization(Result):
-    """Derivatives of every knot at its state and input, in tangent coordinates."""
+    """Derivatives of every knot at its state and input, in tangent coordinates.
 
-    A: Floats  # (T, ndx, ndx)
-    B: Floats  # (T, ndx, nu)
-    x_next: Floats  # (T, nx)
-    status: Integers  # (T,) Status of each knot; the derivatives of an unsolved knot are zero
-    parameters: Mapping[str, Floats] = field(default_factory=dict)  # by name (T, ndx, n); the requested ones
-    # (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts cost digits
+    Attributes:
+        A: (T, ndx, ndx) derivatives by the state.
+        B: (T, ndx, nu) derivatives by the input.
+        x_next: (T, nx) states after the knots.
+        status: (T,) Status of each knot; the derivatives of an unsolved knot are zero.
+        parameters: derivatives (T, ndx, n) by the names of the requested parameters.
+        accuracy: (T,) estimate of the error of A and B, relative to their largest entry: hard contacts on light parts
+            cost digits.
+        detail: sentence about an unsolved step, with its numbers.
+    """
+
+    A: Floats
+    B: Floats
+    x_next: Floats
+    status: Integers
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
     accuracy: Floats = field(default_factory=lambda: np.zeros(0))
     detail: str = ""
 
@@ -264,7 +371,15 @@ class Linearization(Result):
 
 @dataclass(frozen=True)
 class Gradient(Result, Mapping[str, Floats]):
-    """Gradient of a scalar of a rollout, by the names of wrt=...; SimulationError where a step was not solved."""
+    """Gradient of a scalar of a rollout, by the names of wrt=...
+
+    Blocks of an unsolved rollout raise SimulationError when they are taken out.
+
+    Attributes:
+        blocks: "state" (ndx,), "input" (T, nu), parameters (n,).
+        status: Status of the rollout.
+        detail: sentence about an unsolved step, with its numbers.
+    """
 
     blocks: Mapping[str, Floats]
     status: Status
@@ -285,18 +400,32 @@ class Gradient(Result, Mapping[str, Floats]):
 
 @dataclass(frozen=True)
 class Batch(Result):
-    """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state."""
+    """Rollouts from many states. Rows after the first unsolved step of a rollout repeat its last state.
 
-    x: Floats  # (n, T + 1, nx)
-    status: Integers  # (n,) Status of each rollout
-    knot: Integers  # (n,) number of solved steps
+    Attributes:
+        x: (n, T + 1, nx) states.
+        status: (n,) Status of each rollout.
+        knot: (n,) number of solved steps.
+        detail: sentence about an unsolved step, with its numbers.
+    """
+
+    x: Floats
+    status: Integers
+    knot: Integers
     detail: str = ""
 
     __repr__ = brief_repr
 
     @classmethod
     def of(cls, rows: tuple[Floats, Integers, Integers]) -> Batch:
-        """From (states, status, number of solved steps), the rows after the last solved step still to be filled in."""
+        """The result of a batch.
+
+        Args:
+            rows: (states, status, number of solved steps), the rows after the last solved step still to be filled in.
+
+        Returns:
+            The result.
+        """
         xs, _, knots = rows
         for x, knot in zip(xs, knots, strict=True):
             x[knot + 1 :] = x[knot]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace as changed
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +15,6 @@ from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.arguments import is_plain
 from sim.simulator.contact_settings import with_contacts
-from sim.simulator.describe import describe
 from sim.simulator.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
@@ -41,10 +39,6 @@ from sim.simulator.settings import Settings, default_kappa
 from sim.simulator.state_space import StateSpace
 from solvers.status import Status
 
-if TYPE_CHECKING:
-    from sim.derivatives.parameters.parameters import Parameters
-    from sim.simulator.parameter_engine import ParameterEngine
-
 Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
@@ -53,27 +47,33 @@ _ORDERS = (2, 4, 6, 8)
 
 
 class Simulator(StateSpace):
-    """A mechanism, a time step [s], and how exactly a step is solved.
-
-    kappa           central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa over
-                    its impulse. By default 1e-9 m/s * m |g| h, m the lightest part that no joint holds to another,
-                    |g| 9.81 m/s^2 without gravity, within 1e-13 and 1e-6; with collisions m is that of all parts
-    tolerance       of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum
-    max_iterations  of the interior point
-    order           of a step; 4, 6, 8 explicit, for trees: 4, 7, 12 evaluations of the equations of motion. Momentum
-                    is exact with all; order 2 bounds the energy for ever, the others keep a much smaller error that
-                    grows. Steps that would omit impulses kappa / gap beyond the tolerance are of order 2
-    divide          whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps,
-                    as few as it needs: see `substeps` of results. Momentum is handed on exactly, but where no poses a
-                    step apart have it: there, bodies lose momentum against each other, see `shares`
+    """A mechanism, a time step, and the accuracy of its steps.
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
-    With order 2, v is the mean velocity over the interval that led to q; with higher orders that of the node, M(q)^-1 p
-    before the ground acts in the next step: standing still, g h/2.
+    With order 2, v is the mean velocity over the interval that led to q. With higher orders it is that of the node,
+    M(q)^-1 p before the ground acts in the next step: standing still, g h/2.
 
     Every method that steps returns a result with `success`, `status` and `message`, and raises SimulationError for an
     unsolved step only with throw=True. External wrenches are (nbody, 6), with steps in front (T, nbody, 6), or
     {body: (6,) or (T, 6)}: a force at the centre of mass [N], then a torque [N m], in world axes, constant over a step.
+
+    Args:
+        mechanism: the mechanism.
+        time_step: length h of a step [s].
+        kappa: central-path parameter [N s m]: contacts press with kappa / gap, a resting body floats by kappa / impulse
+            (default 1e-9 m/s m |g| h with the lightest free mass m, within 1e-13 and 1e-6; see settings.py).
+        tolerance: error of the equations of a step [N s, N m s, m], relative to 1 + the largest momentum.
+        max_iterations: limit of the iterations of the interior point.
+        order: 2, or 4, 6, 8 for trees: explicit steps with 4, 7, 12 evaluations of the dynamics. All keep momentum.
+            Order 2 bounds the energy for ever; the others have a much smaller error that grows, and steps of order 2
+            where theirs would omit impulses kappa / gap beyond the tolerance.
+        divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
+            few as it needs: see `substeps` of results. Momentum is handed on exactly, unless no poses a step apart have
+            it. Then bodies lose momentum against each other: see `shares`.
+
+    Raises:
+        TypeError: for a mechanism or a `divide` of the wrong kind.
+        ValueError: for a setting out of range; in all methods, for wrong shapes and numbers that are not finite.
     """
 
     def __init__(
@@ -113,9 +113,17 @@ class Simulator(StateSpace):
         return f"Simulator({self.mechanism.name}, {numbers})"
 
     def replace(self, **settings: Any) -> Simulator:
-        """The same with other settings: those of Simulator(...), and `friction`, `law`, `gravity`, `mechanism`.
+        """The same simulator with other settings. Compiled code is shared, and a default kappa stays one.
 
-        friction, law: for all contacts, or {contact name: value}. A default kappa stays one. Compiled code is shared.
+        Args:
+            **settings: settings of Simulator(...), `mechanism`, `gravity` (3,) [m/s^2], and `friction` and `law` of the
+                contacts with the ground: one for all, or {contact name: value}.
+
+        Returns:
+            The new simulator.
+
+        Raises:
+            ValueError: for an unknown setting or contact, or a value out of range.
         """
         known = ("mechanism", *_SETTINGS, "friction", "law", "gravity")
         for key in settings:
@@ -127,11 +135,6 @@ class Simulator(StateSpace):
         if "gravity" in settings:
             mech = changed(mech, gravity=settings.pop("gravity"))
         return Simulator(mech, **{**self._given(), **settings})
-
-    def describe(self) -> str:
-        """The parts of the scene, the work of a step, and its omitted terms, as text."""
-        rank = str(self.loop_rank()) if self._closes else ""
-        return describe(self.mechanism, self.model, self._engine.settings, rank)
 
     # -- motions -------------------------------------------------------------------------------------------------------
 
@@ -246,8 +249,11 @@ class Simulator(StateSpace):
 
         Args:
             x0s: first states (n, nx).
-            us: inputs (n, T, nu).
+            us: inputs (n, T, nu) [N, N m].
             throw: raise SimulationError if a step is not solved.
+
+        Returns:
+            Batch of the states.
         """
         call = "Simulator.rollout_batch"
         inputs = self._arguments.inputs("rollout_batch", "us", us, ("n", "T", self.nu))
@@ -323,6 +329,9 @@ class Simulator(StateSpace):
 
         Returns:
             Reactions; NaN in the rows of unsolved steps.
+
+        Raises:
+            ValueError: for wrenches and states of different or more leading axes, or an unknown frame.
         """
         states, lead = self._arguments.stacked("reactions", "x", x)
         given = np.zeros((*lead, self.nu)) if u is None else u
@@ -336,18 +345,33 @@ class Simulator(StateSpace):
         return ended(found, throw)
 
     def left_out(self, x: ArrayLike, u: ArrayLike | None = None) -> tuple[str, ...]:
-        """Names of the inactive contacts of the step from x, which the solver omits.
+        """Inactive contacts of a step; the solver has no unknowns for them, but their forces kappa / gap act.
 
-        Their forces, kappa / gap, act all the same, to the tolerance of the step. See `describe()` for the distances.
-        An unsolved step raises SimulationError.
+        Args:
+            x: (nx,) state.
+            u: (nu,) input; zero by default.
+
+        Returns:
+            Names of the contacts; `describe()` has the distances.
+
+        Raises:
+            SimulationError: the step is not solved.
         """
         self.step(x, u, throw=True)
         return tuple(name for name, far in zip(self.mechanism.contact_names, self._engine.far(), strict=True) if far)
 
     def horizon(self, knots: int, substeps: int = 1, limits: tuple[ArrayLike, ArrayLike] | None = None) -> Horizon:
-        """Rollouts and derivatives of trajectories of so many knots, for a planner: see horizon.py.
+        """Rollouts and derivatives of many trajectories of one length, for a planner: see horizon.py.
 
-        Of whole steps: a planner is better off with a refusal of wild steps than with their parts.
+        Steps are whole: a planner is better off with a refusal of wild steps than with their parts.
+
+        Args:
+            knots: number of knots.
+            substeps: time steps per knot.
+            limits: (lower, upper) of u, each a number or (nu,) [N, N m].
+
+        Returns:
+            Horizon with its buffers.
         """
         call = "Simulator.horizon"
         return Horizon(
@@ -468,6 +492,9 @@ class Simulator(StateSpace):
 
         Returns:
             Linearization; the derivatives of unsolved knots are zero.
+
+        Raises:
+            ValueError: for numbers of states and inputs that do not match.
         """
         call = "Simulator.linearize_trajectory"
         inputs = self._arguments.inputs("linearize_trajectory", "us", us, ("T", self.nu))
@@ -489,11 +516,19 @@ class Simulator(StateSpace):
     def linearize_maximal(
         self, z: ArrayLike, u: ArrayLike | None = None, kappa: float | None = None, *, throw: bool = False
     ) -> Jacobian:
-        """d(next maximal state)/d(z, u), (12 nbody, 12 nbody) and (12 nbody, nu).
+        """Derivatives of the next maximal state by maximal state and input, in the tangents of `maximal_jacobian`.
 
-        Tangent coordinates per body: position, velocity (world), rotation (right perturbation of the quaternion),
-        angular velocity (body). The step sees z through minimal(z): violations of joints have no effect, so A is the
-        derivative of maximal(step(minimal(z))).
+        The step sees z through minimal(z): violations of joints have no effect, so A is the derivative of
+        maximal(step(minimal(z))).
+
+        Args:
+            z: (nbody, 13) maximal state, as `maximal` returns it.
+            u: (nu,) input; zero by default.
+            kappa: central-path parameter; that of the simulator by default.
+            throw: raise SimulationError where the step is not solved.
+
+        Returns:
+            Jacobian with the blocks (12 nbody, 12 nbody) and (12 nbody, nu).
         """
         bodies = checks.array("Simulator.linearize_maximal(z)", z, (self.nbody, 13))
         found = self.linearize(self.minimal(bodies), u, kappa, throw=throw)
@@ -549,37 +584,17 @@ class Simulator(StateSpace):
         finite = all(np.isfinite(block).all() for block in blocks.values())
         return ended(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
 
-    def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
-        """Names and values of parameters: of all, or of the given names, in their order.
-
-            kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
-
-        A name without a component stands for all of them, one without a part for all parts; `kind:*` is a single one
-        that adds the same to all parts, at the mean of their values. Kinds (units: parameter.py):
-
-            mass, inertia, com          of bodies; a mass changes alone; com is a displacement from where it is, and
-                                        joints, contacts and shapes stay where they are on the body
-            parent_point, child_point   of joints, also of those that close loops
-            orientation, axis           rotation vector of the joint frame, from where it is; direction
-            spring, damper, rest, armature, lower, upper, cone       of joints; gear_ratio, gear_offset
-            input_force, input_torque   of a unit of an input on a body; gravity, time_step
-            friction, restitution       of contacts and collisions
-            contact_point, contact_radius, contact_height, contact_normal; terrain, heights of its grid
-            shape_a, shape_b            centres of the shapes of collisions in their bodies
-            size_a, size_b              their [radius], [length], [x], [y], [z]; of a polytope its [scale], 1 as it is;
-                                        a body's inertia is that of its own shape, and stays
-        """
-        call = "Simulator.parameters(wrt)"
-        return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
-
     def with_parameters(self, values: Mapping[str, ArrayLike]) -> Simulator:
-        """The same, including its kappa, with other values of parameters; a ValueError names impossible ones."""
+        """The same simulator, including its kappa, with other values of parameters.
+
+        Args:
+            values: {name: value}, with the names of `parameters`.
+
+        Returns:
+            The new simulator.
+
+        Raises:
+            ValueError: for an unknown name, or a value that no mechanism has.
+        """
         mech, time_step = self._by_parameters.with_values("Simulator.with_parameters(...)", values)
         return self.replace(mechanism=mech, time_step=time_step, kappa=self.kappa)
-
-    @cached_property
-    def _by_parameters(self) -> ParameterEngine:
-        """Calls by parameters, and sweeps; their modules are imported on first use."""
-        from sim.simulator.parameter_engine import ParameterEngine
-
-        return ParameterEngine(self._engine, self.mechanism, self.time_step)

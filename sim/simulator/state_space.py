@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +15,15 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack import mechanism_sizes, pack
 from sim.model.model import Model
 from sim.simulator.arguments import Arguments, shaped
+from sim.simulator.describe import describe
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
 from sim.simulator.settings import Settings
+
+if TYPE_CHECKING:
+    from sim.derivatives.parameters.parameters import Parameters
+    from sim.simulator.parameter_engine import ParameterEngine
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +45,7 @@ def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine
 
 
 class StateSpace:
-    """Sizes and settings, states on their manifold, and other views of them."""
+    """Sizes, settings and parameters, states on their manifold, and other views of them."""
 
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
@@ -56,8 +63,46 @@ class StateSpace:
             raise AttributeError(f"Simulator.{name}: a Simulator does not change; use replace({name}=...)")
         super().__setattr__(name, value)
 
+    def describe(self) -> str:
+        """A page of text about the simulator.
+
+        Returns:
+            The parts of the scene, the work of a step, and its omitted terms.
+        """
+        rank = str(self.loop_rank()) if self._closes else ""
+        return describe(self.mechanism, self.model, self._engine.settings, rank)
+
+    def parameters(self, wrt: Sequence[str] | None = None) -> Parameters:
+        """Names and values of parameters; `dojo.Parameters` describes the names.
+
+        Args:
+            wrt: names, in the order of the values; all parameters by default.
+
+        Returns:
+            Parameters.
+
+        Raises:
+            ValueError: for an unknown name.
+        """
+        call = "Simulator.parameters(wrt)"
+        return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
+
+    @cached_property
+    def _by_parameters(self) -> ParameterEngine:
+        """Calls by parameters, and sweeps; their modules are imported on first use."""
+        from sim.simulator.parameter_engine import ParameterEngine
+
+        return ParameterEngine(self._engine, self.mechanism, self.time_step)
+
     def neutral(self) -> Floats:
-        """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`."""
+        """The standing or hanging state of the mechanism, at rest, its loops closed as by `close`.
+
+        Returns:
+            State (nx,).
+
+        Raises:
+            ValueError: a loop cannot be closed.
+        """
         x = np.concatenate([np.asarray(self.mechanism.neutral, dtype=np.float64), np.zeros(self.nv)])
         return self.close(x) if self._closes else x
 
@@ -249,7 +294,10 @@ class StateSpace:
         return xs.reshape(*lead, self.nx)
 
     def maximal_jacobian(self, x: ArrayLike) -> Floats:
-        """dz/dx in tangent coordinates, per body [position, velocity, rotation, omega].
+        """dz/dx in tangent coordinates.
+
+        Those of z are, per body: position, velocity (world), rotation (right perturbation of the quaternion), angular
+        velocity (body).
 
         Args:
             x: state (nx,).

@@ -36,7 +36,35 @@ Floats = NDArray[np.float64]
 
 
 class Parameters(NamedTuple):
-    """The parameters of a selection, in order; `rows` has those of each name."""
+    """The parameters of a selection, in order; `parameters[name]` has the values of one name.
+
+        kind:part[component]    mass:trunk   com:trunk[0]   spring:knee   friction:foot   gravity[2]   time_step
+
+    A name without a component stands for all of them, one without a part for all parts. `kind:*` is a single parameter
+    that adds the same to all parts, at the mean of their values. Kinds:
+
+        mass [kg], inertia [kg m^2]        of bodies; a mass changes alone
+        com [m]                            displacement of a centre of mass; joints, contacts and shapes stay where they
+                                           are on the body
+        parent_point, child_point [m]      of joints, also of those that close loops
+        orientation [rad], axis            rotation vector of the joint frame, from where it is; direction
+        spring [N/m, N m/rad], damper [N s/m, N m s/rad], rest [m, rad], armature [kg, kg m^2], lower, upper [m, rad],
+        cone [rad], pitch [m/rev]          of joints
+        gear_ratio [rad/rad, m/rad], gear_offset [m, rad]
+        input_force, input_torque [m]      of a unit of an input on a body
+        friction, restitution              of contacts and collisions
+        contact_point, contact_radius, contact_height [m], contact_normal
+        terrain [m]                        heights of its grid
+        shape_a, shape_b [m]               centres of the shapes of collisions in their bodies
+        size_a, size_b [m]                 their [radius], [length], [x], [y], [z]; of a polytope its [scale], 1 at
+                                           first; a body's inertia is that of its own shape, and stays
+        gravity [m/s^2], time_step [s]
+
+    Attributes:
+        names: names with part and component.
+        values: (n,) values.
+        rows: {requested name: slice of its values}.
+    """
 
     names: tuple[str, ...]
     values: Floats  # (n,)
