@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import ast
+import dataclasses
+import functools
 import importlib
+import inspect
 import json
 import pkgutil
 import re
+import textwrap
+from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
 import dojo_opt as dojo
 from benchmarks import compare
 from dojo_opt import cli
+from dojo_opt.mpc.settings import MPCSettings
+from dojo_opt.plant import monte_carlo, tick
+from dojo_opt.viewer.motion import Motion
+from sim.io.mjcf import report as mjcf_report
+from sim.io.urdf import report as urdf_report
+from sim.simulator import results
 from support.programs import HOME, PACKAGES, python
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -138,3 +152,120 @@ def test_files_stay_readable() -> None:
 def test_examples_are_short() -> None:
     for script in (ROOT / "examples").glob("*.py"):
         assert len(script.read_text().splitlines()) <= 60, script
+
+
+# -- docstrings --------------------------------------------------------------------------------------------------------
+
+# classes that users get from the public names, or whose fields are keywords of these
+REACHED = (
+    *(MPCSettings, Motion, tick.Tick, monte_carlo.MonteCarlo, monte_carlo.MonteCarloRun),
+    *(results.Batch, results.Contacts, results.Gradient, results.Jacobian, results.Shot),
+    *(mjcf_report.MjcfReport, urdf_report.UrdfReport, urdf_report.LinkFrame, urdf_report.Note),
+)
+UNDOCUMENTED = ("dojo.Environment",)  # its methods are Gymnasium's, with the arguments that are described there
+
+
+def public_objects() -> Iterator[tuple[str, Any]]:
+    """Every function, class, method and property that the public names lead to, with its name."""
+    seen: set[int] = set()
+    todo = [(f"dojo.{name}", getattr(dojo, name)) for name in dojo.__all__]
+    todo += [(cls.__name__, cls) for cls in REACHED]
+    while todo:
+        name, thing = todo.pop()
+        if isinstance(thing, ModuleType):
+            todo += [(f"{name}.{key}", getattr(thing, key)) for key in getattr(thing, "__all__", ())]
+        elif callable(thing) and _is_ours(thing) and id(thing) not in seen:
+            seen.add(id(thing))
+            yield name, thing
+            for key in dir(thing) if inspect.isclass(thing) else ():
+                member = inspect.getattr_static(thing, key)
+                described = isinstance(member, property | functools.cached_property) or inspect.isroutine(member)
+                if not key.startswith("_") and described and _is_ours(_owner(thing, key)):
+                    yield f"{name}.{key}", member if not inspect.isroutine(member) else getattr(thing, key)
+
+
+def _is_ours(thing: Any) -> bool:
+    return str(getattr(thing, "__module__", "")).startswith(PACKAGES)
+
+
+def _owner(cls: type, key: str) -> type:
+    """The class that defines a member."""
+    return next(c for c in cls.__mro__ if key in vars(c))
+
+
+def _sections(thing: Any) -> dict[str, list[str]]:
+    """Names that are described in each section of a docstring."""
+    found = re.findall(
+        r"^(Args|Attributes|Returns|Raises):\n((?:    .*\n|\n)*)", f"{inspect.getdoc(thing)}\n", flags=re.MULTILINE
+    )
+    return {title: re.findall(r"^    \*{0,2}(\w+):", text, flags=re.MULTILINE) for title, text in found}
+
+
+def _undescribed(thing: Any) -> list[str]:
+    """Gaps in the docstring of a function, a class or a property."""
+    if not inspect.getdoc(thing):
+        return ["docstring"]
+    if isinstance(thing, property | functools.cached_property):
+        return []
+    if not inspect.isclass(thing):
+        return [*_undescribed_arguments(thing, thing), *_undescribed_result(thing)]
+    if dataclasses.is_dataclass(thing):
+        fields = [field.name for field in dataclasses.fields(thing)]
+    elif "_fields" in vars(thing):
+        fields = thing._fields
+    else:
+        constructed = _is_ours(_owner(thing, "__init__")) and not getattr(thing, "_is_protocol", False)
+        documented = constructed and not issubclass(thing, BaseException)
+        return _undescribed_arguments(thing, thing.__init__) if documented else []
+    known = {name for cls in thing.__mro__ for name in _sections(cls).get("Attributes", ())}
+    return [f"field {name}" for name in fields if name not in known]
+
+
+def _undescribed_arguments(thing: Any, function: Any) -> list[str]:
+    """Gaps in the arguments and errors of a function, which the docstring of `thing` describes."""
+    sections = _sections(thing)
+    names = [name for name in inspect.signature(function).parameters if name not in ("self", "cls")]
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    raises = any(isinstance(node, ast.Raise) for node in ast.walk(tree)) and "Raises" not in sections
+    return [f"Args {names}"] * (names != sections.get("Args", [])) + ["Raises"] * raises
+
+
+def _undescribed_result(function: Any) -> list[str]:
+    result = inspect.signature(function).return_annotation
+    return ["Returns"] * (result not in (None, "None") and "Returns" not in _sections(function))
+
+
+def test_everything_public_is_described() -> None:
+    """A docstring names all arguments in their order, the result, and the errors that the function itself raises."""
+    found = dict(public_objects())
+    assert len(found) > 300 and len(UNDOCUMENTED) <= 5
+    missing = {name: _undescribed(thing) for name, thing in found.items() if not name.startswith(UNDOCUMENTED)}
+    assert {name: things for name, things in missing.items() if things} == {}
+
+
+def test_the_check_of_docstrings_finds_gaps() -> None:
+    def stale(a: float, b: float) -> float:
+        """Add.
+
+        Args:
+            b: second number.
+            a: first number.
+        """
+        if a < 0.0:
+            raise ValueError
+        return a + b
+
+    @dataclasses.dataclass
+    class Half:
+        """A pair.
+
+        Attributes:
+            one: first number.
+        """
+
+        one: float
+        other: float
+
+    assert _undescribed(stale) == ["Args ['a', 'b']", "Raises", "Returns"]
+    assert _undescribed(Half) == ["field other"]
+    assert _undescribed(lambda: 0) == ["docstring"]

@@ -69,7 +69,14 @@ class MPCSettings:
             checks.number("MPC(friction=...)", self.friction, at_least=0.0)
 
     def planner(self, iterations: int) -> Options:
-        """Options of the planner for the iterations of one tick."""
+        """Options of the planner for one tick.
+
+        Args:
+            iterations: number of iterations.
+
+        Returns:
+            The options, with a single stage.
+        """
         base = self.options or OPTIONS
         stage = Stage(self.kappa, self.kappa_grad or self.kappa, base.tolerance, iterations)
         settings = {name: getattr(base, name) for name in base.__dataclass_fields__}

@@ -1,4 +1,4 @@
-"""Every setting of the planner, of MPC and of plants is in `help()`, with its default."""
+"""Every setting of the planner, of MPC and of plants, and every field of a part is in `help()`, with its default."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ def fields(cls):
 
 
 @pytest.mark.parametrize(
-    "cls", [dojo.Options, dojo.Stage, MPCSettings, dojo.Perturbation, dojo.Disturbances, dojo.Push]
+    "cls",
+    [dojo.Options, dojo.Stage, MPCSettings, dojo.Perturbation, dojo.Disturbances, dojo.Push]
+    + [dojo.Body, dojo.Joint, dojo.Contact, dojo.Collision, dojo.Input, dojo.Gear],
 )
 def test_every_field_is_in_help(cls):
-    entries = dict(re.findall(r"^        (\w+): ((?:.|\n            )+)", cls.__doc__, flags=re.MULTILINE))
+    attributes = cls.__doc__.partition("    Raises:")[0]
+    entries = dict(re.findall(r"^        (\w+): ((?:.|\n            )+)", attributes, flags=re.MULTILINE))
     assert list(entries) == list(fields(cls))
     for name, default in fields(cls).items():
         said = re.search(r"\(default ([^\s:;)]+)", " ".join(entries[name].split()))

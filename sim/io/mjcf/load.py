@@ -54,7 +54,8 @@ def load_mjcf(
         gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
 
     Returns:
-        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also an MjcfWarning.
+        MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
+        is also an MjcfWarning.
 
     Raises:
         ImportError: MuJoCo is not installed.

@@ -65,7 +65,8 @@ def load_urdf(
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Returns:
-        UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion is also a UrdfWarning.
+        UrdfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
+        is also a UrdfWarning.
 
     Raises:
         UrdfError: a ValueError, with the file, line and element if the file cannot be read, or with the names of links
