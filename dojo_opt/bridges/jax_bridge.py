@@ -40,8 +40,9 @@ def to_jax(sim: Simulator, kappa: float | None = None, parameters: ParameterSpac
 
     Args:
         sim: the simulator.
-        kappa: of the derivatives [N s m], larger for smoother contact; that of the simulator by default.
-        parameters: the parameters in theta; none by default.
+        kappa: central-path parameter of the derivatives, larger for smoother contact [N s m]; by default that of the
+            simulator.
+        parameters: the parameters in theta (default None: no parameters).
 
     Returns:
         (step, rollout): step gives the next state (nx,), rollout all states (T + 1, nx), including x0.

@@ -104,22 +104,22 @@ def _pressed(sim: Simulator, feet: Feet, state: Array, free: NDArray[np.bool_]) 
 def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int = 20) -> tuple[Array, Array]:
     """A state of rest near x, and the input that holds it.
 
-    The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows;
-    the joints balance gravity and springs; inputs that act on bodies are zero. On the central path a contact
-    with normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction
-    carries a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry load have to be
-    within 1 cm of the same distance from the ground: a robot with legs on terrain is put there by
-    `dojo_opt.gaits.feet.Feet.place`.
+    The contacts press straight down, so nothing creeps on level ground, and share the load as evenly as balance allows.
+    The joints balance gravity and springs. Inputs that act on bodies are zero. On the central path a contact with the
+    normal impulse g floats kappa / g above the ground: the state is moved to those heights. On slopes friction carries
+    a share of the weight, and creeps by an amount proportional to kappa. Contacts that carry load have to be within
+    1 cm of the same distance from the ground: `dojo_opt.gaits.feet.Feet.place` puts a robot with legs there on
+    terrain.
 
     Rest need not be stable: under constant torques a robot on legs leaves it in some tenths of a second.
 
     Args:
         sim: the simulator.
-        x: state (nx,); the neutral state by default.
-        iterations: the largest number of Newton iterations.
+        x: (nx,) state (default None: the neutral state).
+        iterations: limit of the Newton iterations.
 
     Returns:
-        (state (nx,), input (nu,)).
+        (state (nx,), input (nu,) [N, N m]).
 
     Raises:
         ValueError: no such forces exist: the centre of mass is not above the feet, a joint without input would have

@@ -31,12 +31,12 @@ class MPCSettings:
         time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
         mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
             see `dojo_opt.mpc.measurement`.
-        friction: coefficient of friction that plans count on (default None: that of the model). Less than the ground
-            has is safer.
-        learn_ground: whether to take the height of the ground from the contacts that stand (default False).
+        friction: coefficient of friction that plans count on (default None: that of the model). A value below that of
+            the ground is safer.
+        learn_ground: whether to take the height of the ground from the standing contacts (default False).
         options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
             kappa_grad.
-        log: how many of the last ticks `MPC.log` keeps, about 1 kB each; None keeps all (default 10,000).
+        log: number of the last ticks that `MPC.log` keeps, about 1 kB each; None keeps all (default 10,000).
     """
 
     period: float | None = None

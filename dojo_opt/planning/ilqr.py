@@ -67,8 +67,8 @@ def ilqr(
 ) -> Plan:
     """Plan a trajectory.
 
-    A guess of states begins at the stage that it fits best, so that smooth contact does not lead a good one away. A
-    guess in which a joint rests that has to move begins at the smoothest stage. When an attempt fails, the planner
+    A guess of states begins at the stage that it fits best, so that smooth contact does not lead a good guess away.
+    A guess with a resting joint that has to move begins at the smoothest stage. When an attempt fails, the planner
     restarts at another stage, within `max_iterations`; the table of iterations shows it.
 
     A problem with a `refinement` is planned with its own time steps first, and from there with shorter ones. The plan

@@ -54,8 +54,8 @@ class Options:
             (default "feedback").
         follow: share of the merit; a rollout at the next kappa that raises the merit by more has lost the trajectory
             (default 1).
-        bisections: how often a step of kappa is halved, on a logarithmic scale, when its rollout loses the trajectory
-            (default 3).
+        bisections: number of times that a step of kappa is halved, on a logarithmic scale, when its rollout loses the
+            trajectory (default 3).
         tolerance: share of the merit; the last stage ends when an iteration brings less (default 1e-3).
         max_iterations: limit of all iterations, rejected ones included (default 300).
         max_updates: multiplier updates before the constraints count as infeasible (default 20).
@@ -73,7 +73,7 @@ class Options:
         value_regularization: multiple of the regularisation that is added to the Hessian V_xx of the value (default 0).
         armijo: share of the predicted decrease that a step must achieve (default 0.01).
         ascent: allowed multiple of a predicted increase, which only open gaps cause (default 2).
-        halvings: how often the line search halves the step size (default 6).
+        halvings: number of times that the line search halves the step size (default 6).
         rejections: failed line searches in a row before gaps are closed by a rollout, or derivatives sharpened
             (default 2).
         shooting: with open gaps, a step shorter than this is compared with one of multiple shooting; 0 for single

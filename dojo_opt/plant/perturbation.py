@@ -25,13 +25,13 @@ __all__ = ["Perturbation", "Push"]
 
 @dataclass(frozen=True)
 class Push:
-    """A constant force at the centre of mass of a body, for a short time.
+    """A constant force at the centre of mass of a body for a short time.
 
     Attributes:
-        time: when it begins [s].
+        time: begin of the push [s].
         impulse: (3,) force times duration, world axes [N s].
         body: name of the body (default None: the first one).
-        duration: how long it lasts [s] (default 0.02).
+        duration: length of the push [s] (default 0.02).
     """
 
     time: float

@@ -98,7 +98,7 @@ class Plant:
         return Plant(self.sim, self.start, perturbation)
 
     def reset(self) -> None:
-        """Back to the start."""
+        """Put the plant back to its start."""
         self.x = self._x0.copy()
         self.steps = 0
         self.softened = 0

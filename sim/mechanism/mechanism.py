@@ -203,15 +203,15 @@ class Mechanism:
         return out
 
     def add(self, other: Mechanism, pose: ArrayLike = (0.0, 0.0, 0.0), prefix: str = "", name: str = "") -> Mechanism:
-        """One mechanism from this one and another one, whose bodies, joints, contacts, inputs and collisions follow.
+        """One mechanism of this one and another one, whose bodies, joints, contacts, inputs and collisions follow.
 
         Args:
             other: the mechanism to add.
             pose: place of the world of `other`: translation (3,) [m], or with a quaternion (7,). Its joints with the
                 world, its obstacles and its neutral state move there; its contacts keep their ground, and inputs along
                 world axes keep their axes.
-            prefix: put before every name of `other`.
-            name: of the new mechanism; that of this one by default.
+            prefix: text before every name of `other`.
+            name: name of the new mechanism; that of this one by default.
 
         Returns:
             The new mechanism.

@@ -163,7 +163,7 @@ class Joint:
 
     @property
     def lead(self) -> float:
-        """Displacement along the axis per radian of the rotation about it [m/rad]; 0 of a hinge."""
+        """Displacement along the axis per radian of the rotation about it [m/rad]; 0 for a hinge."""
         return self.pitch / (2.0 * np.pi)
 
     @property

@@ -73,12 +73,12 @@ class Reactions(Result):
 
     @property
     def active_force(self) -> Floats:
-        """(..., n, 3) of springs, dampers, limits and inputs of the joint, less its armature's inertia [N]."""
+        """(..., n, 3) force of springs, dampers, limits and inputs of the joint, less that on its armature [N]."""
         return np.asarray(self.force - self.constraint_force)
 
     @property
     def active_torque(self) -> Floats:
-        """(..., n, 3) likewise [N m]."""
+        """(..., n, 3) torque of these [N m]."""
         return np.asarray(self.torque - self.constraint_torque)
 
     def __getitem__(self, joint: str) -> Reactions:

@@ -147,10 +147,10 @@ class Simulator(StateSpace):
             x: (nx,) state.
             u: (nu,) input [N, N m]; zero by default.
             throw: raise SimulationError where the step is not solved.
-            wrenches: external ones, (nbody, 6) or by body.
+            wrenches: external wrenches, (nbody, 6) or by body.
 
         Returns:
-            StepResult with the state after the step, or the one before where it was not solved.
+            StepResult with the state after the step; for an unsolved step, the state before it.
         """
         check = self._arguments
         control = self._no_input if u is None else u
@@ -180,14 +180,14 @@ class Simulator(StateSpace):
         throw: bool = False,
         wrenches: Wrenches | None = None,
     ) -> Trajectory:
-        """Steps from x; the rollout ends at the first step that cannot be solved.
+        """Take steps from x; the rollout ends at the first step that cannot be solved.
 
         Args:
             x: (nx,) state.
-            us: (T, nu) inputs [N, N m]; or a function u = us(time, x), asked before each step; zero by default.
+            us: (T, nu) inputs [N, N m], or a function u = us(time, x), called before each step; zero by default.
             steps: number of steps, if `us` does not determine it.
             throw: raise SimulationError where a step is not solved.
-            wrenches: external ones, (T, nbody, 6) or by body.
+            wrenches: external wrenches, (T, nbody, 6) or by body.
 
         Returns:
             Trajectory of the solved steps.
@@ -288,11 +288,11 @@ class Simulator(StateSpace):
             ks: (T, nu) steps of the inputs.
             Ks: (T, nu, ndx) gains.
             gaps: (T + 1, ndx) f(xs_t, us_t) (-) xs_t+1, in the rows of the later knots.
-            alpha: share of ks and of the gaps that is taken.
+            alpha: applied share of ks and of the gaps.
             limits: (lower, upper) of u, each (nu,).
             substeps: time steps per knot.
             kappa: central-path parameter instead of that of the simulator.
-            wrenches: external ones, (T, nbody, 6) or by body, held over a knot.
+            wrenches: external wrenches, (T, nbody, 6) or by body, held over a knot.
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -324,7 +324,7 @@ class Simulator(StateSpace):
             x: (..., nx) states; `sim.reactions(t.x[:-1], t.u)` has the reactions of a whole trajectory.
             u: (..., nu) inputs with the same leading axes; zero by default.
             frame: axes of the "world", of the "joint" frame on the parent, or of the child ("body").
-            wrenches: external ones, (nbody, 6) or (T, nbody, 6).
+            wrenches: external wrenches, (nbody, 6) or (T, nbody, 6).
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -400,7 +400,7 @@ class Simulator(StateSpace):
             x: (nx,) state.
             u: (nu,) input; zero by default.
             kappa: central-path parameter at which the step is solved; that of the simulator by default.
-            wrenches: external ones, (nbody, 6) or by body, constants.
+            wrenches: external wrenches, (nbody, 6) or by body, constants.
             wrt: "state", "input" and parameters, as in `parameters`. x and u are held fixed, so the poses and momenta
                 that belong to x move with a parameter.
             throw: raise SimulationError where the step is not solved.
@@ -437,14 +437,14 @@ class Simulator(StateSpace):
         *,
         throw: bool = False,
     ) -> tuple[Floats, Linearization]:
-        """A rollout and its derivatives in one pass: as `rollout` and `linearize_trajectory`, each step solved once.
+        """A rollout and its derivatives in one pass: `rollout` and `linearize_trajectory`, each step solved once.
 
         Args:
             x: (nx,) state.
             us: (T, nu) inputs.
             kappa: central-path parameter; that of the simulator by default.
-            wrt: parameters, whose derivatives (T, ndx, n) are then in `Linearization.parameters`, by name.
-            wrenches: external ones, (T, nbody, 6) or by body.
+            wrt: names of parameters, whose derivatives (T, ndx, n) are then in `Linearization.parameters`.
+            wrenches: external wrenches, (T, nbody, 6) or by body.
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -487,7 +487,7 @@ class Simulator(StateSpace):
             us: (T, nu) inputs.
             substeps: time steps per knot.
             kappa: central-path parameter; that of the simulator by default.
-            wrenches: external ones, (T, nbody, 6) or by body.
+            wrenches: external wrenches, (T, nbody, 6) or by body.
             throw: raise SimulationError where a step is not solved.
 
         Returns:
@@ -550,14 +550,14 @@ class Simulator(StateSpace):
     ) -> Gradient:
         """Gradient of a scalar L(x_0, ..., x_T) of a rollout, by one sweep from its end.
 
-        The steps are solved again at `kappa`. Only one step is stored at a time: memory is that of the trajectory.
+        The steps are solved again at `kappa`, and one step is stored at a time: the memory is that of the trajectory.
 
         Args:
-            trajectory: of `rollout`, or (states (T + 1, nx), inputs (T, nu)).
-            dL_dx: (T + 1, ndx) in tangent coordinates.
+            trajectory: result of `rollout`, or (states (T + 1, nx), inputs (T, nu)).
+            dL_dx: (T + 1, ndx) gradient of L by the states, in tangent coordinates.
             wrt: "state", "input" and parameters, as in `parameters`.
             kappa: central-path parameter; that of the simulator by default.
-            wrenches: external ones, (T, nbody, 6) or by body; those of the trajectory by default.
+            wrenches: external wrenches, (T, nbody, 6) or by body; those of the trajectory by default.
             throw: raise SimulationError where a step is not solved.
 
         Returns:

@@ -109,8 +109,8 @@ class StateSpace:
     def close(self, x: ArrayLike) -> Floats:
         """The state near x that closes the loops of the mechanism, at both ends of its interval.
 
-        If Newton's method fails, as for a linkage in one line, it starts again from a fixed set of states around x,
-        and the nearest solution is returned (sim/dynamics/loops/closest_root.py).
+        If Newton's method fails, for example for a linkage in one line, it starts again from a fixed set of states
+        around x, and the nearest solution is returned (sim/dynamics/loops/closest_root.py).
 
         Args:
             x: state (nx,).
@@ -154,7 +154,7 @@ class StateSpace:
             x: state (nx,); the neutral state by default.
 
         Returns:
-            LoopRank, which `print` shows as text.
+            LoopRank; `print` shows it as text.
 
         Raises:
             ValueError: the mechanism has neither loops nor gears.
@@ -169,13 +169,13 @@ class StateSpace:
     def start(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """State with coordinates q (nq,) whose velocity at the node is v (nv,).
 
-        The velocity of a state is the mean one of the interval before it; this one has the momentum M(q) v at its end,
-        so that a simulation started with it is right to second order from its first step. That takes the motion to be
-        free of contacts: start(q, 0) on the ground has the velocity g h/2 that gravity alone would take away, a little
-        hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as that of
-        `neutral` and of `equilibrium`.
+        The velocity of a state is the mean over the interval before it. This state has the momentum M(q) v at the end
+        of that interval, so a simulation from it is right to second order from its first step. The motion is assumed to
+        be free of contacts: start(q, 0) on the ground has the velocity g h/2, which gravity alone would take away, a
+        little hop. A robot at rest on its contacts did not move before the node either: its state is [q; 0], as from
+        `neutral` and `equilibrium`.
 
-        Closed loops: those of the state are closed, as by `close`, and its velocity is the part of v that they allow.
+        Loops are closed, as by `close`, and the velocity is the part of v that they allow.
 
         Args:
             q: coordinates (nq,).
@@ -199,8 +199,8 @@ class StateSpace:
     def velocity(self, x: ArrayLike) -> Floats:
         """Joint velocities at the node, the v of start(q, v).
 
-        They are M(q)^-1 p with the momentum p that the discrete Legendre transform gives the node, and of that the part
-        along closed loops, whose forces act before and after the node.
+        They are M(q)^-1 p with the momentum p of the node by the discrete Legendre transform; with closed loops, the
+        part of it along them, as their forces act before and after the node.
 
         Args:
             x: state (..., nx).
