@@ -44,14 +44,14 @@ def _parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="argument of the problem or task, as target=(1,0)",
+        help="argument of the problem or task, such as target=(1,0)",
     )
     run.add_argument(
         "--perturb",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change of the plant of a task, as payload=1.0",
+        help="change of the plant of a task, such as payload=1.0",
     )
     run.add_argument("--seconds", type=float, metavar="S", help="length of a closed-loop task [s], 4 by default")
     run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
@@ -64,7 +64,7 @@ def _parser() -> argparse.ArgumentParser:
 
     models = commands.add_parser("models", help="list the models", description="List the models and their sizes.")
     models.add_argument("--json", action="store_true", help="print JSON")
-    models.add_argument("--thumbnails", type=Path, metavar="DIR", help="also write a picture of each, DIR/NAME.png")
+    models.add_argument("--thumbnails", type=Path, metavar="DIR", help="write a picture of each model, DIR/NAME.png")
 
     add_show(commands)
 
@@ -95,7 +95,7 @@ def _run(args: argparse.Namespace) -> int:
         there = [*PROBLEMS, *LOOPS]
         raise ValueError(f"no problem or task {args.name!r}; there are {', '.join(there)}{nearest(args.name, there)}")
     if args.perturb or args.seconds is not None:
-        raise ValueError(f"--perturb and --seconds are for closed loops ({', '.join(LOOPS)}), and {name} is a plan")
+        raise ValueError(f"--perturb and --seconds apply to closed loops ({', '.join(LOOPS)}); {name} is a plan")
     problem = getattr(dojo.problems, name)(**_arguments(args.set))
     start = time.perf_counter()
     plan = dojo.ilqr(problem, verbose=not args.json)
@@ -136,7 +136,7 @@ def _run_loop(args: argparse.Namespace) -> int:
         print(f"{loop.message}  rms {loop.rms():.3f} (m, rad) in {loop.duration:.2f} s over all tracked coordinates:")
         print("  " + ", ".join(f"{name} {value:.3f}" for name, value in each.items()))
         if ms.size:
-            times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fell back"
+            times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fallbacks"
             print(times.format(**numbers))
     return 0 if loop.survived else 1
 

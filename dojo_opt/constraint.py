@@ -104,7 +104,7 @@ class StateBounds(Spec):
             bad = int(columns[layout[columns] < 0][0])
             name = component_name(sim, bad)
             raise ValueError(
-                f"StateBounds(components=...): component {bad} ({name}) belongs to a quaternion: no bounds"
+                f"StateBounds(components=...): component {bad} ({name}) belongs to a quaternion, which has no bounds"
             )
         pick = Pick(True, layout[columns], columns, sign)
         return PickTerm("StateBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)

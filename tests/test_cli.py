@@ -158,7 +158,7 @@ def test_the_module_runs_as_a_program() -> None:
 @pytest.mark.parametrize("flag", [["--perturb", "payload=1"], ["--seconds", "2"]])
 def test_a_plan_has_no_plant_to_perturb(flag: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["run", "hop", *flag]) == 2
-    assert "are for closed loops (hopper_mpc, quadruped_mpc), and hop is a plan" in capsys.readouterr().err
+    assert "apply to closed loops (hopper_mpc, quadruped_mpc); hop is a plan" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -177,14 +177,14 @@ def test_show_prints_and_draws_a_model(tmp_path: Path, capsys: pytest.CaptureFix
     command = ["show", "raiberthopper", "--drop", "0.1", "--seconds", "0.1", "--out", str(figure), "--html", str(page)]
     assert cli.main(command) == 0
     text = capsys.readouterr().out
-    assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "let go for 0.1 s" in text
+    assert "raiberthopper: 2 bodies, 7 degrees of freedom" in text and "released for 0.1 s" in text
     assert figure.read_bytes().startswith(b"\x89PNG") and "MeshCat.Viewer" in page.read_text()
 
 
 @pytest.mark.parametrize("name", ["pendulum", "slider", "cartpole", "fourbar"])
 def test_show_lets_go_of_what_does_not_float(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", name, "--seconds", "0.02"]) == 0
-    assert "let go for 0.02 s" in capsys.readouterr().out
+    assert "released for 0.02 s" in capsys.readouterr().out
 
 
 @pytest.mark.filterwarnings("ignore::sim.io.urdf.report.UrdfWarning")
@@ -212,7 +212,7 @@ def test_show_prints_one_json_object(tmp_path: Path, capsys: pytest.CaptureFixtu
         (["nowhere.urdf"], "nowhere.urdf"),
         (["pendulum", "--seconds", "-1"], "--seconds: expected a number > 0, got -1"),
         (["block", "--drop", "nan"], "--drop: expected finite numbers, got nan"),
-        (["pendulum", "--drop", "1"], "--drop is for a floating base, and 'joint_0' is revolute"),
+        (["pendulum", "--drop", "1"], "--drop requires a floating base; 'joint_0' is revolute"),
     ],
 )
 def test_show_refuses_by_name(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,7 +20,7 @@ def _jax() -> Any:
         raise ImportError(f'{_CALL} needs JAX: pip install "dojo-opt[jax]"') from None
     if not jax.config.jax_enable_x64:
         raise ValueError(
-            f"{_CALL}: steps are solved to more than the seven digits of JAX's floats; call "
+            f"{_CALL}: steps are solved to more digits than the seven of JAX's floats; call "
             'jax.config.update("jax_enable_x64", True) before arrays are made'
         )
     return jax

@@ -157,7 +157,7 @@ def equilibrium(sim: Simulator, x: ArrayLike | None = None, *, iterations: int =
         k = int(np.flatnonzero(free)[np.abs(left[free]).argmax()])
         raise ValueError(
             f"equilibrium({mech.name}): no vertical forces at {', '.join(map(repr, feet.names))} balance the "
-            f"weight: {left[k]:.3g} N or N m is left at {sim.mechanism.dof_names[k]!r}"
+            f"weight: {left[k]:.3g} N or N m remains at {sim.mechanism.dof_names[k]!r}"
         )
     _check_friction(mech.name, feet, share, np.where(force > 1e-3 * weight, force, 0.0))
     return state, u

@@ -77,7 +77,7 @@ class ParameterSpace:
         for common in (name for name in asked if ":*" in name):
             clash = [name for name in asked if _kind(name) == _kind(common) and ":*" not in name]
             if clash:
-                raise ValueError(f"{call}(names, bodies=...): {common!r} is of all parts, and so of {clash[0]!r}")
+                raise ValueError(f"{call}(names, bodies=...): {common!r} covers all parts, {clash[0]!r} included")
         self.labels = tuple(self._rows)
         self.values, self.low, self.high = (np.array(column) for column in zip(*self._rows.values(), strict=True))
         self._narrow(f"{call}(bounds=...)", bounds or {})
@@ -148,9 +148,10 @@ class ParameterSpace:
         kind = _kind(name)
         chart = _CHARTS.get("scale" if name.endswith("[scale]") else kind, _plain)
         if kind in _VECTORS and (len(entries) != 3 or ":*" in name):
-            raise ValueError(f"{call}: {kind} is a vector, give it whole and part by part; got {', '.join(entries)}")
+            given = ", ".join(entries)
+            raise ValueError(f"{call}: {kind} is a vector; give all components of one part at a time, got {given}")
         if name.endswith("[scale]") and ":*" in name:
-            raise ValueError(f"{call}: give scales part by part; got {name}")
+            raise ValueError(f"{call}: give the scale of one part at a time, got {name}")
         rows = {entry: (value, *self._limits(entry, kind, value)) for entry, value in zip(entries, values, strict=True)}
         self._append([name], chart, rows)
 

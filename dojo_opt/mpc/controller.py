@@ -142,7 +142,8 @@ class MPC:
         """
         now = checks.number("MPC(time)", time)
         if self.log and now < self.log[-1].time:
-            raise ValueError(f"MPC(time): expected a time after {self.log[-1].time:g} s, got {now:g} s; see reset()")
+            last = self.log[-1].time
+            raise ValueError(f"MPC(time): expected a time after {last:g} s, got {now:g} s; call reset() to start again")
         measured = checks.array("MPC(x)", x, (self.sim.nx,))
         self._measured.add(now, measured)
         if self.policy is None:

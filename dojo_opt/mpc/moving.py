@@ -47,7 +47,7 @@ class Sampled:
         width = None if sim is None else sim.nx
         self.rows = checks.array("Sampled(rows)", rows, (len(self.time), width))
         if len(self.time) < 2 or np.any(np.diff(self.time) <= 0.0):
-            raise ValueError("Sampled(time): expected at least two times, growing")
+            raise ValueError("Sampled(time): expected at least two increasing times")
         self._sim = sim
         self._steps = np.diff(self.rows, axis=0) if sim is None else sim.difference(self.rows[1:], self.rows[:-1])
         size = self.rows.shape[1] if sim is None else sim.ndx
@@ -103,7 +103,7 @@ class Sampled:
         """
         if self._sim is None or self.cycle is None:
             raise ValueError(
-                "Sampled.over: needs states (sim=...) and a cycle, so that there is a time before the first"
+                "Sampled.over: expected states (sim=...) and a cycle, which give the state before the first row"
             )
         sim, h = self._sim, checks.number("Sampled.over(interval)", interval, above=0.0)
         then = self(self.time - h)
@@ -135,7 +135,7 @@ class References:
                 raise ValueError(f"{call}: expected the index of a cost, 0 to {len(problem.costs) - 1}")
             term = problem.costs[index]
             if not isinstance(term, StateTerm | PickTerm):
-                raise ValueError(f"{call}: a {term.name} has no reference that can move")
+                raise ValueError(f"{call}: the reference of a {term.name} cannot move")
             self._moving.append((term, self._function(call, value, isinstance(term, StateTerm))))
         self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
         self._call_checked(0.0)

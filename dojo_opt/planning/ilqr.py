@@ -325,7 +325,7 @@ class Solver:
         ends: list[_Attempt] = []
         for first in self._first_stages():
             if ends:
-                self._history.note(f"{ends[-1].status.name}; again from the guess, beginning at k_eval {kappas[first]}")
+                self._history.note(f"{ends[-1].status.name}; restart from the guess at k_eval {kappas[first]}")
                 self.reset(*duals)
                 self._begin(guess)
             elif first:

@@ -120,8 +120,8 @@ class Plan:
         """
         n = whole_number("Plan.repeated(count)", count)
         if self.stride is None or self.problem is None:
-            why = "its end is not its start (Periodic)" if self.stride is None else "it has no problem"
-            raise ValueError(f"Plan.repeated: this plan cannot be repeated, {why}")
+            lacking = "a periodic plan (Periodic)" if self.stride is None else "a plan with its problem"
+            raise ValueError(f"Plan.repeated: expected {lacking}")
         cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * self.stride) for i in range(n)]
         u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
         x, fun = np.concatenate(cycles), n * self.fun

@@ -152,7 +152,7 @@ def closed_loop(
         Interrupted: after Ctrl-C, a KeyboardInterrupt; its `result` is the ClosedLoop until then.
     """
     if not isinstance(plant, Plant):
-        raise TypeError(f"closed_loop(plant): expected a Plant, as Plant(simulator), got {plant!r}")
+        raise TypeError(f"closed_loop(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
     if not callable(controller):
         raise TypeError(f"closed_loop(controller): expected an MPC or a function of (time, x), got {controller!r}")
     h = plant.sim.time_step

@@ -153,7 +153,7 @@ def monte_carlo(
     """
     count = whole_number("monte_carlo(runs=...)", runs)
     if not isinstance(plant, Plant):
-        raise TypeError(f"monte_carlo(plant): expected a Plant, as Plant(simulator), got {plant!r}")
+        raise TypeError(f"monte_carlo(plant): expected a Plant, such as Plant(simulator), got {plant!r}")
     for name, function in (("controller", controller), ("sampler", sampler)):
         if not callable(function):
             raise TypeError(f"monte_carlo({name}): expected a function, got {function!r}")

@@ -105,7 +105,7 @@ class Perturbation:
         if self.terrain is not None and not isinstance(self.terrain, Terrain):
             raise TypeError(f"{call}(terrain=...): expected a Terrain, got {self.terrain!r}")
         if self.terrain is not None and (self.slope or self.ground_height):
-            raise ValueError(f"{call}(terrain=...): give either it or a slope or ground_height")
+            raise ValueError(f"{call}(terrain=...): give either a terrain, or a slope and a ground_height")
         pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
         for push in pushes:
             if not isinstance(push, Push):
@@ -160,7 +160,7 @@ class Perturbation:
         joints = [replace(j, damper=self.damping * np.asarray(j.damper)) for j in mechanism.joints]
         contacts: Any = mechanism.contacts
         if self.slope and any(c.terrain is not None for c in contacts):
-            raise ValueError("Perturbation(slope=...): a slope is for contacts with half-spaces, not on terrain")
+            raise ValueError("Perturbation(slope=...): expected contacts with half-spaces, got contacts on terrain")
         if self.slope or self.ground_height:
             turn = _rotation(self.slope, self.slope_heading)
             contacts = [
@@ -215,7 +215,7 @@ class Perturbation:
         first = mechanism.joints[0]
         if first.kind != "floating":
             raise ValueError(
-                f"Perturbation(slope=..., ground_height=...): needs a robot on a floating base, but joint "
+                f"Perturbation(slope=..., ground_height=...): expected a robot on a floating base, but joint "
                 f"{first.name!r} is {first.kind}"
             )
         turn = _rotation(self.slope, self.slope_heading)

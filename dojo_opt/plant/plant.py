@@ -59,7 +59,7 @@ class Plant:
         if perturbation is not None and not isinstance(perturbation, Perturbation):
             raise TypeError(f"Plant(perturbation=...): expected a Perturbation, got {perturbation!r}")
         if perturbation is not None and fields:
-            raise ValueError(f"Plant(perturbation=...): give either it or its fields, got also {', '.join(fields)}")
+            raise ValueError(f"Plant(perturbation=...): give either it or its fields, got both: {', '.join(fields)}")
         self.sim = sim
         self.start = sim.neutral() if start is None else checks.array("Plant(start=...)", start, (sim.nx,))
         self.perturbation = p = Perturbation(**fields) if perturbation is None else perturbation

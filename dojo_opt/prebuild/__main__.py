@@ -26,7 +26,7 @@ def _cores() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m dojo_opt.prebuild", description=__doc__)
-    parser.add_argument("--content", choices=CONTENTS, default="all", help="what is compiled (default: all)")
+    parser.add_argument("--content", choices=CONTENTS, default="all", help="content to compile (default: all)")
     parser.add_argument(
         "--targets", nargs="+", choices=FEATURES, default=runnable()[:1], help="processors that this one can stand for"
     )

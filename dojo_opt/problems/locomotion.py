@@ -121,8 +121,8 @@ def _stride(sim: Simulator, reference: Array) -> Array:
     stride = sim.difference(reference[-1], reference[0])
     if np.abs(stride[2:]).max() > 1e-6:
         raise ValueError(
-            "problems.follow(periodic=True): expected a gait that ends as it began but for its place, in whole periods "
-            f"and without turning, got a largest difference of {np.abs(stride[2:]).max():.3g}"
+            "problems.follow(periodic=True): expected a gait of whole periods that ends as it began, apart from its "
+            f"place along x and y; its end differs by up to {np.abs(stride[2:]).max():.3g}"
         )
     stride[2:] = 0.0
     return np.asarray(stride)

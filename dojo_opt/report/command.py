@@ -43,7 +43,7 @@ def _named(names: dict[str, str], moved: Sequence[str]) -> Callable[[str], str]:
 
     def checked(name: str) -> str:
         if name in moved:
-            raise argparse.ArgumentTypeError(f"{name} is run from a checkout: python benchmarks/compare.py {name}")
+            raise argparse.ArgumentTypeError(f"run {name} from a checkout: python benchmarks/compare.py {name}")
         if name not in names:
             raise argparse.ArgumentTypeError(f"no study {name!r}; there are {', '.join(names)}")
         return name

@@ -106,7 +106,7 @@ def study(
     field = make.__dataclass_fields__.get("mechanism")
     if field is None:
         if mechanism is not None:
-            raise ValueError(f"report: {name} has scenes of its own, and takes no mechanism")
+            raise ValueError(f"report: {name} has its own scenes and takes no mechanism")
         return make(quick=quick)
     if mechanism is None and field.default is MISSING:
         mechanism = import_module("dojo_opt.models").quadruped()

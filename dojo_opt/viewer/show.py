@@ -83,9 +83,7 @@ def show(args: argparse.Namespace) -> int:
             print(mechanism.report)  # type: ignore[attr-defined]
     x = sim.neutral()
     if args.drop and mechanism.joints[0].kind != "floating":
-        raise ValueError(
-            f"--drop is for a floating base, and {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}"
-        )
+        raise ValueError(f"--drop requires a floating base; {mechanism.joints[0].name!r} is {mechanism.joints[0].kind}")
     if args.drop:
         x[2] += args.drop
     motion = sim.rollout(x, np.zeros((max(1, round(args.seconds / args.time_step)), sim.nu)))
@@ -96,7 +94,7 @@ def show(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(_numbers(sim, motion)))
         return 0 if motion.success else 1
-    print(f"let go for {motion.time[-1]:g} s, inputs zero: {motion.message}")
+    print(f"released for {motion.time[-1]:g} s without inputs: {motion.message}")
     for path in filter(None, (args.out, args.html)):
         print(f"wrote {path}")
     return 0 if motion.success else 1

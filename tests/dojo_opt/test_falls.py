@@ -69,7 +69,7 @@ def test_the_error_of_a_loop_goes_by_name(walker):
 def test_time_goes_on_in_a_controller():
     mpc = dojo.MPC(dojo.problems.swingup("pendulum"))
     mpc(1.0, np.zeros(2))
-    with pytest.raises(ValueError, match=r"MPC\(time\): expected a time after 1 s, got 0 s; see reset\(\)"):
+    with pytest.raises(ValueError, match=r"MPC\(time\): expected a time after 1 s, got 0 s; call reset\(\)"):
         mpc(0.0, np.zeros(2))
     mpc.reset()
     mpc(0.0, np.zeros(2))

@@ -141,7 +141,7 @@ def test_periodic_gaits_go_on(name, settings):
 
 
 def test_a_gait_that_turns_is_not_periodic():
-    with pytest.raises(ValueError, match="ends as it began but for its place"):
+    with pytest.raises(ValueError, match="ends as it began, apart from its place"):
         problems.turn(periodic=True)
 
 

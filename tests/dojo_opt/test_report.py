@@ -99,7 +99,7 @@ def test_text_shows_bars_and_tables() -> None:
 def test_unknown_studies_and_robots_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="no report 'nonsense'; there are"):
         dojo.report.study("nonsense")
-    with pytest.raises(ValueError, match="compile has scenes of its own"):
+    with pytest.raises(ValueError, match="compile has its own scenes"):
         dojo.report.study("compile", mechanism=dojo.models.pendulum(), studies=STUDIES)
 
 

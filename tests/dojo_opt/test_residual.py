@@ -146,7 +146,7 @@ WRITERS = [always, elsewhere, through_a_view, through_a_helper, into_the_input, 
 @pytest.mark.parametrize("function", WRITERS, ids=lambda f: f.__name__)
 def test_a_function_that_writes_into_its_arguments_is_refused_by_name(function):
     name = function.__name__
-    with pytest.raises(ValueError, match=f"'{name}' writes into x or u, its arguments"):
+    with pytest.raises(ValueError, match=f"'{name}' writes into its argument x or u"):
         dojo.ilqr(problem(ResidualCost(function, 1)))
 
 
@@ -163,7 +163,7 @@ def one_in_that_writes(x, u, out):
 
 
 def test_a_jacobian_that_writes_into_its_arguments_is_refused_by_name():
-    with pytest.raises(ValueError, match="'one_in_that_writes' writes into x or u"):
+    with pytest.raises(ValueError, match="'one_in_that_writes' writes into its argument"):
         dojo.ilqr(problem(ResidualCost(forgotten, 1, jacobian=one_in_that_writes)))
 
 

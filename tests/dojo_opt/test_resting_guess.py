@@ -141,7 +141,7 @@ def test_where_one_stage_fails_the_planner_begins_at_another(monkeypatch):
     monkeypatch.setattr(solver, "_descend", failing)
     plan = solver.solve()
     assert firsts == [0, 1, 2] and plan.success
-    assert "INFEASIBLE; again from the guess, beginning at k_eval 1e-04" in plan.summary()
+    assert "INFEASIBLE; restart from the guess at k_eval 1e-04" in plan.summary()
     firsts.clear()
     monkeypatch.setattr(solver, "_descend", lambda first: firsts.append(first) or Status.INFEASIBLE)
     assert solver.solve().status == Status.INFEASIBLE and firsts == [0, 1, 2, 3]

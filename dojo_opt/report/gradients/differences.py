@@ -41,7 +41,7 @@ def extrapolated(central: Callable[[float], Matrix]) -> Reference:
                 best = Reference(row[j], doubt) if np.isfinite(doubt) else best
         above = row
     if best is None:
-        raise RuntimeError("report gradients: a step beside the state cannot be solved at any distance")
+        raise RuntimeError("report gradients: no step near the state can be solved")
     return best
 
 
