@@ -622,7 +622,7 @@ class Solver:
         """Why the backward pass at `now` failed with that promise; `_detail` has the knot."""
         model, knot = self._model(), promise.knot
         if promise.status == Status.MAX_ITERATIONS:
-            self._detail = f" That of the quadratic program of the control limits, at knot {knot}."
+            self._detail = f" It is that of the quadratic program of the control limits, at knot {knot}."
             return promise.status
         for name, parts in (("dynamics", (model.A, model.B, model.gaps[1:])), ("costs", (model.g, model.H))):
             knots = [k for part in parts for k in np.flatnonzero(~np.isfinite(part).reshape(len(part), -1).all(axis=1))]
@@ -666,7 +666,7 @@ class Solver:
         violation, culprit = self.objective.worst(now.x, now.u)
         if status != Status.SOLVED and violation > options.violation:
             detail += "" if status == Status.INFEASIBLE else " Constraints are not met."
-            detail += f" Violated most: {culprit}, by {violation:.2g}."
+            detail += f" Largest violation: {violation:.2g}, {culprit}."
         plan = Plan(
             success=status == Status.SOLVED,
             status=status,

@@ -119,8 +119,8 @@ class Problem:
         for argument, specs in zip(("cost", "constraints"), self.specs, strict=True):
             for i, spec in enumerate(specs):
                 if not hasattr(spec, "bind"):
-                    what = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
-                    raise TypeError(f"Problem({argument}=...): entry {i} is {what}")
+                    found = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
+                    raise TypeError(f"Problem({argument}=...): entry {i} is {found}")
         self.bind()
         self.control_limits = _limits(control_limits, sim.nu)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)

@@ -17,7 +17,7 @@ from solvers.compiler.optional import OptionalKernel, optional_kernels
 __all__ = ["CONTENTS", "run", "tasks"]
 
 CONTENTS = ("all", "examples")
-_FIRST = (  # the longest, and what later tasks would compile beside them
+_FIRST = (  # the longest, and code that later tasks would compile beside them
     "interior_point:interior_point",
     "step_gradient:gradient",
     "step:step",
@@ -30,7 +30,7 @@ _FIRST = (  # the longest, and what later tasks would compile beside them
 
 
 def states(sim: Any) -> None:
-    """What can be said about a state without moving it."""
+    """Properties of a state without motion."""
     x = sim.neutral()
     sim.describe()
     sim.velocity(x)
@@ -81,7 +81,7 @@ def divisions(sim: Any) -> None:
 
 
 def parameters(sim: Any) -> None:
-    """What steps of order 2 alone have: reactions, derivatives by maximal coordinates and by parameters."""
+    """Features of order 2 only: reactions, derivatives by maximal coordinates and by parameters."""
     x, us = sim.neutral(), np.zeros((2, sim.nu))
     sim.reactions(x[None], us[:1])
     sim.linearize_maximal(sim.maximal(x), us[0], 1e-3)
@@ -189,7 +189,7 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
     "states of higher order": lambda: _pendulum(states, 4),
     "motions of higher order": lambda: _pendulum(motions, 4),
 }
-_BEYOND = {  # what neither README's examples nor the models need
+_BEYOND = {  # needed neither by README's examples nor by the models
     "derivatives of higher order": lambda: _pendulum(derivatives, 4),
     "derivatives of a flight": lambda: _flight(derivatives, 8),
 }

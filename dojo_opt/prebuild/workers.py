@@ -81,7 +81,7 @@ class _Worker:
             print(task, file=self._process.stdin, flush=True)
         except BrokenPipeError:
             pass
-        for line in self._process.stdout:  # what a task prints comes before its answer
+        for line in self._process.stdout:  # output of a task comes before its answer
             words = line.split()
             if len(words) == 3 and words[0] == _ANSWER:
                 return Done(task, float(words[1]), int(words[2]))

@@ -6,7 +6,7 @@ from an empty folder.
 
 To load compiled code is to run it. So a folder is read only where its owner is the user or root, and where neither a
 group nor the world can write; and a file only when it is as it was written. Everything else is compiled, in memory
-if it cannot be stored, with one warning that gives the reason. What came compiled with the package (shipped.py) is
+if it cannot be stored, with one warning that gives the reason. Code that came compiled with the package (shipped.py) is
 looked for first, and never written here.
 
     DOJO_OPT_CACHE=0         compile in memory only
@@ -250,7 +250,7 @@ def ship(base: Path, folder: Path, target: str) -> tuple[Path, int]:
 
 @cache
 def prepare() -> None:
-    """Let Numba register what it compiles with: half a second of processor time, which shipped code does not need.
+    """Let Numba register its types and functions: half a second of processor time, which shipped code does not need.
 
     Plain arithmetic before anything else: otherwise the operators of sets and strings come first, and every operator
     of every kernel is then tried on all of them: 10 of the 50 s of processor time of a cold start (Numba 0.68).
@@ -267,7 +267,7 @@ def _text_digest(file: str) -> bytes:
 
 
 class _Named:
-    """What Numba's keys ask of a code generator: system, processor and features."""
+    """Properties of a code generator in Numba's keys: system, processor and features."""
 
     def __init__(self, codegen: Any, target: str) -> None:
         self._magic = (codegen.magic_tuple()[0], target, "")

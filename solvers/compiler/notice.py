@@ -1,4 +1,4 @@
-"""Signs of life during compilation, which happens once and takes a while; and the count of what was compiled.
+"""Signs of life during compilation, which happens once and takes a while; and the count of compiled functions.
 
 dojo_opt: compiling, once: no code is shipped; kept in /home/me/.cache/dojo_opt/0123456789abcdef
 dojo_opt: compiling sim.solve.interior_point.interior_point (function 34, 5 s so far, part 2 of 14)
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 
 def _is_watched() -> bool:
-    """Whether a user sees what is printed, and wants to."""
+    """Whether a user sees the output, and wants to."""
     if os.environ.get("DOJO_OPT_QUIET", "0") not in ("", "0"):
         return False
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
@@ -45,7 +45,7 @@ class _Clock:
         self.told = self.written = False
 
     def look(self) -> None:
-        """Print what goes on, if compilation takes long and a user waits."""
+        """Print the present work, if compilation takes long and a user waits."""
         spent = self.spent + time.perf_counter() - self.begin
         if spent < self.next_word:
             return

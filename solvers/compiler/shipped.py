@@ -82,7 +82,7 @@ class Shipped:
         return data
 
     def _index(self) -> dict[str, Any]:
-        """What the file holds."""
+        """Content of the file."""
         _check(self._path.parent, self._path.parent.stat())
         head = self._read(0, _HEAD)
         digest, length = head[len(_MAGIC) : -8], int.from_bytes(head[-8:], "little")

@@ -2,7 +2,7 @@
 
 Code for x86-64-v3 (AVX2 and FMA, every x86 processor since 2013 to 2015 but the smallest) is as fast as code for the
 processor itself; code for x86-64-v2 takes a third longer. The others have one family each: 64-bit ARM has vectors and
-fused products in every processor, and Apple's first is what all of its later ones can run.
+fused products in every processor, and all of Apple's later ones can run code for its first.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ __all__ = ["FEATURES", "best_target", "build_environment", "runnable"]
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
-FEATURES: dict[str, tuple[str, ...]] = {  # what a processor needs beyond the least of its architecture
+FEATURES: dict[str, tuple[str, ...]] = {  # features of a processor beyond the least of its architecture
     "x86-64-v3": _V3,
     "x86-64-v2": _V2,
     "apple-m1": (),

@@ -48,4 +48,4 @@ def test_a_leap_that_is_too_high_is_no_success():
     problem.control_limits = (np.full(12, -12.0), np.full(12, 12.0))
     plan = ilqr(problem)
     assert not plan.success
-    assert "Violated most: Goal of trunk" in plan.message
+    assert "Largest violation: " in plan.message and "Goal of trunk" in plan.message

@@ -61,7 +61,7 @@ def test_a_plan_that_fails_names_the_constraint_and_the_component():
     problem = dojo.Problem(SIM, X, 10, cost=Effort(1e-3), constraints=[Goal(X), Goal(goal, components="cart")])
     plan = dojo.ilqr(problem)
     assert not plan.success
-    assert "Violated most: Goal of cart at knot 10, by 0." in plan.message
+    assert "Largest violation: 0." in plan.message and "Goal of cart at knot 10." in plan.message
 
 
 def test_one_term_need_not_be_a_list_and_names_of_settings_are_suggested():
