@@ -44,7 +44,7 @@ def delta(
 
     Args:
         base_radius: distance of the motors from the vertical axis of the robot [m].
-        platform_radius: distance of the ends of the arms, seen from the middle of the platform [m].
+        platform_radius: distance of the pairs of ball joints from the middle of the platform [m].
         arm: length of an arm [m].
         forearm: length of a rod [m].
         gap: distance between the two rods of an arm [m].
