@@ -68,7 +68,9 @@ def _parser() -> argparse.ArgumentParser:
 
     add_show(commands)
 
-    warmup = commands.add_parser("warmup", help="compile ahead of time", description="Compile and cache every kernel.")
+    warmup = commands.add_parser(
+        "warmup", help="compile ahead of time", description="Compile and cache the kernels of a plan."
+    )
     warmup.add_argument("--json", action="store_true", help="print JSON")
     return parser
 

@@ -28,14 +28,14 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m dojo_opt.prebuild", description=__doc__)
     parser.add_argument("--content", choices=CONTENTS, default="all", help="content to compile (default: all)")
     parser.add_argument(
-        "--targets", nargs="+", choices=FEATURES, default=runnable()[:1], help="processors that this one can stand for"
+        "--targets", nargs="+", choices=FEATURES, default=runnable()[:1], help="targets that this processor can run"
     )
     parser.add_argument("--out", type=Path, default=FOLDER, help=f"folder of the file (default: {FOLDER})")
-    parser.add_argument("--cache", type=Path, help="folder of compiled code to go on from; a temporary one by default")
+    parser.add_argument("--cache", type=Path, help="folder with compiled code to start from (default: a temporary one)")
     parser.add_argument(
         "--jobs", type=int, default=_cores(), help=f"processes (default: one per core, {_MOST} at most)"
     )
-    parser.add_argument("--check", action="store_true", help="compile nothing: fail if the shipped code does not do")
+    parser.add_argument("--check", action="store_true", help="fail if anything compiles, write nothing")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     return parser
 

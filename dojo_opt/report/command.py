@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser, studies: Studies, moved: Sequ
     parser.add_argument(
         "robot", nargs="?", type=Path, metavar="ROBOT.urdf", help="robot to measure; a quadruped by default"
     )
-    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, as for an arm")
+    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, for example of an arm")
     parser.add_argument(
         "--contacts",
         nargs="+",
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser, studies: Studies, moved: Sequ
     parser.add_argument("--json", action="store_true", help="print every number as JSON instead of the tables")
     parser.add_argument("--quick", action="store_true", help="run fewer and shorter rounds, as a check")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write report.html, .md, .json and a PNG per study")
-    parser.add_argument("--strict", action="store_true", help="exit with 1 when a bar is missed")
+    parser.add_argument("--strict", action="store_true", help="exit with status 1 if a bar is missed")
 
 
 def _named(names: dict[str, str], moved: Sequence[str]) -> Callable[[str], str]:

@@ -23,7 +23,7 @@ def add_show(commands: Any) -> None:
     parser.add_argument(
         "robot", metavar="ROBOT", help="name of a model (see `dojo-opt models`), ROBOT.urdf, or ROBOT.xml"
     )
-    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, as for an arm")
+    parser.add_argument("--fixed", action="store_true", help="fix the root of ROBOT.urdf, for example of an arm")
     parser.add_argument(
         "--repair", action="store_true", help="replace inertias of ROBOT.urdf that no rigid body can have"
     )

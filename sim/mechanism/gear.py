@@ -37,7 +37,7 @@ class Gear:
     offset: float = 0.0
     dof: int = 0
     other_dof: int = 0
-    name: str = ""  # default: that of the joint
+    name: str = ""
 
     def __post_init__(self) -> None:
         checks.name("Gear(joint=...)", self.joint)

@@ -53,11 +53,11 @@ class Mechanism:
     joints: Sequence[Joint]
     contacts: Sequence[Contact] = ()
     inputs: Sequence[Input] | None = None
-    gravity: ArrayLike = (0.0, 0.0, -9.81)  # [m/s^2]
+    gravity: ArrayLike = (0.0, 0.0, -9.81)
     name: str = "mechanism"
     neutral: Mapping[str, ArrayLike] | ArrayLike | None = None
     collisions: Sequence[Collision] = ()
-    loops: Sequence[Joint] = ()  # joints with close=True are moved here
+    loops: Sequence[Joint] = ()
     gears: Sequence[Gear] = ()
 
     def __post_init__(self) -> None:

@@ -59,7 +59,7 @@ class Terrain:
     direction: ArrayLike = (1.0, 0.0)
     plane: tuple[Any, float] | None = None
     name: str = "ground"
-    coefficients: Floats = field(init=False, repr=False)  # (nx + 2, ny + 2) of the spline
+    coefficients: Floats = field(init=False, repr=False)
 
     __repr__ = brief_repr
 
