@@ -21,6 +21,10 @@ import pytest
 import dojo_opt as dojo
 from benchmarks import compare
 from dojo_opt import cli
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.models.catalogue import Entry
+from dojo_opt.mpc.moving import References
+from dojo_opt.mpc.policy import Policy
 from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.plant import monte_carlo, tick
 from dojo_opt.viewer.motion import Motion
@@ -158,7 +162,8 @@ def test_examples_are_short() -> None:
 
 # classes that users get from the public names, or whose fields are keywords of these
 REACHED = (
-    *(MPCSettings, Motion, tick.Tick, monte_carlo.MonteCarlo, monte_carlo.MonteCarloRun),
+    *(Entry, Feet, MPCSettings, Motion, Policy, References, tick.Tick),
+    *(monte_carlo.MonteCarlo, monte_carlo.MonteCarloRun),
     *(results.Batch, results.Contacts, results.Gradient, results.Jacobian, results.Shot),
     *(mjcf_report.MjcfReport, urdf_report.UrdfReport, urdf_report.LinkFrame, urdf_report.Note),
 )

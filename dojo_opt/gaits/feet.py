@@ -24,9 +24,16 @@ _DAMPING = 1e-8  # keeps a stretched leg solvable
 
 
 class Feet:
-    """Contacts of the bodies at the ends of the tree, or those that are named, as points that move with the state.
+    """Contacts of a robot as points that move with its state.
 
-    The first joint of the mechanism is its base; the others are its legs.
+    The first joint of the mechanism is the base of the robot; the others are its legs.
+
+    Args:
+        sim: simulator of the robot.
+        names: names of k contacts (default None: those of the bodies at the ends of the tree).
+
+    Raises:
+        ValueError: a name is unknown, or no body at the end of the tree has a contact.
     """
 
     def __init__(self, sim: Simulator, names: Sequence[str] | None = None) -> None:
@@ -49,19 +56,40 @@ class Feet:
         self.height = np.array([c.height for c in self.contacts])
 
     def positions(self, x: ArrayLike) -> Array:
-        """Centres (..., k, 3) of the balls at the states x (..., nx), world axes [m]."""
+        """Places of the balls.
+
+        Args:
+            x: (..., nx) states.
+
+        Returns:
+            (..., k, 3) centres, world axes [m].
+        """
         z = self.sim.maximal(x)[..., self._body, :]
         w, v = z[..., 6:7], z[..., 7:10]
         side = cross(v, self._point)
         return np.asarray(z[..., :3] + self._point + 2.0 * (w * side + cross(v, side)))
 
     def gaps(self, x: ArrayLike) -> Array:
-        """Distances (..., k) of the balls from the ground [m]."""
+        """Distances of the balls from the ground.
+
+        Args:
+            x: (..., nx) states.
+
+        Returns:
+            (..., k) distances [m].
+        """
         at = self.positions(x)
         return np.stack([c.gap(at[..., k, :]) for k, c in enumerate(self.contacts)], axis=-1)
 
     def put_down(self, x: Array) -> Array:
-        """The state x (nx,) of a robot on a floating base, moved up or down until its lowest ball touches."""
+        """Move a robot on a floating base up or down until its lowest ball touches the ground.
+
+        Args:
+            x: (nx,) state.
+
+        Returns:
+            (nx,) state.
+        """
         out = x.copy()
         for _ in range(_ITERATIONS):
             least = float((self.gaps(out) / self.normals(out)[:, 2]).min())
@@ -71,11 +99,25 @@ class Feet:
         return out
 
     def normals(self, x: Array) -> Array:
-        """Outward normals (k, 3) of the ground at the balls, at one state x (nx,)."""
+        """Outward normals of the ground at the balls.
+
+        Args:
+            x: (nx,) state.
+
+        Returns:
+            (k, 3) unit normals, world axes.
+        """
         return np.stack([c.normal_at(p) for c, p in zip(self.contacts, self.positions(x), strict=True)])
 
     def touching(self, x: Array) -> Feet:
-        """The same with the points of the balls nearest to the ground at x (nx,), instead of their centres."""
+        """The points of the balls nearest to the ground, instead of their centres.
+
+        Args:
+            x: (nx,) state that determines the points.
+
+        Returns:
+            The points, fixed on their bodies.
+        """
         z = self.sim.maximal(x)[self._body]
         w, v, arm = z[:, 6:7], -z[:, 7:10], -self.radius[:, None] * self.normals(x)
         side = cross(v, arm)
@@ -84,7 +126,14 @@ class Feet:
         return other
 
     def jacobian(self, x: ArrayLike) -> Array:
-        """d(positions)/d(dq), (..., k, 3, nv), by central differences."""
+        """Derivatives of the positions by the coordinates, by central differences.
+
+        Args:
+            x: (..., nx) states.
+
+        Returns:
+            (..., k, 3, nv) derivatives.
+        """
         sim = self.sim
         steps = np.zeros((2 * sim.nv, sim.ndx))
         steps[: sim.nv, : sim.nv] = _STEP * np.eye(sim.nv)
@@ -94,10 +143,20 @@ class Feet:
         return np.moveaxis(slope, -3, -1)
 
     def place(self, x: ArrayLike, targets: ArrayLike) -> Array:
-        """States (n, nx) with the base of x (n, nx) and the feet at `targets` (n, k, 3): inverse kinematics.
+        """Inverse kinematics: joint angles that put the feet at given places, with the base where it is.
 
-        Damped Gauss-Newton from the joint angles of x, so a knee stays bent to its side; all states at once. ValueError
-        when a target is out of reach, or only reached beyond the stops of a joint.
+        Damped Gauss-Newton starts at the joint angles of x, so a knee stays bent to its side. It solves all states at
+        once.
+
+        Args:
+            x: (n, nx) or (nx,) states.
+            targets: (n, k, 3) centres of the balls, world axes [m].
+
+        Returns:
+            (n, nx) states.
+
+        Raises:
+            ValueError: a target is out of reach, or only reached beyond the stops of a joint.
         """
         sim, nb = self.sim, self.base
         x = np.array(np.broadcast_to(x, (len(np.asarray(targets)), sim.nx)), dtype=float)

@@ -115,9 +115,16 @@ class Sampled:
 class References:
     """The costs of a problem whose references move, and the functions that move them.
 
-    given: one function or trajectory for all `Tracking` costs, or {index of a cost: function or trajectory} for
-    `Tracking` and `Effort`. A function takes times (n,) [s] and returns rows (n, nx) or (n, nu); a trajectory is rows
-    one knot apart, or anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero.
+    A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is rows one knot apart, or
+    anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero.
+
+    Args:
+        problem: the problem; the references of its terms are overwritten.
+        given: one function or trajectory for all `Tracking` costs, or {index of a cost: function or trajectory} for
+            `Tracking` and `Effort`; None for references that stay.
+
+    Raises:
+        ValueError: for a cost without a reference, or rows of the wrong shape.
     """
 
     def __init__(self, problem: Problem, given: Any) -> None:
@@ -144,7 +151,7 @@ class References:
 
     @property
     def tracked(self) -> Integers | None:
-        """Numbers of the coordinates that the first moving `Tracking` weighs; None when no state moves."""
+        """Numbers of the coordinates that the first moving `Tracking` weighs; None if no state moves."""
         term = next((term for term, _ in self._moving if isinstance(term, StateTerm)), None)
         return None if term is None else np.flatnonzero(term.weight[:, : self._sim.nv].any(axis=0))
 
@@ -163,7 +170,12 @@ class References:
             checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
 
     def move(self, time: float, rise: float = 0.0) -> None:
-        """Let the first knot of every reference be at `time` [s], and a floating base be higher by `rise` [m]."""
+        """Move the references to the present.
+
+        Args:
+            time: time of the first knot [s].
+            rise: height of the ground, added to that of a floating base [m].
+        """
         self._begin, self.rise = time, rise
         for term, function in self._moving:
             term.reference[:] = function(time + self._h * term.knots)
@@ -171,9 +183,17 @@ class References:
                 term.reference[:, 2] += rise
 
     def rows(self, kind: type[StateTerm] | type[PickTerm], begin: float, count: int) -> Matrix | None:
-        """Rows (count, width) of the first reference of that kind at begin, begin + h, ...; None when none moves.
+        """Rows of the first reference of a kind, one knot apart.
 
-        Those of the present horizon are not computed again. States are `rise` higher then, as all others of it.
+        Rows of the present horizon are not computed again, and states are `rise` higher then, as all others of it.
+
+        Args:
+            kind: class of the term.
+            begin: time of the first row [s].
+            count: number of rows.
+
+        Returns:
+            (count, nx) states or (count, nu) inputs; None if no such reference moves.
         """
         for term, function in self._moving:
             if isinstance(term, kind):

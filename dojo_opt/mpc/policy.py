@@ -22,20 +22,29 @@ __all__ = ["Policy"]
 
 @dataclass(frozen=True)
 class Policy:
-    """x (T + 1, nx), u (T, nu), K (T, nu, ndx) of the knots at time + i knot_time.
+    """A plan over time: states, inputs and gains of the knots at time + i knot_time.
 
     A step of the model acts on the node it starts from: its input is an impulse there, and so stands for the input from
     half a simulation step before that node on. `control` reads u that way; read from the node on, every input would
     come half a step late.
+
+    Attributes:
+        sim: simulator of the model.
+        time: time of the first knot [s].
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+        K: (T, nu, ndx) gains.
+        substeps: simulation steps per knot (default 1).
+        lead: an earlier time [s] and the state then, from which x[0] was predicted (default None: x[0] was measured).
     """
 
     sim: Simulator
-    time: float  # of the first knot [s]
+    time: float
     x: Matrix
     u: Matrix
     K: Stack
-    substeps: int = 1  # simulation steps per knot
-    lead: tuple[float, Vector] | None = None  # an earlier time [s], and the state then, from which x[0] was predicted
+    substeps: int = 1
+    lead: tuple[float, Vector] | None = None
 
     __repr__ = brief_repr
 
@@ -51,11 +60,25 @@ class Policy:
         return n, s - n if s - n > _ROUNDING else 0.0
 
     def index(self, time: float) -> int:
-        """Row of `u` that acts at `time`; the last one beyond the end."""
+        """Row of `u` that acts at a time.
+
+        Args:
+            time: the time [s].
+
+        Returns:
+            The row; beyond the end, the last one.
+        """
         return min(self._place(time + 0.5 * self.sim.time_step)[0], len(self.u) - 1)
 
     def state(self, time: float) -> Vector:
-        """State (nx,) at `time`, between knots along the shortest way; the last one beyond the end."""
+        """Planned state at a time, between knots along the shortest way.
+
+        Args:
+            time: the time [s].
+
+        Returns:
+            (nx,) state; beyond the end, the last one.
+        """
         if self.lead is not None and time < self.time:
             begin, x = self.lead
             f = min(1.0, max(0.0, (time - begin) / (self.time - begin)))
@@ -68,19 +91,41 @@ class Policy:
         return self.sim.integrate(self.x[n], f * self.sim.difference(self.x[n + 1], self.x[n]))
 
     def control(self, time: float) -> Vector:
-        """Input (nu,) at `time`, without feedback."""
+        """Planned input at a time, without feedback.
+
+        Args:
+            time: the time [s].
+
+        Returns:
+            (nu,) input [N, N m].
+        """
         return self.u[self.index(time)].copy()
 
     def feedback(self, time: float, x: Vector) -> Vector:
-        """K (x (-) planned state) at `time`."""
+        """Feedback K (x (-) planned state) at a time.
+
+        Args:
+            time: the time [s].
+            x: (nx,) state.
+
+        Returns:
+            (nu,) change of the input [N, N m].
+        """
         knot = min(self._place(time)[0], len(self.u) - 1)
         return self.K[knot] @ self.sim.difference(x, self.state(time))
 
     def shifted(self, time: float, tail: Callable[[int], tuple[Matrix, Matrix]]) -> Policy:
-        """The same plan with its first knot at `time`, not before now; tail(n): n more states and inputs at its end.
+        """The same plan with a later first knot.
 
-        Between knots, states are interpolated on the manifold, gains linearly, and inputs so that the impulse over
-        each new knot is that of the old ones it overlaps.
+        Between knots, states are interpolated on the manifold, gains linearly, and inputs so that the impulse over each
+        new knot is that of the old ones it overlaps.
+
+        Args:
+            time: time of the first knot, not before the present one [s].
+            tail: function of n that returns n more states (n, nx) and inputs (n, nu) for the end.
+
+        Returns:
+            The new policy, of the same length.
         """
         n, f = self._place(time)
         extra = n + (f > 0.0)
