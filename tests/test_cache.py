@@ -353,8 +353,15 @@ FEATURES = (  # of few scenes: rooms and files with kernels of their own
             "sim.rollout(sim.neutral(), np.zeros((3, sim.nu)))\nsim.linearize(sim.neutral())",
             (*FEATURES, "sim.contact.", "sim.solve.interior_point", "sim.solve.inequalities", "solvers.cones"),
         ),
+        (
+            "body = dojo.Body('link', 1.0, shape=dojo.Sphere(0.1))\n"
+            "hinge = dojo.Joint('revolute', None, 'link', axis=(1.0, 0.0, 0.0), limits=(-0.1, 0.1))\n"
+            "sim = dojo.Simulator(dojo.Mechanism(bodies=[body], joints=[hinge]))\n"
+            "sim.rollout(sim.neutral(), np.ones((3, sim.nu)))\nsim.linearize(sim.neutral())",
+            (*FEATURES, "sim.contact.", "sim.solve.loop_branch"),
+        ),
     ],
-    ids=["hop", "pendulum"],
+    ids=["hop", "pendulum", "limit"],
 )
 def test_features_of_few_scenes_are_not_compiled(program: str, foreign: tuple[str, ...]) -> None:
     text = f"""

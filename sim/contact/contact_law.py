@@ -24,7 +24,8 @@ from sim.model.columns import Bounce, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import LawForm, NewtonTarget
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.cones import onto_path, orthant_step, return_pair
 from solvers.rotation import Vec3
 from solvers.types import Vector
@@ -121,7 +122,7 @@ def slip_violation(model: Model, data: Data, c: int, kappa: float) -> float:
     return cone_violation(model, data, c, kappa) if law_of(model, c) == Law.NONLINEAR else 0.0
 
 
-@kernel
+@optional(Slot.SLIP_NOISE, default=0.0)
 def slip_noise(model: Model, data: Data, h: float) -> float:
     """Rounding of the friction laws: mu gamma times that of the slips, which are differences of positions over h."""
     e = 0.0

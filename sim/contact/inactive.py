@@ -34,7 +34,8 @@ from sim.model.columns import Cluster, Inactive
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import StepOptions
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.rotation import rotate, three
 
 
@@ -61,7 +62,7 @@ def cluster_gap(model: Model, data: Data, c: int, height: float, third: bool) ->
     return n[0] * (pos[i, 0] + x) + n[1] * (pos[i, 1] + y) + n[2] * (pos[i, 2] + z) - height - p[Cluster.RADIUS]
 
 
-@kernel
+@optional(Slot.SUNK_CONTACT, default=-1)
 def sunk_contact(model: Model) -> int:
     """A contact that no motion lifts out of the ground (confined.py), or -1."""
     for c in range(model.contact_hold.shape[0]):
@@ -70,7 +71,7 @@ def sunk_contact(model: Model) -> int:
     return -1
 
 
-@kernel
+@optional(Slot.CHOOSE_ACTIVE)
 def choose_active(model: Model, data: Data, options: StepOptions) -> None:
     """Sort contacts into active and inactive ones, from configuration 2 and the motion that led there.
 
@@ -141,7 +142,7 @@ def _stiffness(model: Model, h: float, c: int, a: float) -> float:
     return (mu * mu + h * (1.0 + mu)) * p[Cluster.MOBILITY] + h * (1.0 + mu) * p[Cluster.TURNING] * a
 
 
-@kernel
+@optional(Slot.HAS_ACTIVATED, default=False)
 def has_activated(model: Model, data: Data) -> bool:
     """Whether an inactive cluster has become active at configuration 3; it is active from now on."""
     found = pairs_came_near(model, data)

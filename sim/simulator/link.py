@@ -7,7 +7,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.contact.active_contacts import (
+    add_slip_jacobians,
+    apply_contacts,
+    condense_contacts,
+    contact_constants,
+    contacts_boundary,
+    contacts_kinematics,
+    contacts_overlap,
+    contacts_products,
+    contacts_products_ahead,
+    has_pyramids,
+    keep_contacts,
+    move_contacts,
+    normal_impulses,
+    recover_contacts,
+    resume_contacts,
+    return_contacts,
+    slip_error,
+    start_contacts,
+)
+from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_contacts, worst_contact
+from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.inactive_terrain import evaluate_on_terrain
 from sim.contact.pairs.active_features import choose_pairs, overlapping
 from sim.contact.pairs.cylinder_pairs import choose_cylinders, collide_cylinders, cylinder_before, cylinder_distance
@@ -58,13 +80,40 @@ from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
 from sim.model.model import Law, Model
 from sim.model.shape_kinds import SWAPPED, Pair
+from sim.solve.delassus import contact_answers, contact_rates
 from sim.solve.inequalities import add_stiffness
 from sim.solve.interior_point import interior_point
 from sim.solve.loop_branch import solve_loops
 from sim.solve.newton import newton
+from sim.solve.prediction import choose_contacts, take_contacts
 from sim.step import step
 from solvers.compiler import link
 
+_CONTACTS = (
+    sunk_contact,
+    choose_active,
+    has_activated,
+    contacts_kinematics,
+    contacts_overlap,
+    start_contacts,
+    resume_contacts,
+    return_contacts,
+    normal_impulses,
+    apply_contacts,
+    condense_contacts,
+    contact_constants,
+    recover_contacts,
+    keep_contacts,
+    move_contacts,
+    contacts_products,
+    contacts_products_ahead,
+    contacts_boundary,
+    slip_error,
+    slip_noise,
+    worst_contact,
+    report_contacts,
+)
+_PREDICTION = (has_pyramids, contact_rates, contact_answers, choose_contacts, take_contacts)
 _LOOPS = (
     factor_coupling,
     solve_coupling,
@@ -170,9 +219,11 @@ def link_step(model: Model) -> None:
     hard = len(model.contact_body) + len(model.limit_dof) > 0
     link(model.optional, step)
     if hard:
-        link(model.optional, interior_point, worst_contact, report_contacts)
+        link(model.optional, interior_point)
     else:
         link(model.optional, newton)
+    if len(model.contact_body):
+        link(model.optional, *_CONTACTS, *_PREDICTION)
     if np.any(model.limit_cone):
         link(model.optional, cone_gap, cone_block)
     if _has_ball_springs(model):
@@ -205,6 +256,8 @@ def link_gradient(model: Model) -> None:
         link(model.optional, solve_deep_panel)
     if len(model.contact_body) + len(model.limit_dof):
         link(model.optional, add_stiffness)
+    if len(model.contact_body):
+        link(model.optional, add_slip_jacobians)
     if len(model.limit_dof):
         link(model.optional, add_limit_derivatives)
     if np.any(model.limit_cone):

@@ -16,7 +16,8 @@ from sim.dynamics.elimination import dot_six
 from sim.model.columns import Kin
 from sim.model.data import Data
 from sim.model.model import Model
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.lu import lu_solve
 from solvers.types import Vector
 
@@ -42,7 +43,7 @@ def _rates_above(model: Model, data: Data, i: int, a: int) -> None:
                 _add_six(-data.reach[d, a], data.L[d], r)
 
 
-@kernel
+@optional(Slot.CONTACT_RATES)
 def contact_rates(model: Model, data: Data, c: int, a: int) -> None:
     """Rows a, a + 1, a + 2: gap and slip of contact c."""
     i = model.contact_body[c]
@@ -92,7 +93,7 @@ def _answer(model: Model, data: Data, i: int, b: int, size: int) -> None:
         i = model.body_parent[i]
 
 
-@kernel
+@optional(Slot.CONTACT_ANSWERS)
 def contact_answers(model: Model, data: Data, c: int, b: int, size: int) -> None:
     """Columns b, b + 1, b + 2: unit impulses of contact c, normal and tangents."""
     i = model.contact_body[c]

@@ -21,6 +21,7 @@ It differs in these points (60,000 random extreme states, `benchmarks/robustness
 
 from __future__ import annotations
 
+from sim.contact.active_contacts import slip_error
 from sim.contact.contact_law import slip_noise
 from sim.contact.inactive import choose_active, has_activated, sunk_contact
 from sim.contact.pairs.active_features import overlapping
@@ -31,7 +32,7 @@ from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FAILED, FeatureChoice, Guess, Outcome, StepOptions, Verdict
 from sim.model.slots import Slot
-from sim.solve.complementarity import products, slip_error
+from sim.solve.complementarity import products
 from sim.solve.direction import direction, linearize_step
 from sim.solve.energy_balance import step_gained
 from sim.solve.globalization import (

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from sim.contact.active_contacts import slip_error
 from sim.dynamics.loops.closure import apply_loops
 from sim.model.data import Data
 from sim.model.model import Model
-from sim.solve.complementarity import products, slip_error
+from sim.solve.complementarity import products
 from sim.solve.inequalities import apply_inequalities, apply_limits
 from sim.solve.residual import balance_to_wrench, norm, project_wrench
 from solvers.compiler import kernel

@@ -10,6 +10,7 @@ with the residual there and the matrices of before, costs less than an iteration
 
 from __future__ import annotations
 
+from sim.contact.active_contacts import has_pyramids
 from sim.contact.contact_law import law_of
 from sim.contact.ground_contact import contact_jacobian, contact_rate
 from sim.dynamics.elimination import solve
@@ -17,13 +18,14 @@ from sim.model.columns import Bound, Cone, Kin
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from sim.model.options import StepOptions
+from sim.model.slots import Slot
 from sim.solve.delassus import delassus
 from sim.solve.inequalities import resume_inequalities
 from sim.solve.matrix import factor_free
 from sim.solve.merit import residuals
 from sim.solve.residual import residual_scale
 from sim.solve.trial_velocity import INFEASIBLE, set_trial_velocity
-from solvers.compiler import kernel
+from solvers.compiler import kernel, optional
 from solvers.gauss_seidel import gauss_seidel
 from solvers.rotation import Vec3
 from solvers.types import Vector
@@ -38,11 +40,7 @@ def predictable(model: Model, data: Data) -> bool:
     """Whether `predict` covers the scene: no pairs of bodies, loops, gears or friction pyramids."""
     if data.active_count[0] != data.active_ground_count[0] or model.loop_ntrans.shape[0] + model.gear_dof.shape[0] > 0:
         return False
-    for m in range(data.active_ground_count[0]):
-        c = data.active[m]
-        if law_of(model, c) == Law.LINEAR:
-            return False
-    return True
+    return not has_pyramids(model, data)
 
 
 @kernel
@@ -73,13 +71,9 @@ def limit_rate(model: Model, data: Data, h: float, k: int) -> float:
     return h * model.limit_sign[k] * data.dnu[model.limit_dof[k]]
 
 
-@kernel
-def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
-    """Contacts and limits that may touch, into reach_of, with w and l; and their number: (contacts, rows). The others
-    get the impulses of their gaps.
-
-    After a solve. (0, -1) when there are more of them than places.
-    """
+@optional(Slot.CHOOSE_CONTACTS, default=0)
+def choose_contacts(model: Model, data: Data, h: float, kappa: float) -> int:
+    """Contacts that may touch, into reach_of, with w and l; and their rows, three each. See `choose`."""
     most = data.reach_of.shape[0]
     n = 0
     for m in range(data.active_ground_count[0]):
@@ -90,13 +84,27 @@ def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
         z = data.cone[c]
         if _may_touch(gap, rate[0], z[Cone.SLACK], z[Cone.IMPULSE], kappa):
             if n + 3 > most:
-                return 0, -1
+                return -1
             data.reach_of[n] = c
             data.reach_friction[n] = model.contact_friction[c] if law_of(model, c) == Law.NONLINEAR else 0.0
             _take_contact(data, n, c, rate)
             n += 3
         else:
             z[Cone.IMPULSE], z[Cone.FRICTION1], z[Cone.FRICTION2] = kappa / (gap + rate[0]), 0.0, 0.0
+    return n
+
+
+@kernel
+def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
+    """Contacts and limits that may touch, into reach_of, with w and l; and their number: (contacts, rows). The others
+    get the impulses of their gaps.
+
+    After a solve. (0, -1) when there are more of them than places.
+    """
+    most = data.reach_of.shape[0]
+    n = choose_contacts(model, data, h, kappa)
+    if n < 0:
+        return 0, -1
     points = n // 3
     for k in range(model.limit_dof.shape[0]):
         if model.limit_cone[k]:
@@ -114,11 +122,19 @@ def choose(model: Model, data: Data, h: float, kappa: float) -> tuple[int, int]:
     return points, n
 
 
+@optional(Slot.TAKE_CONTACTS)
+def take_contacts(model: Model, data: Data, h: float, points: int) -> None:
+    """w and l of the contacts chosen, with their Jacobians at the present pose, after the last solve."""
+    for j in range(0, 3 * points, 3):
+        c = data.reach_of[j]
+        contact_jacobian(model, data, h, c)
+        _take_contact(data, j, c, contact_rate(model, data, c))
+
+
 @kernel
 def rates(model: Model, data: Data, h: float, points: int, size: int) -> None:
     """w and l of the contacts and limits chosen, after the last solve."""
-    for j in range(0, 3 * points, 3):
-        _take_contact(data, j, data.reach_of[j], contact_rate(model, data, data.reach_of[j]))
+    take_contacts(model, data, h, points)
     for j in range(3 * points, size):
         _take_limit(data, j, data.reach_of[j], limit_rate(model, data, h, data.reach_of[j]))
 
@@ -179,7 +195,5 @@ def predict(
         if step == _STEPS or not settled or max(balance[0] / scale, balance[1]) < _CLOSE:
             return balance
         step += 1
-        for j in range(0, 3 * points, 3):
-            contact_jacobian(model, data, h, data.reach_of[j])
         descend(model, data)
         rates(model, data, h, points, size)
