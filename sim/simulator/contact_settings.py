@@ -11,11 +11,16 @@ from sim.mechanism.mechanism import Mechanism
 
 
 def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
-    """The mechanism with another friction or law, of all contacts or by name."""
+    """The mechanism with another friction or law, of all contacts and collisions or by name."""
     if isinstance(value, Mapping):
+        names = tuple(part.name for part in (*mech.contacts, *mech.collisions))
         for name in value:
-            checks.one_of(f"Simulator.replace({field}=...)", name, mech.contact_names)
-        contacts = [replace(c, **{field: value.get(c.name, getattr(c, field))}) for c in mech.contacts]
+            checks.one_of(f"Simulator.replace({field}=...)", name, names)
+        chosen = value
     else:
-        contacts = [replace(c, **{field: value}) for c in mech.contacts]
-    return replace(mech, contacts=contacts)
+        chosen = {part.name: value for part in (*mech.contacts, *mech.collisions)}
+    return replace(
+        mech,
+        contacts=[replace(c, **{field: chosen.get(c.name, getattr(c, field))}) for c in mech.contacts],
+        collisions=[replace(c, **{field: chosen.get(c.name, getattr(c, field))}) for c in mech.collisions],
+    )

@@ -116,8 +116,8 @@ class Simulator(StateSpace):
         """The same simulator with other settings. Compiled code is shared, and a default kappa stays one.
 
         Args:
-            **settings: settings of Simulator(...), `mechanism`, `gravity` (3,) [m/s^2], and `friction` and `law` of the
-                contacts with the ground: one for all, or {contact name: value}.
+            **settings: settings of Simulator(...), `mechanism`, `gravity` (3,) [m/s^2], and `friction` and `law` of
+                contacts and collisions: one for all, or {name of a contact or collision: value}.
 
         Returns:
             The new simulator.

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+import dojo_opt as dojo
 from dojo_opt import models
 from sim.simulator.simulator import Simulator
 
@@ -51,6 +52,19 @@ def test_replace() -> None:
     assert [c.friction for c in SIM.mechanism.contacts] == [0.5, 0.5]
     only = SIM.replace(friction={"foot": 1.2}, law="linear").mechanism.contacts
     assert [(c.name, c.friction, c.law) for c in only] == [("foot", 1.2, "linear"), ("body", 0.5, "linear")]
+
+
+def test_replace_reaches_collisions() -> None:
+    mech = dojo.Mechanism(
+        bodies=[dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in "ab"],
+        joints=[dojo.Joint("floating", None, name) for name in "ab"],
+        contacts=[dojo.Contact("a", radius=0.1, name="floor")],
+        collisions=[dojo.Collision("a", "b", name="pair")],
+    )
+    sim = dojo.Simulator(mech)
+    every, one = sim.replace(friction=0.9, law="linear").mechanism, sim.replace(friction={"pair": 0.2}).mechanism
+    assert [(c.friction, c.law) for c in (*every.contacts, *every.collisions)] == [(0.9, "linear")] * 2
+    assert [c.friction for c in (*one.contacts, *one.collisions)] == [mech.contacts[0].friction, 0.2]
 
 
 def test_pickle() -> None:
