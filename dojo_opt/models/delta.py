@@ -64,6 +64,10 @@ def delta(
         ValueError: for an argument out of range, or arms and rods that do not reach the platform.
     """
     out = base_radius + arm * np.cos(angle) - platform_radius  # from the end of an arm to the platform
+    if not abs(out) < forearm:
+        raise ValueError(
+            f"delta(forearm=...): expected more than {abs(out):.3g} m, from an arm to the platform, got {forearm}"
+        )
     drop = float(np.sqrt(forearm**2 - out**2))
     bodies, joints, balls = [], [], []
     for k in range(3):

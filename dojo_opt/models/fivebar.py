@@ -58,7 +58,10 @@ def fivebar(
     up = {"crank": (0.0, 0.0, crank / 2), "forearm": (0.0, 0.0, forearm / 2)}
     down = {"crank": (0.0, 0.0, -crank / 2), "forearm": (0.0, 0.0, -forearm / 2)}
     length = {"crank": crank, "forearm": forearm}
-    inwards = float(np.arcsin((base / 2 + crank * np.sin(angle)) / forearm))
+    across = base / 2 + crank * np.sin(angle)  # from an elbow to the middle
+    if not abs(across) < forearm:
+        raise ValueError(f"fivebar(forearm=...): expected more than {abs(across):.3g} m, to the middle, got {forearm}")
+    inwards = float(np.arcsin(across / forearm))
     neutral: dict[str, float] = {}
     bodies, joints = [], []
     for side, sign in (("l", -1.0), ("r", 1.0)):

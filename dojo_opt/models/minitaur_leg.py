@@ -65,8 +65,11 @@ def minitaur_leg(
     Raises:
         ValueError: for an argument out of range, or shanks too short to meet.
     """
-    reach = upper * np.cos(angle) + np.sqrt(lower**2 - (upper * np.sin(angle)) ** 2)
-    knee = angle + float(np.arcsin(upper * np.sin(angle) / lower))
+    across = upper * np.sin(angle)  # from a knee to the middle
+    if not abs(across) < lower:
+        raise ValueError(f"minitaur_leg(lower=...): expected more than {abs(across):.3g} m, to the middle, got {lower}")
+    reach = upper * np.cos(angle) + np.sqrt(lower**2 - across**2)
+    knee = angle + float(np.arcsin(across / lower))
     bodies = [Body("body", body_mass, shape=Box(0.2, 0.12, 0.08))]
     neutral: dict[str, ArrayLike] = {"base": (0.0, float(reach) + foot_radius, 0.0)}
     hips, knees = [], []

@@ -89,3 +89,12 @@ def test_period_of_a_four_bar() -> None:
         k = [k for k in range(2, len(v) - 1) if v[k] * v[k + 1] <= 0.0][1]  # from rest through one side and back
         errors.append(abs((k + 0.5 + v[k] / (v[k] - v[k + 1])) * h - exact))
     assert errors[0] < 5e-3 * exact and errors[1] < 0.35 * errors[0]
+
+
+@pytest.mark.parametrize(
+    ("model", "field", "length"),
+    [("delta", "forearm", 0.1), ("fivebar", "forearm", 0.05), ("minitaur_leg", "lower", 0.05)],
+)
+def test_lengths_that_cannot_meet_are_refused(model: str, field: str, length: float) -> None:
+    with pytest.raises(ValueError, match=rf"{model}\({field}=...\): expected more than .* got {length}"):
+        getattr(dojo.models, model)(**{field: length})
