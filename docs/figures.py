@@ -39,7 +39,12 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 MEASURED = ROOT / "docs" / "measured"
-PAGES = ("README.md", "docs/numbers.md", "docs/guide.md", "CHANGELOG.md")
+PAGES = (
+    "README.md",
+    "CHANGELOG.md",
+    *(f"docs/{name}.md" for name in ("accuracy", "examples", "guide", "installation", "limitations", "numbers")),
+    "docs/theory/step.md",
+)
 BULKY = (("planning", "settings"),)  # details that nothing quotes, 0.4 MB: not taken to docs/measured
 DIGITS = 6  # significant ones that are kept of what is taken
 WIDTH = 120  # of a line of JSON

@@ -99,7 +99,7 @@ def test_every_module_can_be_imported() -> None:
 # -- README and sizes --------------------------------------------------------------------------------------------------
 
 
-PAGES = ("README.md", "docs/guide.md", "docs/numbers.md")
+PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")))
 
 
 def test_commands_of_the_pages_exist() -> None:
