@@ -43,7 +43,7 @@ def thumbnail(mechanism: Mechanism, q: ArrayLike | None = None, *, size: float =
         line = np.array([a, b]) @ np.array([right, up]).T
         ax.plot(*line.T, color=_BONE, linewidth=2.0, solid_capstyle="round", zorder=1)
         drawn.append(line)
-    solids = [(b.name, b.shape) for b in mechanism.bodies if b.shape is not None]
+    solids = [(b.name, shape) for b in mechanism.bodies for shape in b.shapes]
     for name, shape in sorted(solids, key=lambda part: float(at[part[0]].point @ depth)):
         points = np.array([at[name].at(p) for p in _surface(shape)]) @ np.array([right, up]).T
         outline = _hull(points)

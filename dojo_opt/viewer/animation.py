@@ -6,6 +6,7 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -125,7 +126,7 @@ def _scene(m: Motion) -> list[Any]:
     steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
     for k, body in enumerate(m.mechanism.bodies):
         node = _node("bodies", k, body.name)
-        for part, (solid, place) in enumerate(_solids(body.shape)):
+        for part, (solid, place) in enumerate(_solids(body.shapes)):
             commands.append(SetObject(solid, steel, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
         for c, contact in enumerate(m.mechanism.contacts):
@@ -138,7 +139,7 @@ def _scene(m: Motion) -> list[Any]:
     for k, collision in enumerate(m.mechanism.collisions):
         if collision.b != WORLD or isinstance(collision.shape_b, shapes.String):
             continue
-        for part, (solid, place) in enumerate(_solids(collision.shape_b)):
+        for part, (solid, place) in enumerate(_solids([collision.shape_b])):
             node = _node("obstacles", k, collision.name).append(f"part{part}")
             commands += [SetObject(solid, earth, node), SetTransform(place, node)]
     return commands
@@ -158,14 +159,17 @@ def _label(before: str, name: str) -> str:
     return escape(f"{before} {name.replace('/', '|')}")
 
 
-def _solids(shape: Any) -> list[tuple[Any, Any]]:
-    """(MeshCat geometry, placement in the body) of a shape; a body without one is a small ball."""
+def _solids(found: Sequence[Any]) -> list[tuple[Any, Any]]:
+    """(MeshCat geometry, placement in the body) of shapes; a body without one is a small ball."""
     from meshcat import geometry
 
-    if shape is None:
+    if not found:
         return [(geometry.Sphere(0.02), np.eye(4))]
-    place = _place(shape.center, shape.orientation)
-    return [(_geometry(part), place @ _at(part)) for part in shape.primitives()]
+    return [
+        (_geometry(part), _place(shape.center, shape.orientation) @ _at(part))
+        for shape in found
+        for part in shape.primitives()
+    ]
 
 
 def _geometry(part: Primitive) -> Any:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
 
 from sim.mechanism import checks
-from sim.mechanism.parts import LAWS, WORLD
+from sim.mechanism.parts import LAWS, WORLD, Body
 from sim.mechanism.shapes import Solid
 
 
@@ -17,6 +20,9 @@ class Collision:
     no friction. A taut string moves as a rod does (string.py), and one that is jerked taut takes the energy of the
     jerk.
 
+    A mechanism makes one collision for each shape of a body that has several, called "name.shape" by the name or the
+    number of the shape.
+
     A motion may start with shapes that overlap: its first step moves them apart, at a speed of their overlap over the
     time step, and adds the energy that this takes.
 
@@ -26,10 +32,11 @@ class Collision:
         shape_a: Sphere, Capsule, Box, Cylinder, Ellipsoid, Polytope or HalfSpace; a HalfSpace moves with its body
             (default None: the shape of the body).
         shape_b: likewise of b; of the world, it is placed in world axes (default None: the shape of the body).
-        friction: coefficient of friction (default 0.5).
+        friction: coefficient of friction (default None: the larger one of the two shapes, 0.5 where they have none).
         law: contact law, see `dojo.Contact` (default "nonlinear").
         name: name of the collision (default "a-b").
-        restitution: share of the normal velocity that an impact gives back, 0 to 1 (default 0).
+        restitution: share of the normal velocity that an impact gives back, 0 to 1 (default None: the larger one of the
+            two shapes, 0 where they have none).
 
     Raises:
         ValueError: for one body on both sides, an obstacle without a shape, or a value out of range.
@@ -39,10 +46,10 @@ class Collision:
     b: str | None = None
     shape_a: Solid | None = None
     shape_b: Solid | None = None
-    friction: float = 0.5
+    friction: float | None = None
     law: str = "nonlinear"
     name: str = ""  # default: a-b
-    restitution: float = 0.0
+    restitution: float | None = None
 
     def __post_init__(self) -> None:
         checks.name("Collision(a=...)", self.a)
@@ -63,7 +70,40 @@ class Collision:
             shape = getattr(self, field)
             if shape is not None and not isinstance(shape, Solid):
                 raise ValueError(f"{call}, {field}=...): expected a shape, got {shape!r}")
-        friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
-        object.__setattr__(self, "friction", friction)
+        if self.friction is not None:
+            friction = checks.number(f"{call}, friction=...)", self.friction, at_least=0.0)
+            object.__setattr__(self, "friction", friction)
         checks.one_of(f"{call}, law=...)", self.law, LAWS)
-        object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
+        if self.restitution is not None:
+            object.__setattr__(self, "restitution", checks.share(f"{call}, restitution=...)", self.restitution))
+
+
+def shape_by_shape(collisions: Iterable[Collision], bodies: Mapping[str, Body]) -> tuple[Collision, ...]:
+    """One collision per pair of shapes, with the friction and restitution of its shapes where it has none.
+
+    The only shape of a body stays that of the body; a body without a shape is refused where contact points are made.
+    """
+    return tuple(one for collision in collisions for one in _single(collision, bodies))
+
+
+def _single(collision: Collision, bodies: Mapping[str, Body]) -> list[Collision]:
+    sides: list[list[Solid | None]] = [
+        [shape] if shape is not None or name not in bodies else list(bodies[name].shapes) or [None]
+        for name, shape in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b))
+    ]
+    several = [len(side) > 1 for side in sides]
+    out = []
+    for (i, a), (j, b) in product(enumerate(sides[0]), enumerate(sides[1])):
+        labels = [
+            shape.name or str(k) for k, shape, many in zip((i, j), (a, b), several, strict=True) if many and shape
+        ]
+        given: dict[str, Any] = {}
+        if labels:
+            given["name"] = f"{collision.name}.{'-'.join(labels)}"
+        given |= {field: s for field, s, many in zip(("shape_a", "shape_b"), (a, b), several, strict=True) if many}
+        for field, usual in (("friction", 0.5), ("restitution", 0.0)):
+            if getattr(collision, field) is None:
+                own = (getattr(shape, field) for shape in (a, b) if shape is not None)
+                given[field] = max((value for value in own if value is not None), default=usual)
+        out.append(replace(collision, **given) if given else collision)
+    return out

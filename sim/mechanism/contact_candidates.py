@@ -63,10 +63,10 @@ def _touches(call: str, bodies: Sequence[Body], index: dict[str, int], collision
     solids: list[End] = []
     for body, given in ((collision.a, collision.shape_a), (collision.b or WORLD, collision.shape_b)):
         i = index[body]
-        shape = given if given is not None else bodies[i].shape
-        if shape is None:
+        shapes = (given,) if given is not None else bodies[i].shapes
+        if not shapes:
             raise ValueError(f"{call}: body {body!r} has no shape; give one to the body or to the collision")
-        solids.append((i, shape))
+        solids.append((i, shapes[0]))  # the only one, see collision.py
     (a, first), (b, second) = solids
     if isinstance(first, String) and isinstance(second, String) and first.length != second.length:
         raise ValueError(f"{call}: both ends of a string have its length, got {first.length:g} and {second.length:g}")
@@ -114,9 +114,9 @@ def _points(collision: Collision, kind: shape_kinds.Pair, ends: list[End]) -> li
             tuple(tables) if feature == 0 else (),
             (around[0], around[1]),
             places,
-            0.0 if rope else collision.friction,
+            0.0 if rope else collision.friction or 0.0,
             "impact" if rope else collision.law,
-            collision.restitution,
+            collision.restitution or 0.0,
             collision.name,
         )
         for feature in range(number)
@@ -135,7 +135,7 @@ def _corners(collision: Collision, solid: tuple[int, Polytope], ground: End) -> 
     for k, point in enumerate(np.asarray(shape.vertices) @ places[0, 3:].reshape(3, 3).T + places[0, :3]):
         where = places.copy()
         where[0, :3] = point
-        law = (collision.friction, collision.law, collision.restitution, collision.name)
+        law = (collision.friction or 0.0, collision.law, collision.restitution or 0.0, collision.name)
         out.append(Touch(f"{collision.name}_{k}", bodies, kind, 0, np.zeros(8), (), (0.0, np.inf), where, *law))
     return out
 

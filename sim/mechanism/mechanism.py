@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
 from sim.mechanism.closing import carried
-from sim.mechanism.collision import Collision
+from sim.mechanism.collision import Collision, shape_by_shape
 from sim.mechanism.contact_candidates import Touch, touches
 from sim.mechanism.dofs import components, dof_names
 from sim.mechanism.gear import Gear, check_gears
@@ -88,6 +88,9 @@ class Mechanism:
             for name in (c.a, c.b):
                 checks.one_of(f"{call}): body of collision {c.name!r}", name, ends)
         checks.distinct(f"{call}): collisions", (c.name for c in self.collisions))
+        single = shape_by_shape(self.collisions, {b.name: b for b in self.bodies})
+        object.__setattr__(self, "collisions", single)
+        checks.distinct(f"{call}): collisions", (c.name for c in single))
         object.__setattr__(self, "contacts", name_contacts(f"{call})", self.contacts, self.body_names))
         object.__setattr__(self, "inputs", name_inputs(call, self.inputs or (), self.joints, self.body_names))
         object.__setattr__(self, "gravity", checks.vector(f"{call}, gravity=...)", self.gravity, 3))
@@ -262,7 +265,7 @@ class Mechanism:
 
         Args:
             shape: the obstacle, placed in world axes by its centre and orientation.
-            bodies: names of bodies whose shapes touch it; by default the balls of the contacts do.
+            bodies: names of bodies all of whose shapes touch it; by default the balls of the contacts do.
             name: prefix of the names of the collisions.
             **options: friction, law, restitution of Collision.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
-from sim.mechanism.polytope import Polytope
-from sim.mechanism.shapes import Shape, Solid
+from sim.mechanism.composite import composite
+from sim.mechanism.shapes import Solid
 from sim.mechanism.terrain import Terrain
 
 WORLD = "world"
@@ -50,7 +50,9 @@ class Body:
         mass: mass [kg] (default 1).
         inertia: (3,) principal moments or (3, 3) matrix, about the centre of mass, body axes [kg m^2] (default None:
             that of `shape`).
-        shape: shape for inertia, collisions and drawings (default None: no shape).
+        shape: shape for inertia, collisions and drawings, or several (default None: no shape). All of them touch the
+            ground (`Mechanism.on`), obstacles and other bodies where asked, each with its own friction and restitution.
+            Several shapes share the mass by their volumes; `shapes` has them as a tuple.
 
     Raises:
         ValueError: for a value out of range, or an inertia that no rigid body has; the message names the body.
@@ -59,16 +61,22 @@ class Body:
     name: str
     mass: float = 1.0  # [kg]
     inertia: ArrayLike | None = None
-    shape: Shape | Polytope | None = None
+    shape: Solid | Sequence[Solid] | None = None
 
     def __post_init__(self) -> None:
         checks.name("Body(name=...)", self.name)
         call = f"Body({self.name!r}"
+        object.__setattr__(self, "shape", shape_of(f"{call}, shape=...)", self.shape))
         if self.mass != 0 or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
-        if self.shape is not None and not isinstance(self.shape, Solid):
-            raise ValueError(f"{call}, shape=...): expected a shape, as Sphere(0.1), got {self.shape!r}")
         object.__setattr__(self, "inertia", inertia_of(call, self))
+
+    @property
+    def shapes(self) -> tuple[Solid, ...]:
+        """All of its shapes."""
+        if self.shape is None:
+            return ()
+        return (self.shape,) if isinstance(self.shape, Solid) else tuple(self.shape)
 
 
 @dataclass(frozen=True)
@@ -317,16 +325,24 @@ class Input:
 # -- checks of arguments, per part -------------------------------------------------------------------------------------
 
 
+def shape_of(call: str, given: Any) -> Any:
+    """One shape, a tuple of several, or None; shapes of a body that have names have different ones."""
+    if given is None or isinstance(given, Solid):
+        return given
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
+    for shape in found:
+        if not isinstance(shape, Solid):
+            raise ValueError(f"{call}: expected a shape, as Sphere(0.1), or several, got {given!r}")
+    checks.distinct(f"{call}: shapes", (shape.name for shape in found if shape.name))
+    return found if len(found) > 1 else found[0] if found else None
+
+
 def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
     """The inertia as rows, after the tests that every rigid body passes."""
     if body.mass == 0.0:
         return ((0.0, 0.0, 0.0),) * 3
     if body.inertia is None:
-        if body.shape is None:
-            raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
-        if np.any(np.asarray(body.shape.center)):
-            raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
-        matrix = body.shape.inertia(body.mass)
+        matrix = inertia_of_shapes(call, body)
     else:
         matrix = checks.array(f"{call}, inertia=...)", body.inertia, (3,) if np.ndim(body.inertia) == 1 else (3, 3))
         matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
@@ -342,6 +358,25 @@ def inertia_of(call: str, body: Body) -> tuple[tuple[float, ...], ...]:
             "the largest exceeds the sum of the others"
         )
     return tuple(tuple(float(x) for x in row) for row in matrix)
+
+
+def inertia_of_shapes(call: str, body: Body) -> NDArray[np.float64]:
+    """The inertia of one shape at the centre of mass, or of several that have theirs there."""
+    if not body.shapes:
+        raise ValueError(f"{call}): give inertia=..., or a shape=... to take it from")
+    if len(body.shapes) == 1:
+        if np.any(np.asarray(body.shapes[0].center)):
+            raise ValueError(f"{call}): give inertia=...; the shape is not centred at the centre of mass")
+        return body.shapes[0].inertia(body.mass)
+    centre, matrix = composite(body.shapes, body.mass)
+    size = max(float(np.linalg.norm(shape.center)) + shape.bounding_radius() for shape in body.shapes)
+    if not np.abs(centre).max() <= 1e-9 * size:
+        at = np.round(centre, 9).tolist()
+        raise ValueError(
+            f"{call}): the centre of mass of its shapes is at {at}; a body has its origin there: move the centers of "
+            "the shapes by the negative of that, or give inertia=..."
+        )
+    return matrix
 
 
 def per_dof(call: str, joint: Joint, field: str) -> tuple[float, ...]:

@@ -111,14 +111,23 @@ class Polytope(Solid):
         Raises:
             ValueError: the centroid is elsewhere.
         """
-        volume, first, second = self._moments()
+        volume, first, _ = self._moments()
         size = float(np.ptp(np.asarray(self.vertices), axis=0).max())
         if np.abs(first / volume).max() > 1e-9 * size:
             raise ValueError(
                 f"Polytope: its centroid is at {np.round(first / volume, 9).tolist()}; a body has its origin there: "
                 "use Polytope.about_centroid(vertices), or give inertia=..."
             )
-        C = mass / volume * second
+        return self.central_inertia(mass)
+
+    def mass_centre(self) -> Floats:
+        """Centre of the solid (3,), in the axes of its body from the centre of mass [m]."""
+        return self.place(self.centroid)
+
+    def central_inertia(self, mass: float) -> Floats:
+        """Inertia (3, 3) about that centre, in body axes [kg m^2]: C = m/V int (x - c)(x - c)^T, J = tr(C) I - C."""
+        volume, first, second = self._moments()
+        C = mass / volume * (second - np.outer(first, first) / volume)
         R = rotation_matrix(self.orientation)
         return np.asarray(R @ (np.trace(C) * np.eye(3) - C) @ R.T)
 

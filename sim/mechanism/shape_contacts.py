@@ -1,4 +1,4 @@
-"""Contacts of a shape with the ground: the points and balls by which it stands, as it does on a half-space.
+"""Contacts of the shapes of a body with the ground: the points and balls by which they stand, as on a half-space.
 
     sphere     itself          capsule    a ball at either end          box, polytope    its corners
 
@@ -10,20 +10,28 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from sim.mechanism.parts import Body, Contact
-from sim.mechanism.shapes import rotation_matrix
 
 
 def shape_contacts(call: str, body: Body, **options: Any) -> list[Contact]:
-    """Contacts of the shape of a body; options: of Contact.   ValueError: it has none, a cylinder or an ellipsoid."""
-    shape = body.shape
-    stance = None if shape is None else shape.stance()
-    if shape is None or stance is None:
-        found = "has no shape" if shape is None else f"has the shape {type(shape).__name__}"
-        raise ValueError(f"{call}: body {body.name!r} {found}; expected a Sphere, Capsule, Box or Polytope")
-    part, points, radius = stance
-    places = points @ rotation_matrix(shape.orientation).T + np.asarray(shape.center)
-    names = [f"{body.name}_{part}{k}" if len(places) > 1 else f"{body.name}_{part}" for k in range(len(places))]
-    return [Contact(body.name, p, radius, name=name, **options) for p, name in zip(places, names, strict=True)]
+    """Contacts of all shapes of a body; options: of Contact, before those of the shapes.
+
+    ValueError: it has no shape, or one that does not stand on points, a cylinder or an ellipsoid.
+    """
+    if not body.shapes:
+        raise ValueError(f"{call}: body {body.name!r} has no shape; {_EXPECTED}")
+    out = []
+    for number, shape in enumerate(body.shapes):
+        stance = shape.stance()
+        if stance is None:
+            raise ValueError(f"{call}: body {body.name!r} has the shape {type(shape).__name__}; {_EXPECTED}")
+        label = body.name if len(body.shapes) == 1 else f"{body.name}.{shape.name or number}"
+        own = {field: getattr(shape, field) for field in ("friction", "restitution")}
+        settings = {field: value for field, value in own.items() if value is not None} | options
+        for k, point in enumerate(shape.place(stance.points)):
+            name = f"{label}_{stance.part}{k}" if len(stance.points) > 1 else f"{label}_{stance.part}"
+            out.append(Contact(body.name, point, stance.radius, name=name, **settings))
+    return out
+
+
+_EXPECTED = "expected a Sphere, Capsule, Box or Polytope"

@@ -74,6 +74,10 @@ class Solid:
     Attributes:
         center: (3,) its centre, from the centre of mass of the body, body axes [m] (default that of mass).
         orientation: (4,) unit quaternion (w, x, y, z) from its axes to those of the body (default none).
+        friction: coefficient of contacts and collisions of this shape that have none of their own; of two shapes the
+            larger one (default None: that of the contact or collision).
+        restitution: likewise, their restitution.
+        name: name in those of its contacts, where its body has several shapes (default its number).
 
     Raises:
         ValueError: for a value of the wrong shape or out of range.
@@ -84,11 +88,22 @@ class Solid:
 
     center: ArrayLike = (0.0, 0.0, 0.0)
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    friction: float | None = None
+    restitution: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         call = type(self).__name__
         object.__setattr__(self, "center", checks.vector(f"{call}(center=...)", self.center, 3))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}(orientation=...)", self.orientation))
+        if self.friction is not None:
+            friction = checks.number(f"{call}(friction=...)", self.friction, at_least=0.0)
+            object.__setattr__(self, "friction", friction)
+        if self.restitution is not None:
+            restitution = checks.share(f"{call}(restitution=...)", self.restitution)
+            object.__setattr__(self, "restitution", restitution)
+        if self.name:
+            checks.name(f"{call}(name=...)", self.name)
 
     def _positive(self, *fields: str) -> None:
         for field in fields:
@@ -186,6 +201,18 @@ class Solid:
         """
         R = rotation_matrix(self.orientation)
         return np.asarray((R * self.principal(mass)) @ R.T)
+
+    def place(self, points: ArrayLike) -> Floats:
+        """Points (..., 3) of the frame of the shape, in the axes of its body from the centre of mass [m]."""
+        return np.asarray(points) @ rotation_matrix(self.orientation).T + np.asarray(self.center)
+
+    def mass_centre(self) -> Floats:
+        """Centre of the solid (3,), in the axes of its body from the centre of mass [m]."""
+        return np.array(self.center, dtype=np.float64)
+
+    def central_inertia(self, mass: float) -> Floats:
+        """Inertia (3, 3) about that centre, in body axes [kg m^2]."""
+        return self.inertia(mass)
 
 
 @dataclass(frozen=True)

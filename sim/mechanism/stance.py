@@ -31,12 +31,12 @@ def gaps(mech: Mechanism, q: Floats) -> Floats:
 def plane_heights(mech: Mechanism, q: Floats) -> list[tuple[float, float]]:
     """(distance [m], upward part of the normal) of every shape of a body from a half-space of the world."""
     at = poses(mech.joints, q)
-    shapes = {body.name: body.shape for body in mech.bodies}
+    shapes = {body.name: body.shapes for body in mech.bodies}
     out = []
     for c in mech.collisions:
-        solid = c.shape_a if c.shape_a is not None else shapes[c.a]
-        if c.b != WORLD or not isinstance(c.shape_b, HalfSpace) or solid is None:
+        if c.b != WORLD or not isinstance(c.shape_b, HalfSpace):
             continue
+        solid = c.shape_a if c.shape_a is not None else shapes[c.a][0]  # the only one, see collision.py
         n = rotation_matrix(c.shape_b.orientation)[:, 2]
         own = (at[c.a].rotation @ rotation_matrix(solid.orientation)).T @ -n
         arm = at[c.a].at(np.asarray(solid.center)) - np.asarray(c.shape_b.center)

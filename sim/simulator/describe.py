@@ -88,11 +88,11 @@ def _collision_lines(mech: Mechanism) -> list[str]:
     """The shapes of each collision, and the number of their contact points."""
     lines = []
     for c in mech.collisions:
-        points = sum(touch.name == c.name or touch.name.startswith(f"{c.name}_") for touch in mech.touches)
+        points = sum(touch.collision == c.name for touch in mech.touches)
         met = _count(points, "point", "points") if points else "fixed to one another, omitted"
         kinds = [_solid(mech, *end) for end in ((c.a, c.shape_a), (c.b or WORLD, c.shape_b))]
         more = f", restitution {c.restitution:g}" if c.restitution else ""
-        law = c.law if c.friction > 0 else "impact"
+        law = c.law if c.friction else "impact"
         lines.append(
             f"  {c.name:<18}{kinds[0]} on {c.a}, {kinds[1]} {'of the' if c.b == WORLD else 'on'} {c.b}: "
             f"{met}, law {law}, friction {c.friction:g}{more}"
@@ -102,7 +102,7 @@ def _collision_lines(mech: Mechanism) -> list[str]:
 
 def _solid(mech: Mechanism, body: str, shape: Solid | None) -> str:
     """The kind of shape that a collision has on a body."""
-    own = shape if shape is not None or body == WORLD else mech.bodies[mech.body_names.index(body)].shape
+    own = shape if shape is not None or body == WORLD else mech.bodies[mech.body_names.index(body)].shapes[0]
     return type(own).__name__.lower()
 
 

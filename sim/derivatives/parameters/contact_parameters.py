@@ -57,8 +57,8 @@ def collision_parameters(mech: Mechanism) -> Iterator[Parameter]:
         if not mine:  # of two parts that are fixed to one another
             continue
         for kind, effect, value in (
-            ("friction", Effect.FRICTION, collision.friction),
-            ("restitution", Effect.RESTITUTION, collision.restitution),
+            ("friction", Effect.FRICTION, collision.friction or 0.0),
+            ("restitution", Effect.RESTITUTION, collision.restitution or 0.0),
         ):
             if kind == "restitution" or not isinstance(collision.shape_a, String):  # a string does not rub
                 yield Parameter(kind, collision.name, "", value, tuple((effect, ground + j, 0, 1.0) for j in mine))
@@ -81,9 +81,7 @@ def shape_of(mech: Mechanism, collision: Collision, letter: str) -> Solid:
     """Shape a or b of a collision: its own, or that of the body."""
     own: Solid | None = collision.shape_a if letter == "a" else collision.shape_b
     body = collision.a if letter == "a" else collision.b
-    shape = own if own is not None else mech.bodies[mech.body_names.index(body or "")].shape
-    assert shape is not None  # `touches` has checked it
-    return shape
+    return own if own is not None else mech.bodies[mech.body_names.index(body or "")].shapes[0]
 
 
 def _sizes(

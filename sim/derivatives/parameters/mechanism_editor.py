@@ -90,8 +90,8 @@ class Draft:
     def _move_centre(self, name: str, d: Floats) -> None:
         """The centre of mass moves by d, body axes; elements of the body stay in place."""
         body = self.bodies[name]
-        if body.shape is not None:
-            self.bodies[name] = replace(body, shape=_moved(body.shape, -d))
+        if body.shapes:
+            self.bodies[name] = replace(body, shape=[_moved(shape, -d) for shape in body.shapes])
         for label, joint in self.joints.items():
             for side, field in ((joint.parent, "parent_point"), (joint.child, "child_point")):
                 if side == name:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.urdf.drawing import Named, largest
 from sim.io.urdf.inertia import RigidInertia, combined
-from sim.io.urdf.report import Notes
+from sim.io.urdf.solids import named
 from sim.mechanism.pose import HERE, Pose
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Solid, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -82,17 +81,21 @@ def find_groups(model: Any) -> tuple[list[GeomGroup], Where]:
     return groups, where
 
 
-def drawn(model: Any, group: GeomGroup, notes: Notes) -> Shape | None:
-    """The largest primitive among the geoms of the group that collide, or else among the others."""
-    found: tuple[list[Named], list[Named]] = ([], [])
+def body_shapes(model: Any, group: GeomGroup) -> tuple[Solid, ...]:
+    """All primitives among the geoms of the group that collide; without one the largest of the others, if any."""
+    found: tuple[list[Solid], list[Solid]] = ([], [])
     for b, frame in group.members.items():
         start = int(model.body_geomadr[b])
         for g in range(start, start + int(model.body_geomnum[b])):
             solid = solid_of(model, g, frame, group.com)
             collides = model.geom_contype[g] | model.geom_conaffinity[g]
             if solid is not None:
-                found[0 if collides else 1].append((name_of(model, "geom", g), solid))
-    return largest(found[0], notes) or largest(found[1])
+                mu = 0.0 if int(model.geom_condim[g]) == 1 else float(model.geom_friction[g, 0])
+                solid = replace(solid, name=name_of(model, "geom", g), friction=mu)
+                found[0 if collides else 1].append(solid)
+    if found[0]:
+        return named(found[0])
+    return (max(found[1], key=lambda shape: shape.volume()),) if found[1] else ()
 
 
 def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | None:

@@ -14,7 +14,7 @@ from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
 from sim.io.mjcf.drives import find_inputs, left_out
 from sim.io.mjcf.equalities import find_gears, find_loops
-from sim.io.mjcf.groups import GeomGroup, drawn, find_groups
+from sim.io.mjcf.groups import GeomGroup, body_shapes, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
 from sim.io.mjcf.report import MjcfMechanism, MjcfReport, MjcfWarning
 from sim.io.urdf.report import LinkFrame, Notes
@@ -119,7 +119,7 @@ def _tree(
     for group in groups:
         carried = carry(model, group, merge, notes)
         inertia = group.inertia
-        solid = Body(group.name, inertia.mass, inertia.inertia, drawn(model, group, notes)) if inertia.mass else None
+        solid = Body(group.name, inertia.mass, inertia.inertia, body_shapes(model, group)) if inertia.mass else None
         bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
         joints += carried.joints
         homes |= carried.homes

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.io.urdf.contacts import find_contacts
-from sim.io.urdf.drawing import drawn
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import mimic_gears
 from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
+from sim.io.urdf.solids import body_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
@@ -79,7 +79,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     neutral: dict[str, ArrayLike] = {j.name: _neutral(robot, choices, j.name) for j in joints if j.nv == 1}
     neutral |= {j.name: choices.neutral[j.name] for j in joints if j.nv > 1 and j.name in choices.neutral}
     mech = UrdfMechanism(
-        [_body(body, inertias[body.name], notes) for body in groups],
+        [_body(body, inertias[body.name]) for body in groups],
         [*joints, *closing],
         found,
         _inputs(joints, closing, choices),
@@ -167,8 +167,8 @@ def _joint(
     )
 
 
-def _body(body: MergedLinks, part: RigidInertia, notes: Notes) -> Body:
-    return Body(body.name, part.mass, part.inertia, drawn(body, part.com, notes))
+def _body(body: MergedLinks, part: RigidInertia) -> Body:
+    return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com))
 
 
 def _closing(

@@ -1,0 +1,62 @@
+"""The shapes of a body: all of its links that collide, for obstacles, other bodies and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.io.urdf.robot import Geometry
+from sim.io.urdf.tree import MergedLinks
+from sim.mechanism.pose import Pose
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere
+
+Floats = NDArray[np.float64]
+
+
+def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
+    """All primitives among the collision shapes of a body; without one the largest of its visual shapes, if any.
+
+    Each has the friction of its link, where the file gives one.
+    """
+    found = named(_solids(body, com, "collisions"))
+    if found:
+        return found
+    seen = _solids(body, com, "visuals")
+    return (max(seen, key=lambda shape: shape.volume()),) if seen else ()
+
+
+def named(found: Sequence[Solid]) -> tuple[Solid, ...]:
+    """The shapes without those that are given twice, with different names."""
+    out: list[Solid] = []
+    taken: set[str] = set()
+    for shape in dict.fromkeys(found):
+        label, k = shape.name, 0
+        while label and label in taken:
+            k += 1
+            label = f"{shape.name}_{k}"
+        taken.add(label)
+        out.append(shape if label == shape.name else replace(shape, name=label))
+    return tuple(out)
+
+
+def _solids(body: MergedLinks, com: Floats, field: str) -> list[Solid]:
+    """The primitives among the collision or visual shapes of a body."""
+    found = [(link, s, pose.then(s.pose)) for link, pose in body.links for s in getattr(link, field)]
+    solids = [solid_of(s, pose, com, link.name, link.friction) for link, s, pose in found]
+    return [solid for solid in solids if solid is not None]
+
+
+def solid_of(shape: Geometry, pose: Pose, com: Floats, name: str, friction: float | None) -> Solid | None:
+    """The shape in the body, from its centre of mass; None for a mesh or something without extent."""
+    if not shape.sizes or min(shape.sizes) <= 0.0:
+        return None
+    center, turn = tuple(pose.point - com), pose.quaternion
+    if shape.kind == "sphere":
+        return Sphere(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
+    if shape.kind == "box":
+        return Box(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
+    kind = Cylinder if shape.kind == "cylinder" else Capsule
+    return kind(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
