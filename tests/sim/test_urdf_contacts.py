@@ -16,6 +16,7 @@ from support.urdf_files import collision, inertial, joint, link, write
 SPHERE, BOX = '<sphere radius="0.1"/>', '<box size="0.2 0.4 0.6"/>'
 CYLINDER, CAPSULE = '<cylinder radius="0.3" length="0.2"/>', '<capsule radius="0.05" length="0.4"/>'
 MESH = '<mesh filename="package://robot/foot.stl" scale="1 1 1"/>'
+pytestmark = pytest.mark.filterwarnings("ignore:.*collision meshes not found:sim.io.urdf.report.UrdfWarning")
 
 
 def one(folder: Path, *parts: str, **settings: object) -> dojo.UrdfMechanism:
@@ -114,7 +115,10 @@ def test_a_contact_can_be_placed_by_hand_in_the_frame_of_its_link(tmp_path: Path
         ("left", "left", 0.1, 0.8),
         ("right", "right", 0.02, 0.3),
     ]
-    with pytest.raises(dojo.UrdfError, match=r"link name='right'.*contacts=\.\.\.: the link has no sphere, box"):
+    with pytest.raises(
+        dojo.UrdfError,
+        match=r"link name='right'.*contacts=\.\.\.: the link has no sphere, box, cylinder, capsule or mesh",
+    ):
         dojo.load_urdf(biped(tmp_path), contacts=["right"])
     with pytest.raises(dojo.UrdfError, match=r"load_urdf\(contacts=\.\.\.\): 'hand' is not a link of the file: trunk"):
         dojo.load_urdf(biped(tmp_path), contacts=["hand"])

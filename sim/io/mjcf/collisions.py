@@ -17,7 +17,7 @@ from sim.io.mjcf.groups import NO_SHAPE, PLANE, GeomGroup, Where, name_of, solid
 from sim.io.urdf.report import Notes
 from sim.mechanism.collision import Collision
 from sim.mechanism.parts import WORLD
-from sim.mechanism.shapes import HalfSpace, Shape
+from sim.mechanism.shapes import HalfSpace, Solid
 
 Settings = tuple[float | None, str, int]
 
@@ -92,7 +92,7 @@ def _excluded(model: Any, a: int, b: int) -> bool:
     return bool((model.exclude_signature == signature).any())
 
 
-def _solid(model: Any, where: Where, g: int) -> Shape | None:
+def _solid(model: Any, where: Where, g: int) -> Solid | None:
     """The shape of a geom, from the centre of mass of its body, or in the world; None where there is none."""
     group, frame = where[int(model.geom_bodyid[g])]
     return solid_of(model, g, frame, group.com if group else 0.0)

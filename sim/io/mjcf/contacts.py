@@ -4,6 +4,7 @@
     capsule     two balls
     box         its eight corners
     cylinder    points on both rims
+    mesh        the corners of its convex hull, reduced to 32 at most
     ellipsoid   none: the point that touches moves over it; a collision with a half-space (collisions.py)
 
 A plane counts where it is fixed to the world; a geom touches it if MuJoCo's contype and conaffinity allow it. Friction
@@ -22,11 +23,13 @@ from sim.io.mjcf.groups import (
     BOX,
     CAPSULE,
     CYLINDER,
+    MESH,
     NO_SHAPE,
     PLANE,
     SPHERE,
     GeomGroup,
     Where,
+    mesh_corners,
     name_of,
     pose_of,
 )
@@ -35,7 +38,7 @@ from sim.mechanism.parts import Contact
 from sim.mechanism.pose import Pose
 
 Floats = NDArray[np.float64]
-STANDING = (SPHERE, CAPSULE, BOX, CYLINDER)  # on balls and points
+STANDING = (SPHERE, CAPSULE, BOX, CYLINDER, MESH)  # on balls and points
 _UNLESS = "are no obstacles (collisions=True makes them)"
 
 
@@ -63,6 +66,12 @@ def find_contacts(
             notes.add(f"no contact from geoms of kind {NO_SHAPE[kind]}", [name_of(model, "geom", g)], warn=True)
         if kind not in STANDING:
             continue
+        if kind == MESH:
+            error = 1e3 * mesh_corners(model, g)[1]
+            text = (
+                "meshes are convex hulls of at most 32 corners, at these largest distances from the hulls of the meshes"
+            )
+            notes.add(text, [f"{name_of(model, 'geom', g)} ({error:.2g} mm)"])
         balls = _balls(model, g, frame, settings[2])
         for p in touched:
             label = label_on(model, g, p, touched)
@@ -144,6 +153,8 @@ def _balls(model: Any, g: int, frame: Pose, rim: int) -> list[tuple[Floats, floa
         return [(at.at(end), float(size[0])) for end in ends]
     if kind == BOX:
         return [(at.at(size * signs), 0.0) for signs in product((-1, 1), repeat=3)]
+    if kind == MESH:
+        return [(at.at(corner), 0.0) for corner in mesh_corners(model, g)[0]]
     assert kind == CYLINDER
     angles = 2.0 * np.pi * np.arange(rim) / rim
     around = [size[0] * np.array([np.cos(a), np.sin(a), 0.0]) for a in angles]

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.io.meshes.hull import reduced_hull
 from sim.io.urdf.inertia import RigidInertia, combined
 from sim.io.urdf.solids import named
+from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import HERE, Pose
-from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Solid, Sphere, rotation_matrix
+from sim.mechanism.shapes import Box, Capsule, Cylinder, Ellipsoid, Solid, Sphere, rotation_matrix
 
 Floats = NDArray[np.float64]
 
-PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # mjtGeom
-NO_SHAPE = {1: "height field", 7: "mesh", 8: "signed distance field"}
+PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = 0, 2, 3, 4, 5, 6, 7  # mjtGeom
+NO_SHAPE = {1: "height field", 8: "signed distance field"}
 
 
 @dataclass
@@ -98,8 +100,8 @@ def body_shapes(model: Any, group: GeomGroup) -> tuple[Solid, ...]:
     return (max(found[1], key=lambda shape: shape.volume()),) if found[1] else ()
 
 
-def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | None:
-    """A geom as a shape in its body, from the centre of mass com; None for a mesh or a plane."""
+def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Solid | None:
+    """A geom as a shape in its body, from the centre of mass com; None for a plane or a field."""
     at = frame.then(pose_of(model.geom_pos[g], model.geom_quat[g]))
     r, s, t = (float(x) for x in model.geom_size[g])
     center, turn = at.point - com, at.quaternion
@@ -114,4 +116,14 @@ def solid_of(model: Any, g: int, frame: Pose, com: Floats | float) -> Shape | No
         return Box(2.0 * r, 2.0 * s, 2.0 * t, center=center, orientation=turn)
     if kind == ELLIPSOID:
         return Ellipsoid(r, s, t, center=center, orientation=turn)
+    if kind == MESH:
+        return Polytope(mesh_corners(model, g)[0], center=center, orientation=turn)
     return None
+
+
+def mesh_corners(model: Any, g: int) -> tuple[Floats, float]:
+    """Corners (n, 3) of the reduced convex hull of a mesh in the frame of its geom, and its Hausdorff distance [m]."""
+    k = int(model.geom_dataid[g])
+    first = int(model.mesh_vertadr[k])
+    points = np.array(model.mesh_vert[first : first + int(model.mesh_vertnum[k])], dtype=np.float64)
+    return reduced_hull(points)

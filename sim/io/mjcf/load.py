@@ -50,7 +50,8 @@ def load_mjcf(
             their range in its middle, and a floating base high enough that nothing penetrates.
         rim_points: number of points per rim of a cylinder.
         collisions: whether bodies collide with one another, and with fixed geoms other than planes, where MuJoCo lets
-            them: its spheres, capsules, boxes, cylinders and ellipsoids (sim/io/mjcf/collisions.py).
+            them: its spheres, capsules, boxes, cylinders, ellipsoids and meshes, each the convex hull of 32
+            corners at most (sim/io/mjcf/collisions.py).
         gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
 
     Returns:

@@ -201,7 +201,13 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: 
     """Notes on the ground for the user, before the first step."""
     wanted = choices.contacts is None or len(choices.contacts) > 0
     if floating and wanted and not mech.contacts:
-        notes.add("nothing of the robot makes contact with the ground: it falls through", warn=True)
+        carrying = {j.parent for j in mech.joints}
+        ends = ", ".join(f"dojo.Contact({name!r}, radius=0.02)" for name in mech.body_names if name not in carrying)
+        notes.add(
+            f"nothing of the robot makes contact with the ground: it falls through; contacts=[{ends}] puts balls at "
+            "the origins of its last links",
+            warn=True,
+        )
     if mech.contacts:
         sunk = gaps(mech, np.asarray(mech.neutral))
         low = [f"{name} ({-gap:.3g} m)" for name, gap in zip(mech.contact_names, sunk, strict=True) if gap < -_SUNK]

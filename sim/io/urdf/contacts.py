@@ -1,12 +1,11 @@
 """Contacts from the collision shapes of links: balls and points that cannot enter the ground.
 
-    sphere      one ball
-    capsule     two balls
-    box         its eight corners
-    cylinder    points on both rims, the first along x; two balls of its radius for a wheel, at the ends of its axis,
-                which is exact as long as the axis is level. A wheel is a cylinder whose link turns about its axis.
-
-Meshes have no contacts.
+sphere      one ball
+capsule     two balls
+box         its eight corners
+cylinder    points on both rims, the first along x; two balls of its radius for a wheel, at the ends of its axis,
+            which is exact as long as the axis is level. A wheel is a cylinder whose link turns about its axis.
+hull        its corners; collision_meshes.py makes hulls of meshes
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from sim.mechanism.pose import HERE, Pose
 Floats = NDArray[np.float64]
 Balls = list[tuple[Floats, float]]  # centre (3,) and radius [m]
 
-SHAPES = ("sphere", "box", "cylinder", "capsule")
+SHAPES = ("sphere", "box", "cylinder", "capsule", "hull")
 FRICTION = 0.8  # where neither the caller nor the file says anything
 _PARALLEL = 1e-3  # [rad, radii] by how much the axis of a wheel may miss that of its joint
 
@@ -77,7 +76,7 @@ def find_contacts(
             notes.add(f"no contact from collision shapes of kind {kind!r}", [name])
         if chosen is not None and not balls:
             raise link.element.error(
-                f"contacts=...: the link has no sphere, box, cylinder or capsule to make contacts of; "
+                f"contacts=...: the link has no sphere, box, cylinder, capsule or mesh to make contacts of; "
                 f"place one in its frame with dojo.Contact({name!r}, point=(x, y, z), radius=...)"
             )
     return out
@@ -119,6 +118,8 @@ def _balls(shape: Geometry, place: Place, rim: int) -> Balls:
     if shape.kind == "box":
         half = 0.5 * np.array(shape.sizes)
         return [(pose.at(half * signs), 0.0) for signs in product((-1, 1), repeat=3)]
+    if shape.points is not None:
+        return [(pose.at(corner), 0.0) for corner in shape.points]
     radius, length = shape.sizes
     ends = [np.array([0.0, 0.0, side * length / 2]) for side in (-1, 1)]
     if shape.kind == "capsule" or is_wheel(pose, radius, place.group):

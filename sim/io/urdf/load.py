@@ -7,7 +7,9 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
+from sim.io.meshes.hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
+from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
 from sim.io.urdf.loops import read_loops
 from sim.io.urdf.report import Notes, UrdfMechanism
 from sim.io.urdf.robot import Robot, read_robot
@@ -27,6 +29,9 @@ def load_urdf(
     contacts: Sequence[str | Contact] | None = None,
     merge_fixed: bool = True,
     *,
+    meshes: str | Mapping[str, str] = "hull",
+    mesh_corners: int = CORNERS,
+    mesh_dirs: Sequence[str | Path] = (),
     locked: Collection[str] = (),
     mimic: str = "free",
     repair: bool = False,
@@ -49,8 +54,15 @@ def load_urdf(
             0.8.
         contacts: names of the links that touch the ground, or dojo.Contact(link, point, radius), with the point in the
             frame of the link; None: all that have a sphere, box (8 corners), capsule (2 balls) or cylinder (points on
-            both rims; 2 balls for a wheel, a cylinder that turns about its own axis). Meshes make no contacts.
+            both rims; 2 balls for a wheel, a cylinder that turns about its own axis) or mesh.
         merge_fixed: whether links on fixed joints become one body; a link without mass always does.
+        meshes: replacement of a collision mesh: "hull", its convex hull reduced to `mesh_corners`; "decompose", several
+            such hulls, by CoACD; "sphere", "box" or "capsule", fitted ones, for feet and for speed; "none"; or a table
+            of these by link, with "*" for all others. `report` has the largest distances from the meshes. Needs trimesh
+            (`pip install "dojo-opt[meshes]"`).
+        mesh_corners: largest number of corners of a convex hull. Each is a contact point with the ground, and costs
+            time. With 8 a hull takes the time of a box.
+        mesh_dirs: folders with meshes, before those of ROS_PACKAGE_PATH and the ones around the file.
         locked: names of the joints that are held at their neutral coordinate, as if they were fixed.
         mimic: treatment of joints that follow another one: "gear" couples them (see Gear), "free" and "locked" ignore
             that.
@@ -76,6 +88,9 @@ def load_urdf(
     file, notes = Path(path), Notes()
     root = parse(file)
     robot = read_robot(root, notes)
+    folders = [Path(folder) for folder in ([mesh_dirs] if isinstance(mesh_dirs, str | Path) else mesh_dirs)]
+    choice = mesh_choices(meshes, robot.links), whole_number("load_urdf(mesh_corners=...)", mesh_corners, 4)
+    robot = with_shapes(robot, file, choice, folders, ground and contacts is None, notes)
     loops = read_loops(root, robot, notes)
     held, geared = _held(robot, locked, mimic, notes)
     choices = Choices(

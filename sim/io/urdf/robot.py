@@ -17,6 +17,7 @@ from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
 
 Floats = NDArray[np.float64]
 T = TypeVar("T", "UrdfLink", "UrdfJoint")
+Palette = dict[str, tuple[float, ...]]  # red, green, blue, alpha of materials by name
 
 # URDF's joint types, and the further ones that PyBullet (spherical) and Dojo read, as kinds of Joint; then those kinds
 # of Joint without a standard word. A kind's own name is read, too, except for "planar", which may turn in URDF, and
@@ -50,11 +51,19 @@ READ = {"link", "joint", "loop_joint"}
 
 @dataclass(frozen=True)
 class Geometry:
-    """A shape of a link. sizes: radius; x, y, z; or radius, length [m]. Empty for a kind that has no meaning here."""
+    """A shape of a link. sizes: radius; x, y, z; or radius, length [m]. Empty for a kind that has no meaning here.
+
+    file, scale: of a mesh. points: (n, 3) corners of a hull, which stands for a mesh (collision_meshes.py) [m].
+    color: red, green, blue, alpha from 0 to 1 of a <visual>; None where the file has none.
+    """
 
     kind: str
     sizes: tuple[float, ...]
     pose: Pose  # in the link
+    file: str = ""
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+    color: tuple[float, ...] | None = None
+    points: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,8 @@ def read_robot(root: Element, notes: Notes) -> Robot:
     for element in root.children:
         if element.tag.startswith("xacro:"):
             raise element.error("this is a xacro file; run xacro on it first")
-    links = _by_name(root.all("link"), lambda e: _link(e, notes))
+    palette = _palette(root)
+    links = _by_name(root.all("link"), lambda e: _link(e, palette, notes))
     joints = _by_name(root.all("joint"), lambda e: _joint(e, notes))
     if not links:
         raise root.error("expected at least one <link>")
@@ -141,7 +151,7 @@ def _pose(element: Element) -> Pose:
     return Pose(roll_pitch_yaw(origin.vector("rpy", 3, zero)), origin.vector("xyz", 3, zero))
 
 
-def _link(element: Element, notes: Notes) -> UrdfLink:
+def _link(element: Element, palette: Palette, notes: Notes) -> UrdfLink:
     mass, com, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     inertial = element.one("inertial")
     if inertial is not None:
@@ -161,23 +171,45 @@ def _link(element: Element, notes: Notes) -> UrdfLink:
         raise lateral.error(f"expected a coefficient >= 0, got {friction:g}")
     if contact and any(e.tag in ("rolling_friction", "spinning_friction", "restitution") for e in contact.children):
         notes.add("rolling and spinning friction and restitution are not modelled", [element.text("name")])
-    shapes = [tuple(_geometry(e) for e in element.all(tag)) for tag in ("collision", "visual")]
+    shapes = [tuple(_geometry(e, palette) for e in element.all(tag)) for tag in ("collision", "visual")]
     return UrdfLink(element.text("name"), mass, com, inertia, shapes[0], shapes[1], friction, element)
 
 
-def _geometry(element: Element) -> Geometry:
+def _geometry(element: Element, palette: Palette) -> Geometry:
     """The shape of a <collision> or <visual>."""
     kinds = [e for e in element.need("geometry").children if e.tag != "material"]
     if len(kinds) != 1:
         raise element.need("geometry").error(f"expected one shape, got {len(kinds)}")
-    shape = kinds[0]
+    shape, materials = kinds[0], element.all("material")
+    color = _color(materials[0] if materials else None, palette)
     if shape.tag == "box":
         sizes = tuple(float(x) for x in shape.vector("size", 3))
     else:
         sizes = tuple(shape.number(field) for field in SIZES.get(shape.tag, ()))
     if any(size < 0.0 for size in sizes):
         raise shape.error(f"expected sizes >= 0, got {', '.join(f'{s:g}' for s in sizes)}")
-    return Geometry(shape.tag, sizes, _pose(element))
+    if shape.tag != "mesh":
+        return Geometry(shape.tag, sizes, _pose(element), color=color)
+    scale = tuple(float(x) for x in shape.vector("scale", 3, (1.0, 1.0, 1.0)))
+    name = shape.attributes.get("filename", "").strip()
+    return Geometry("mesh", (), _pose(element), name, scale, color)
+
+
+def _palette(root: Element) -> Palette:
+    """Colours of the materials that links refer to by name."""
+    found = {e.attributes.get("name", ""): _color(e, {}) for e in root.all("material")}
+    return {name: color for name, color in found.items() if color is not None}
+
+
+def _color(material: Element | None, palette: Palette) -> tuple[float, ...] | None:
+    """Colour of a <material>, or of that of the file with its name; a robot is not refused for a bad one."""
+    for color in material.all("color") if material else ():
+        try:
+            rgba = [float(word) for word in color.attributes.get("rgba", "").split()]
+        except ValueError:
+            return None
+        return tuple(min(max(c, 0.0), 1.0) for c in rgba) if len(rgba) == 4 and np.isfinite(rgba).all() else None
+    return palette.get(material.attributes.get("name", "")) if material else None
 
 
 def _joint(element: Element, notes: Notes) -> UrdfJoint:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sim.io.urdf.robot import Geometry
 from sim.io.urdf.tree import MergedLinks
+from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import Pose
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere
 
@@ -50,10 +51,12 @@ def _solids(body: MergedLinks, com: Floats, field: str) -> list[Solid]:
 
 
 def solid_of(shape: Geometry, pose: Pose, com: Floats, name: str, friction: float | None) -> Solid | None:
-    """The shape in the body, from its centre of mass; None for a mesh or something without extent."""
+    """The shape in the body, from its centre of mass; None for a mesh that is not read or something without extent."""
+    center, turn = tuple(pose.point - com), pose.quaternion
+    if shape.points is not None:
+        return Polytope(shape.points, center=center, orientation=turn, name=name, friction=friction)
     if not shape.sizes or min(shape.sizes) <= 0.0:
         return None
-    center, turn = tuple(pose.point - com), pose.quaternion
     if shape.kind == "sphere":
         return Sphere(*shape.sizes, center=center, orientation=turn, name=name, friction=friction)
     if shape.kind == "box":
