@@ -54,6 +54,7 @@ from sim.mechanism.shapes import (
 )
 from sim.simulator.simulator import Simulator as Simulator
 from sim.mechanism.terrain import Terrain as Terrain
+from sim.mechanism.visual import Visual as Visual
 from sim.io.urdf.load import load_urdf as load_urdf
 from sim.io.urdf.report import UrdfMechanism as UrdfMechanism, UrdfWarning as UrdfWarning
 from sim.io.urdf.xml import UrdfError as UrdfError

@@ -6,19 +6,19 @@ The drawing is MeshCat's: its scene commands and its viewer, put into the page.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dojo_opt.viewer import drawing
 from dojo_opt.viewer.motion import Motion, motion
 from dojo_opt.viewer.page import page
 from sim.mechanism import shapes
 from sim.mechanism.pack import contact_frame
-from sim.mechanism.parts import WORLD
-from sim.mechanism.shapes import PLATE, Primitive
+from sim.mechanism.parts import WORLD, Body, Contact
+from sim.mechanism.shapes import PLATE
 from sim.mechanism.terrain import Terrain
 from sim.simulator.simulator import Simulator
 
@@ -29,13 +29,14 @@ _GRID, _SQUARE, _PIECE = 20.0, 0.5, 1.0  # edge of the drawn floor, of its squar
 _AROUND, _FINE, _LINES = 1.0, 0.02, 160  # of drawn terrain: margin, spacing [m], and lines along one axis at most
 
 _FLOOR, _LINE = 0xECEBE7, 0xB9B7B1  # colours
+_RUBBER, _EARTH = (0.2, 0.2, 0.2), (0.6, 0.56, 0.5, 0.6)
 
 
 def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = None) -> Path:
     """Write an animation that opens in a browser.
 
     Args:
-        result: Trajectory, Plan or ClosedLoop.
+        result: Trajectory, Plan or ClosedLoop; or a Mechanism, which stands in its neutral state.
         path: path of the HTML file.
         simulator: simulator of the result, for one that was read from a file (default None: that of the result).
 
@@ -100,7 +101,7 @@ def _floor() -> list[Any]:
     ink = geometry.LineBasicMaterial(color=_LINE)
     return [
         SetObject(geometry.Box([_GRID, _GRID, PLATE]), geometry.MeshBasicMaterial(color=_FLOOR), plane),
-        SetTransform(_place((0.0, 0.0, -2.0 * PLATE)), plane),
+        SetTransform(drawing.matrix((0.0, 0.0, -2.0 * PLATE)), plane),
         SetObject(geometry.LineSegments(geometry.PointsGeometry(points.astype(np.float32)), ink), path=lines),
     ]
 
@@ -118,31 +119,43 @@ def _surface(m: Motion, terrain: Terrain, height: float) -> tuple[Any, Any]:
 
 
 def _scene(m: Motion) -> list[Any]:
-    """Commands that draw every body at its first pose: its shape, and a ball for every contact."""
+    """Commands that draw every body at its first pose, the balls of its contacts, and obstacles."""
     from meshcat import geometry
     from meshcat.commands import SetObject, SetTransform
 
     commands = []
-    steel, rubber = geometry.MeshLambertMaterial(color=0x8FA3B8), geometry.MeshLambertMaterial(color=0x333333)
     for k, body in enumerate(m.mechanism.bodies):
         node = _node("bodies", k, body.name)
-        for part, (solid, place) in enumerate(_solids(body.shapes)):
-            commands.append(SetObject(solid, steel, node.append(f"part{part}")))
+        for part, piece in enumerate(m.pieces[body.name]):
+            solid, paint, place = drawing.geometry(piece)
+            commands.append(SetObject(solid, paint, node.append(f"part{part}")))
             commands.append(SetTransform(place, node.append(f"part{part}")))
         for c, contact in enumerate(m.mechanism.contacts):
-            if contact.body == body.name:
+            if contact.body == body.name and _shows(contact, body):
                 ball = node.append(_label(f"contact {c}", contact.name))
-                commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), rubber, ball))
-                commands.append(SetTransform(_place(contact.point), ball))
-        commands.append(SetTransform(_place(m.position[0, k], m.quaternion[0, k]), node))
-    earth = geometry.MeshLambertMaterial(color=0x9A8F80, opacity=0.6, transparent=True)
+                commands.append(SetObject(geometry.Sphere(max(contact.radius, 0.01)), drawing.material(_RUBBER), ball))
+                commands.append(SetTransform(drawing.matrix(contact.point), ball))
+        commands.append(SetTransform(drawing.matrix(m.position[0, k], m.quaternion[0, k]), node))
+    for part, piece in enumerate(m.pieces[WORLD]):
+        solid, paint, place = drawing.geometry(piece)
+        node = _node("obstacles", part, WORLD)
+        commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     for k, collision in enumerate(m.mechanism.collisions):
-        if collision.b != WORLD or isinstance(collision.shape_b, shapes.String):
+        if collision.b != WORLD or collision.shape_b is None or isinstance(collision.shape_b, shapes.String):
             continue
-        for part, (solid, place) in enumerate(_solids([collision.shape_b])):
+        for part, piece in enumerate(drawing.of_solid(collision.shape_b, _EARTH)):
             node = _node("obstacles", k, collision.name).append(f"part{part}")
-            commands += [SetObject(solid, earth, node), SetTransform(place, node)]
+            solid, paint, place = drawing.geometry(piece)
+            commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     return commands
+
+
+def _shows(contact: Contact, body: Body) -> bool:
+    """Whether a contact is drawn: on a body with a picture none, on one with shapes those that are balls."""
+    if body.visuals or (contact.radius == 0.0 and body.shapes):
+        return False
+    balls = [s for s in body.shapes if isinstance(s, shapes.Sphere) and s.radius >= contact.radius]
+    return not any(np.allclose(np.asarray(s.center), np.asarray(contact.point)) for s in balls)
 
 
 def _node(kind: str, number: int, name: str) -> Any:
@@ -157,48 +170,6 @@ def _label(before: str, name: str) -> str:
     JavaScript has words of its own, such as "constructor", which the number before keeps apart.
     """
     return escape(f"{before} {name.replace('/', '|')}")
-
-
-def _solids(found: Sequence[Any]) -> list[tuple[Any, Any]]:
-    """(MeshCat geometry, placement in the body) of shapes; a body without one is a small ball."""
-    from meshcat import geometry
-
-    if not found:
-        return [(geometry.Sphere(0.02), np.eye(4))]
-    return [
-        (_geometry(part), _place(shape.center, shape.orientation) @ _at(part))
-        for shape in found
-        for part in shape.primitives()
-    ]
-
-
-def _geometry(part: Primitive) -> Any:
-    """The MeshCat geometry of a part of a shape."""
-    from meshcat import geometry
-
-    if part.kind == "hull":
-        from scipy.spatial import ConvexHull
-
-        return geometry.TriangularMeshGeometry(part.size, ConvexHull(part.size).simplices)
-    if part.kind == "cylinder":
-        radius, length = part.size.tolist()
-        return geometry.Cylinder(length, radius)
-    if part.kind == "box":
-        return geometry.Box(part.size.tolist())
-    return geometry.Sphere(float(part.size[0])) if len(part.size) == 1 else geometry.Ellipsoid(part.size.tolist())
-
-
-def _at(part: Primitive) -> Any:
-    """Its placement in the shape: MeshCat's cylinders stand along y, ours along z."""
-    return _place(part.center, (np.sqrt(0.5), np.sqrt(0.5), 0, 0) if part.kind == "cylinder" else (1.0, 0.0, 0.0, 0.0))
-
-
-def _place(position: Any, quaternion: Any = (1.0, 0.0, 0.0, 0.0)) -> Any:
-    """Homogeneous matrix (4, 4) of a pose."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = shapes.rotation_matrix(quaternion)
-    matrix[:3, 3] = position
-    return matrix
 
 
 def _animation(m: Motion) -> Any:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from dojo_opt.viewer.drawing import Piece, pieces
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.poses import poses
 from sim.mechanism.shapes import rotation_matrix
 from sim.simulator.results import Trajectory
 from sim.simulator.simulator import Simulator
@@ -43,6 +46,11 @@ class Motion:
     normal_force: Array
     friction_force: Array
 
+    @cached_property
+    def pieces(self) -> dict[str, list[Piece]]:
+        """What is drawn of every body."""
+        return pieces(self.mechanism)
+
     __repr__ = brief_repr
 
     def points(self, body: int, point: Any) -> Array:
@@ -63,7 +71,7 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
     """Motion of a result. The contact forces of a plan come from its steps, solved again.
 
     Args:
-        result: Trajectory, Plan or ClosedLoop.
+        result: Trajectory, Plan or ClosedLoop; or a Mechanism, at rest in its neutral state.
         simulator: simulator of the result, for one that was read from a file (default None: that of the result).
 
     Returns:
@@ -74,6 +82,8 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         ValueError: the result does not know its simulator.
         SimulationError: a step of a plan cannot be solved again, for its forces.
     """
+    if isinstance(result, Mechanism):
+        return _standing(result)
     sim = simulator or getattr(result, "simulator", None) or getattr(getattr(result, "problem", None), "sim", None)
     if sim is None:
         if not hasattr(result, "x") or not hasattr(result, "u"):
@@ -97,6 +107,25 @@ def motion(result: Any, simulator: Simulator | None = None) -> Motion:
         contact_time=sim.time_step * np.arange(1, len(normal) + 1, dtype=np.float64),
         normal_force=normal,
         friction_force=friction,
+    )
+
+
+def _standing(mech: Mechanism) -> Motion:
+    """One knot: the neutral state."""
+    q = np.asarray(mech.neutral, dtype=np.float64)
+    found = poses(mech.joints, q)
+    at = [found[name] for name in mech.body_names]
+    none = np.zeros((0, len(mech.contact_names)))
+    return Motion(
+        mechanism=mech,
+        time=np.zeros(1),
+        x=np.concatenate([q, np.zeros(mech.nv)])[None],
+        u=np.zeros((0, len(mech.input_names))),
+        position=np.array([[pose.point for pose in at]]),
+        quaternion=np.array([[pose.quaternion for pose in at]]),
+        contact_time=np.zeros(0),
+        normal_force=none,
+        friction_force=none,
     )
 
 

@@ -35,7 +35,11 @@ def carried(
                 f"rotations, for which its child {j.child!r} needs a mass; let a body with a mass be the child"
             )
     out = [_part(b, b.name, shares[b.name]) if b.name in shares else b for b in bodies]
-    out += [replace(_part(whole[j.child], _share(j), shares[j.child]), shape=None) for j in acting if j.child in whole]
+    out += [
+        replace(_part(whole[j.child], _share(j), shares[j.child]), shape=None, visuals=())
+        for j in acting
+        if j.child in whole
+    ]
     hung = [replace(j, child=_share(j) if j.child in whole else j.child, close=False) for j in acting]
     welds = {j.name: Joint("fixed", j.child, _share(j), _share(j), close=True) for j in acting}
     return tuple(out), (*joints, *hung), tuple(welds.get(j.name, j) for j in loops)

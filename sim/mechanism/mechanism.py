@@ -23,6 +23,7 @@ from sim.mechanism.shape_contacts import shape_contacts
 from sim.mechanism.shapes import Solid, Sphere, rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.mechanism.tree import check_axes, check_loops, check_masses, sort_tree
+from sim.mechanism.visual import Visual
 
 Floats = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ class Mechanism:
     collisions: Sequence[Collision] = ()
     loops: Sequence[Joint] = ()
     gears: Sequence[Gear] = ()
+    scenery: Sequence[Visual] = ()  # of pictures, fixed to the world
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)
@@ -307,6 +309,7 @@ _KINDS = {
     "collisions": Collision,
     "loops": Joint,
     "gears": Gear,
+    "scenery": Visual,
 }
 
 
@@ -354,6 +357,7 @@ def _added(mech: Mechanism, other: Mechanism, pose: ArrayLike, prefix: str, name
         [*mech.collisions, *collisions],
         [*mech.loops, *loops],
         [*mech.gears, *parts["gears"]],
+        [*mech.scenery, *(_moved_visual(v, point, quat) for v in other.scenery)],
     )
 
 
@@ -436,6 +440,14 @@ def _moved_obstacle(collision: Collision, point: Floats, quat: Floats) -> Collis
         return collision
     centre = point + rotation_matrix(quat) @ np.asarray(shape.center)
     return replace(collision, shape_b=replace(shape, center=centre, orientation=_product(quat, shape.orientation)))
+
+
+def _moved_visual(visual: Visual, point: Floats, quat: Floats) -> Visual:
+    """What belongs to the picture of the world moves with the scene it comes with."""
+    part: Any = visual if visual.shape is None else visual.shape
+    centre = point + rotation_matrix(quat) @ np.asarray(part.center)
+    moved = replace(part, center=centre, orientation=_product(quat, part.orientation))
+    return moved if visual.shape is None else replace(visual, shape=moved)
 
 
 def _with_obstacle(mech: Mechanism, shape: Solid, bodies: Sequence[str] | None, name: str, **options: Any) -> Mechanism:

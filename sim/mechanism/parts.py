@@ -13,6 +13,7 @@ from sim.mechanism import checks
 from sim.mechanism.composite import composite
 from sim.mechanism.shapes import Solid
 from sim.mechanism.terrain import Terrain
+from sim.mechanism.visual import Visual
 
 WORLD = "world"
 # free translations and free rotations of each kind of joint
@@ -53,6 +54,7 @@ class Body:
         shape: shape for inertia, collisions and drawings, or several (default None: no shape). All of them touch the
             ground (`Mechanism.on`), obstacles and other bodies where asked, each with its own friction and restitution.
             Several shapes share the mass by their volumes; `shapes` has them as a tuple.
+        visuals: picture of the body, where it is another one than the shapes (default none).
 
     Raises:
         ValueError: for a value out of range, or an inertia that no rigid body has; the message names the body.
@@ -62,6 +64,7 @@ class Body:
     mass: float = 1.0  # [kg]
     inertia: ArrayLike | None = None
     shape: Solid | Sequence[Solid] | None = None
+    visuals: Sequence[Visual] = ()
 
     def __post_init__(self) -> None:
         checks.name("Body(name=...)", self.name)
@@ -70,6 +73,10 @@ class Body:
         if self.mass != 0 or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         object.__setattr__(self, "inertia", inertia_of(call, self))
+        object.__setattr__(self, "visuals", tuple(self.visuals))
+        for visual in self.visuals:
+            if not isinstance(visual, Visual):
+                raise ValueError(f"{call}, visuals=...): expected a list of Visual, got {visual!r}")
 
     @property
     def shapes(self) -> tuple[Solid, ...]:

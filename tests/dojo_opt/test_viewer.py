@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.viewer import animation
+from dojo_opt.viewer import animation, drawing
 from dojo_opt.viewer.motion import motion
 from dojo_opt.viewer.page import page as page_of
+from sim.io.meshes.shading import clustered, shaded
+from sim.io.meshes.triangles import TriangleMesh
 from sim.mechanism.shapes import rotation_matrix
 
 # a browser process that is closed leaves sockets to the garbage collector
@@ -104,6 +106,52 @@ def test_sloping_ground_is_drawn(page, tmp_path):
         time.sleep(2.0)
         images.append(shot(page))
     assert changed(*images) > 20_000
+
+
+@pytest.mark.slow
+def test_a_robot_of_meshes_fills_a_third_of_the_picture_in_its_colours(page, tmp_path):
+    """A green mesh with a red lid, mirrored by its scale; MeshCat's own menu is hidden."""
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box(extents=(0.1, 0.2, 0.4)).export(tmp_path / "box.stl")
+    seen = [dojo.Visual(mesh=str(tmp_path / "box.stl"), scale=(1, -1, 1), color=(0.0, 0.8, 0.0))]
+    seen.append(dojo.Visual(dojo.Box(0.1, 0.2, 0.1, center=(0, 0, 0.25)), color=(0.9, 0.0, 0.0)))
+    body = dojo.Body("b", 1.0, (0.1, 0.1, 0.1), visuals=seen)
+    mech = dojo.Mechanism([body], [dojo.Joint("floating", None, "b")], neutral={"b": (0, 0, 0.2, 1, 0, 0, 0)})
+    page.goto(dojo.viewer.save_html(mech, tmp_path / "a.html").as_uri())
+    time.sleep(2.0)
+    r, g, b = np.moveaxis(shot(page), 2, 0)
+    green, red = (g > 2 * r) & (g > 2 * b) & (g > 0.2), (r > 2 * g) & (r > 2 * b) & (r > 0.2)
+    rows = np.flatnonzero((green | red).any(axis=1))
+    assert 0.25 < np.ptp(rows) / 360 < 0.55 and red.sum() > 300 and green.sum() > 1000
+    assert np.flatnonzero(red.any(axis=1)).mean() < np.flatnonzero(green.any(axis=1)).mean()  # the lid is on top
+    assert page.evaluate("getComputedStyle(document.querySelector('.dg')).display") == "none"
+
+
+def test_every_library_robot_has_a_picture():
+    """A body without shape has bones; the leg of a hopper is as long as in its neutral state."""
+    for name in dojo.models.__all__:
+        found = drawing.pieces(getattr(dojo.models, name)())
+        assert sum(len(parts) for parts in found.values()) > 0, name
+    hopper = drawing.pieces(dojo.models.raiberthopper())["foot"]
+    leg = [p for p in hopper if p.solid.kind == "cylinder"]
+    assert len(leg) == 1 and leg[0].solid.size[1] == pytest.approx(0.5) and leg[0].place[2, 3] == pytest.approx(0.25)
+
+
+def test_meshes_of_pictures_get_lighter_and_keep_their_creases():
+    trimesh = pytest.importorskip("trimesh")
+    cube, ball = trimesh.creation.box(), trimesh.creation.icosphere(subdivisions=5)
+    for part, count in ((cube, 24), (ball, len(ball.vertices))):
+        mesh = TriangleMesh(np.asarray(part.vertices), np.asarray(part.faces), None)
+        vertices, normals, colors, faces = shaded(mesh)
+        assert len(vertices) == count and colors is None and faces.shape == part.faces.shape
+        middle = vertices[faces].mean(axis=1)
+        outward = middle / np.linalg.norm(middle, axis=1)[:, None]
+        assert (normals[faces].mean(axis=1) * outward).sum(axis=1).min() > 0.7
+        if part is ball:
+            np.testing.assert_allclose(normals, vertices, atol=0.01)
+    light = clustered(TriangleMesh(np.asarray(ball.vertices), np.asarray(ball.faces), None), 0.1)
+    assert len(light.faces) < 0.3 * len(ball.faces)
+    np.testing.assert_allclose(np.linalg.norm(light.vertices, axis=1), 1.0, atol=0.01)
 
 
 def test_a_plant_with_short_steps_does_not_make_a_long_file(tmp_path):

@@ -90,8 +90,9 @@ class Draft:
     def _move_centre(self, name: str, d: Floats) -> None:
         """The centre of mass moves by d, body axes; elements of the body stay in place."""
         body = self.bodies[name]
-        if body.shapes:
-            self.bodies[name] = replace(body, shape=[_moved(shape, -d) for shape in body.shapes])
+        if body.shapes or body.visuals:
+            seen = [_moved(v, -d) if v.shape is None else replace(v, shape=_moved(v.shape, -d)) for v in body.visuals]
+            self.bodies[name] = replace(body, shape=[_moved(shape, -d) for shape in body.shapes], visuals=seen)
         for label, joint in self.joints.items():
             for side, field in ((joint.parent, "parent_point"), (joint.child, "child_point")):
                 if side == name:

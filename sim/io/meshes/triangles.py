@@ -81,7 +81,8 @@ def _colors(part: Any) -> Floats | None:
         return None
     image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
     if image is not None and getattr(part.visual, "uv", None) is not None:
-        per_face = np.asarray(part.visual.to_color().face_colors, dtype=np.float64)[:, :3] / 255.0
-        return per_face
+        corners = np.asarray(part.visual.to_color().vertex_colors, dtype=np.float64)[:, :3] / 255.0
+        if len(corners) == len(part.vertices):
+            return np.asarray(corners[part.faces].mean(axis=1))
     main = np.asarray(material.main_color, dtype=np.float64)[:3] / 255.0
     return np.tile(main, (len(part.faces), 1))

@@ -15,13 +15,14 @@ from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import mimic_gears
 from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
-from sim.io.urdf.solids import body_shapes
+from sim.io.urdf.solids import body_shapes, body_visuals
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
+from sim.mechanism.visual import Visual
 
 Floats = NDArray[np.float64]
 
@@ -86,6 +87,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         gravity=choices.gravity,
         name=robot.name,
         neutral=neutral,
+        scenery=_scenery(places, coms, choices),
         gears=mimic_gears(robot, choices.geared, {j.name: j.nv for j in joints}),
     )
     bases = [j.name for j in joints if j.kind == "floating" and j.parent == WORLD]
@@ -168,7 +170,14 @@ def _joint(
 
 
 def _body(body: MergedLinks, part: RigidInertia) -> Body:
-    return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com))
+    return Body(body.name, part.mass, part.inertia, body_shapes(body, part.com), body_visuals(body, part.com))
+
+
+def _scenery(places: Mapping[str, Place], coms: Mapping[str, Floats], choices: Choices) -> list[Visual]:
+    """Pictures of the links that are part of the world."""
+    still = [(p.link, p.pose) for p in places.values() if p.group.name not in coms]
+    world = MergedLinks(None, None, links=still)
+    return list(body_visuals(world, -np.asarray(choices.position)))
 
 
 def _closing(

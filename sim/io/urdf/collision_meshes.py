@@ -14,7 +14,7 @@ from sim.io.meshes.hull import reduced_hull
 from sim.io.meshes.paths import find_mesh
 from sim.io.meshes.triangles import MeshError, TriangleMesh, read_mesh
 from sim.io.urdf.report import Notes
-from sim.io.urdf.robot import Geometry, Robot
+from sim.io.urdf.robot import Geometry, Robot, UrdfLink
 from sim.mechanism import checks
 from sim.mechanism.pose import HERE
 
@@ -56,7 +56,7 @@ def with_shapes(robot: Robot, file: Path, choice: Choice, mesh_dirs: Sequence[Pa
                 continue
             found += [replace(part, pose=shape.pose.then(part.pose)) for part in made[0]]
             errors.append((made[1], f"{name} ({1e3 * made[1]:.2g} mm)"))
-        links[name] = replace(link, collisions=tuple(found))
+        links[name] = replace(link, collisions=tuple(found), visuals=_located(link, file, mesh_dirs, notes))
     if errors:
         notes.add(
             f"collision meshes are convex hulls of at most {corners} corners or primitives, at these largest distances "
@@ -64,6 +64,19 @@ def with_shapes(robot: Robot, file: Path, choice: Choice, mesh_dirs: Sequence[Pa
             [text for _, text in sorted(errors, reverse=True)],
         )
     return replace(robot, links=links)
+
+
+def _located(link: UrdfLink, file: Path, mesh_dirs: Sequence[Path], notes: Notes) -> tuple[Geometry, ...]:
+    """The visual shapes of a link with the paths of their meshes, empty where there is no such file."""
+    out = []
+    for shape in link.visuals:
+        if shape.kind == "mesh":
+            path = find_mesh(shape.file, file, mesh_dirs) if shape.file else None
+            if path is None:
+                notes.add("visual meshes not found, which pictures leave out", [f"{link.name} ({shape.file})"])
+            shape = replace(shape, file="" if path is None else str(path))
+        out.append(shape)
+    return tuple(out)
 
 
 def _made(

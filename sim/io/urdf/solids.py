@@ -13,6 +13,7 @@ from sim.io.urdf.tree import MergedLinks
 from sim.mechanism.polytope import Polytope
 from sim.mechanism.pose import Pose
 from sim.mechanism.shapes import Box, Capsule, Cylinder, Solid, Sphere
+from sim.mechanism.visual import Visual
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +27,22 @@ def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
     if found:
         return found
     seen = _solids(body, com, "visuals")
-    return (max(seen, key=lambda shape: shape.volume()),) if seen else ()
+    return (replace(max(seen, key=lambda shape: shape.volume()), name=""),) if seen else ()
+
+
+def body_visuals(body: MergedLinks, com: Floats) -> tuple[Visual, ...]:
+    """The picture of a body: the visual shapes and meshes of its links with their colours."""
+    out = []
+    for link, pose in body.links:
+        for shape in link.visuals:
+            at = pose.then(shape.pose)
+            if shape.kind == "mesh":
+                if shape.file:
+                    place = at.point - com
+                    out.append(Visual(None, shape.file, None, shape.scale, place, at.quaternion, shape.color))
+            elif (solid := solid_of(shape, at, com, "", None)) is not None:
+                out.append(Visual(solid, color=shape.color))
+    return tuple(out)
 
 
 def named(found: Sequence[Solid]) -> tuple[Solid, ...]:

@@ -1,0 +1,47 @@
+"""Visual: a part of the picture of a body, which touches nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.shapes import Solid
+
+STEEL = (0.56, 0.64, 0.72)  # colour of what has none
+
+
+@dataclass(frozen=True)
+class Visual:
+    """A shape, the mesh of a file, or triangles, placed in a body.
+
+    shape      a solid with its own place, or
+    mesh       path of an STL, OBJ or DAE file, read when it is drawn (the extra `meshes`), scaled and placed by
+    center, orientation    from the centre of mass [m], and to body axes; or
+    triangles  (vertices (n, 3), faces (k, 3)), placed likewise
+    color      red, green, blue, or with alpha, from 0 to 1; None: that of the mesh, or grey
+    """
+
+    shape: Solid | None = None
+    mesh: str = ""
+    triangles: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
+    scale: ArrayLike = (1.0, 1.0, 1.0)
+    center: ArrayLike = (0.0, 0.0, 0.0)
+    orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
+    color: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        given: list[Any] = [self.shape is not None, bool(self.mesh), self.triangles is not None]
+        if sum(given) != 1:
+            raise ValueError("Visual(...): give one of shape=..., mesh=... and triangles=...")
+        for field in ("scale", "center"):
+            object.__setattr__(self, field, checks.vector(f"Visual({field}=...)", getattr(self, field), 3))
+        object.__setattr__(self, "orientation", checks.quaternion("Visual(orientation=...)", self.orientation))
+        if self.color is not None:
+            rgba = checks.array("Visual(color=...)", self.color, (None,))
+            if len(rgba) not in (3, 4) or not np.all((rgba >= 0.0) & (rgba <= 1.0)):
+                raise ValueError(f"Visual(color=...): expected 3 or 4 numbers from 0 to 1, got {self.color!r}")
+            object.__setattr__(self, "color", tuple(float(c) for c in rgba))
