@@ -29,7 +29,7 @@ from sim.mechanism.brief import brief_repr
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
 
-__all__ = ["ControlBounds", "Goal", "Periodic", "ResidualConstraint", "StateBounds"]
+__all__ = ["ControlBounds", "Goal", "Periodic", "ResidualConstraint", "SpeedLimits", "StateBounds"]
 
 
 @dataclass(frozen=True)
@@ -108,6 +108,30 @@ class StateBounds(Spec):
             )
         pick = Pick(True, layout[columns], columns, sign)
         return PickTerm("StateBounds", knots, np.ones_like(reference), reference, pick, one_sided=True)
+
+
+@dataclass(frozen=True)
+class SpeedLimits(Spec):
+    """|v_i| <= share speed_i for the joints whose inputs have a largest speed, as a file gives it.
+
+    Attributes:
+        share: part of that speed (default 1).
+        knots: numbers of the knots (default None: 1 to T).
+    """
+
+    share: float = 1.0
+    knots: Any = None
+
+    __repr__ = brief_repr
+
+    def bind(self, sim: Any, horizon: int, layout: Integers) -> Term:
+        mech = sim.mechanism
+        limited = [i for i in mech.inputs or () if i.joint is not None and np.isfinite(i.speed)]
+        if not limited:
+            raise ValueError(f"SpeedLimits(): no input of {mech.name!r} has a largest speed; see Input(speed=...)")
+        speeds = {mech.v_slice(i.joint).start + i.dof: self.share * i.speed for i in limited}
+        most = np.array(list(speeds.values()))
+        return StateBounds(-most, most, mech.nv + np.array(list(speeds)), self.knots).bind(sim, horizon, layout)
 
 
 @dataclass(frozen=True)

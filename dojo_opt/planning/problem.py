@@ -21,10 +21,13 @@ Matrix = NDArray[np.float64]
 __all__ = ["Problem"]
 
 
-def _limits(limits: tuple[ArrayLike, ArrayLike] | None, nu: int) -> tuple[Vector, Vector] | None:
-    """Control limits as two (nu,) arrays, infinite where free."""
+def _limits(limits: tuple[ArrayLike, ArrayLike] | None, sim: Any) -> tuple[Vector, Vector] | None:
+    """Control limits as two (nu,) arrays, infinite where free; those of the inputs where none are given."""
+    nu = sim.nu
     if limits is None:
-        return None
+        limits = getattr(sim.mechanism, "input_limits", None)
+        if limits is None or not np.isfinite(limits).any():
+            return None
     if not hasattr(limits, "__len__") or len(limits) != 2:
         raise ValueError(f"Problem(control_limits=...): expected (lower, upper), got {limits!r}")
     lo, hi = (numbers("Problem(control_limits=...)", b) for b in limits)
@@ -73,7 +76,8 @@ class Problem:
         horizon: number T of knots.
         cost: one cost or several, see `dojo.cost`.
         constraints: one constraint or several, see `dojo.constraint`.
-        control_limits: (lower, upper), numbers or (nu,) [N, N m], which hold at every iteration (default None: none).
+        control_limits: (lower, upper), numbers or (nu,) [N, N m], which hold at every iteration (default None:
+            those of the inputs of the mechanism, as a file gives them; (-np.inf, np.inf) is none).
         substeps: steps of `sim.time_step` per knot, with the input held (default 1).
         controls0: (T, nu) guess of the inputs [N, N m] (default zero).
         states0: (T + 1, nx) guess of the states, which need not be consistent: the planner closes its gaps (default
@@ -122,7 +126,7 @@ class Problem:
                     found = f"a {type(spec).__name__}, not a term of dojo.{argument.removesuffix('s')}"
                     raise TypeError(f"Problem({argument}=...): entry {i} is {found}")
         self.bind()
-        self.control_limits = _limits(control_limits, sim.nu)
+        self.control_limits = _limits(control_limits, sim)
         self.controls0 = self.check_controls("Problem(controls0=...)", 0.0 if controls0 is None else controls0)
         self.states0 = None if states0 is None else self.check_states("Problem(states0=...)", states0)
 

@@ -63,7 +63,8 @@ class Perturbation:
         terrain: ground under all contacts (default None: that of the model).
         delay: time from a command to the moment it acts [s] (default 0).
         noise: standard deviation of the measured state: a number, or (ndx,) [m, rad, m/s, rad/s] (default 0).
-        control_limits: (lower, upper) limits of the actuators, numbers or (nu,) [N, N m] (default None: none).
+        control_limits: (lower, upper) limits of the actuators, numbers or (nu,) [N, N m] (default None: those of the
+            inputs of the mechanism).
         seed: seed of the noise (default 0).
     """
 

@@ -68,7 +68,7 @@ class Plant:
         contacts = self.simulator.mechanism.contacts
         self._floor = next((c for c in contacts if c.terrain is not None or np.asarray(c.normal)[2] > _FLOOR), None)
         self._noise = _spread("Plant(noise=...)", p.noise, sim.ndx)
-        lo, hi = (-np.inf, np.inf) if p.control_limits is None else p.control_limits
+        lo, hi = sim.mechanism.input_limits if p.control_limits is None else p.control_limits
         self._limits = tuple(_spread("Plant(control_limits=...)", b, sim.nu) for b in (lo, hi))
         self._late = round(p.delay / sim.time_step)
         if abs(self._late * sim.time_step - p.delay) > 1e-9:

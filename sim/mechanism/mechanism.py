@@ -152,6 +152,13 @@ class Mechanism:
         return tuple(i.name for i in self.inputs or ())
 
     @cached_property
+    def input_limits(self) -> tuple[Floats, Floats]:
+        """(lower, upper) limits of the entries of u, (nu,) each, infinite where there are none [N, N m]."""
+        table = np.array([i.limits for i in self.inputs or ()], dtype=np.float64).reshape(-1, 2)
+        table.flags.writeable = False
+        return table[:, 0], table[:, 1]
+
+    @cached_property
     def dof_names(self) -> tuple[str, ...]:
         """Names of the degrees of freedom, (nv,), in the order of v: "knee", "base x", "base rz"."""
         return dof_names(self.joints)

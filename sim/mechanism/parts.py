@@ -302,6 +302,10 @@ class Input:
         frame: axes of force and torque, "world" or "body" (default "world").
         name: name of the input (default that of the joint, with the number of one of several degrees of freedom, or of
             the body).
+        limits: (lo, hi) of the force or torque, as a file gives them: default control limits of problems and plants;
+            a simulator does not clip [N, N m] (default infinite).
+        speed: largest speed of the joint's coordinate, see `dojo.constraint.SpeedLimits`; nothing else holds it [m/s,
+            rad/s] (default infinite).
 
     Raises:
         ValueError: for both a joint and a body or neither, or a value out of range.
@@ -314,6 +318,8 @@ class Input:
     torque: ArrayLike = (0.0, 0.0, 0.0)
     frame: str = "world"
     name: str = ""
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    speed: float = np.inf
 
     def __post_init__(self) -> None:
         if (self.joint is None) == (self.body is None):
@@ -327,6 +333,9 @@ class Input:
             raise ValueError(f"{call}): give a force=... or a torque=... per unit of the input")
         if self.joint is not None and wrench.any():
             raise ValueError(f"{call}): force and torque are for an input on a body")
+        object.__setattr__(self, "limits", bounds(f"{call}, limits=...)", self.limits))
+        if not (isinstance(self.speed, int | float) and self.speed > 0.0):
+            raise ValueError(f"{call}, speed=...): expected a number > 0, got {self.speed!r}")
 
 
 # -- checks of arguments, per part -------------------------------------------------------------------------------------

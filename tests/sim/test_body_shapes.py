@@ -80,6 +80,28 @@ def test_one_shape_twice_is_one_shape(tmp_path: Path) -> None:
     assert len(mech.bodies[0].shapes) == 1
 
 
+def test_masses_and_inertias_that_a_file_lacks_are_those_of_the_shapes(tmp_path: Path) -> None:
+    """One link has a mass without inertia, one neither; the third has shapes, but an impossible inertia."""
+    box = collision('<box size="0.2 0.4 0.6"/>', "0.1 0 0")
+    none = (0.0,) * 6
+    wrong = (1.0, 0.1, 0.1, 0.0, 0.0, 0.0)
+    links = (
+        link("a", inertial(3.0, xyz="0.1 0 0", inertia=none), box),
+        link("b", box),
+        link("c", inertial(1.0, inertia=wrong), box),
+    )
+    path = write(tmp_path, *links, joint("j", "a", "b"), joint("k", "b", "c"))
+    with pytest.raises(dojo.UrdfError, match="no rigid body has the inertia of these moving links"):
+        dojo.load_urdf(path)
+    with pytest.warns(dojo.UrdfWarning, match="were repaired, from the collision shapes, with 1000 kg/m.3"):
+        a, b, c = dojo.load_urdf(path, repair=True, ground=False).bodies
+    solid = dojo.Box(0.2, 0.4, 0.6)
+    np.testing.assert_allclose(a.inertia, solid.inertia(3.0), rtol=1e-12)
+    assert b.mass == pytest.approx(48.0) and b.shapes[0].center == pytest.approx((0.0, 0.0, 0.0))
+    np.testing.assert_allclose(b.inertia, solid.inertia(48.0), rtol=1e-12)
+    assert c.mass == 1.0 and np.trace(c.inertia) > 1.2
+
+
 def test_mjcf_bodies_keep_every_geom_that_collides() -> None:
     pytest.importorskip("mujoco")
     text = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/><body name="a" pos="0 0 1"><freejoint/>

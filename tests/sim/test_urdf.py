@@ -136,14 +136,22 @@ def test_inputs_act_on_what_moves_or_on_what_is_chosen(tmp_path: Path) -> None:
 # -- what is not represented -------------------------------------------------------------------------------------------
 
 
-def test_mimics_move_freely_with_a_warning_or_are_locked(tmp_path: Path) -> None:
+def test_mimics_become_gears_or_move_freely_with_a_warning_or_are_locked(tmp_path: Path) -> None:
     path = arm(tmp_path, link("hand"), joint("wrist", "forearm", "hand", "continuous", AXIS, '<mimic joint="elbow"/>'))
+    mech = dojo.load_urdf(path, floating=False)
+    assert mech.gears == (dojo.Gear("wrist", "elbow"),) and mech.input_names == ("elbow",)
+    with pytest.warns(
+        dojo.UrdfWarning, match="mimic joints that follow none with a coordinate.*each moves freely: wrist"
+    ):
+        assert dojo.load_urdf(path, floating=False, locked=["elbow"]).gears == ()
     with pytest.warns(dojo.UrdfWarning, match="mimic joints are not modelled.*each moves freely: wrist"):
-        assert dojo.load_urdf(path, ground=False).nv == 8
+        assert dojo.load_urdf(path, ground=False, mimic="free").nv == 8
     with pytest.warns(dojo.UrdfWarning, match="are held where they are: wrist"):
         assert dojo.load_urdf(path, ground=False, mimic="locked").joint_names == ("floating_base", "elbow")
     assert dojo.load_urdf(path, ground=False, locked=["wrist"]).joint_names == ("floating_base", "elbow")
-    with pytest.raises(ValueError, match=r"load_urdf\(mimic=\.\.\.\): 'follow' is not one of: free, locked, gear"):
+    with pytest.raises(
+        ValueError, match=r"load_urdf\(mimic=\.\.\.\): 'follow' is not one of: auto, free, locked, gear"
+    ):
         dojo.load_urdf(path, mimic="follow")
 
 

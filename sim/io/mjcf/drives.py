@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,8 +40,10 @@ def find_inputs(
             notes.add("servos and actuators with dynamics are plain forces here", [name], warn=True)
         ratio = 1.0 if wrench else float(model.actuator_gear[a, 0])
         gear = ratio * (float(model.actuator_gainprm[a, 0]) if plain else 1.0)
-        inputs.append(wrench or Input(homes[j][0], dof=homes[j][1], name=name))
-        rows.append((gear, *_bounds(model, a, gear, ratio, bool(plain))))
+        low, high = _bounds(model, a, gear, ratio, bool(plain))
+        part = wrench or Input(homes[j][0], dof=homes[j][1], name=name)
+        inputs.append(replace(part, limits=(low, high)) if low < high else part)
+        rows.append((gear, low, high))
     table = np.array(rows, dtype=np.float64).reshape(-1, 3)
     return inputs, table[:, 0], table[:, 1], table[:, 2]
 

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
-from sim.io.urdf.mimic import mimic_gears
+from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
 from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
-from sim.io.urdf.solids import body_shapes, body_visuals
+from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
+from sim.mechanism.composite import composite
 from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
@@ -30,6 +31,8 @@ ROOT_JOINT = {
     False: "floating_base",
     True: "fixed_base",
 }  # by whether the base is fixed; behind the link's name if taken
+DENSITY = 1000.0  # [kg/m^3] of repaired links without a mass
+_NOTHING = 1e-12  # [m^2] an inertia over a mass that is none
 _SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
 
 
@@ -83,7 +86,7 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
         [_body(body, inertias[body.name]) for body in groups],
         [*joints, *closing],
         found,
-        _inputs(joints, closing, choices),
+        _inputs(joints, closing, {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, choices),
         gravity=choices.gravity,
         name=robot.name,
         neutral=neutral,
@@ -103,9 +106,12 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     return replace(mech, report=report)
 
 
-def _neutral(robot: Robot, choices: Choices, name: str) -> float:
+def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float:
     """Neutral coordinate of a joint with one degree of freedom; of one with more, which is to be locked, zero."""
     if name not in choices.neutral:
+        # a circle of followers ends; one without a leader is refused later
+        if name in choices.geared and depth < len(choices.geared) and leader_of(robot, name) in robot.joints:
+            return follower_value(robot, name, lambda leader: _neutral(robot, choices, leader, depth + 1))
         return resting(robot.joints[name].limits)
     if robot.joints[name].kind not in ("revolute", "prismatic"):
         raise ValueError(
@@ -117,7 +123,7 @@ def _neutral(robot: Robot, choices: Choices, name: str) -> float:
 def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
     """Inertia of every body in its own frame; impossible inertias are repaired or refused."""
     out = {body.name: combined(body.inertias) for body in groups}
-    if groups and not any(part.mass for part in out.values()):
+    if groups and not choices.repair and not any(part.mass for part in out.values()):
         raise UrdfError(f"load_urdf: {choices.file}: nothing that moves has a mass")
     bad: list[str] = []
     for body in groups:
@@ -126,8 +132,8 @@ def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict
             continue
         on = f"on joint {body.joint.name!r}" if body.joint else "as the root"
         if choices.repair:
-            out[body.name] = repaired(out[body.name])
-            notes.add("inertias that no rigid body has were repaired", [f"{body.name} {why}"], warn=True)
+            out[body.name], how = _repaired(body, out[body.name])
+            notes.add(f"inertias that no rigid body has were repaired{how}", [f"{body.name} {why}"], warn=True)
         else:
             bad.append(f"  line {body.links[0][0].element.line}, link {body.name!r}, which moves {on}, {why}")
     if bad:
@@ -138,6 +144,22 @@ def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict
             + f"\nlocked=[...] holds their joints{root}, repair=True replaces the inertias by the nearest possible ones"
         )
     return out
+
+
+def _repaired(body: MergedLinks, part: RigidInertia) -> tuple[RigidInertia, str]:
+    """A possible inertia in place of an impossible one, and whence it is.
+
+    Where the file has none at all it is that of the collision shapes, with the mass of the file, or without one with
+    the density of water; otherwise the nearest possible one.
+    """
+    shapes = collision_shapes(body, part.com)
+    if not shapes or np.abs(part.inertia).max() > _NOTHING * part.mass:  # more than the rounding of a shifted zero
+        return repaired(part), ""
+    mass = part.mass or DENSITY * sum(shape.volume() for shape in shapes)
+    centre, inertia = composite(shapes, mass)
+    whole = RigidInertia(mass, part.com if part.mass else part.com + centre, inertia)
+    whole = repaired(whole) if fault(whole) else whole
+    return whole, f", from the collision shapes, with {DENSITY:g} kg/m^3 where there is no mass"
 
 
 def _joint(
@@ -193,17 +215,21 @@ def _closing(
     return [joint for joint in found if joint is not None]
 
 
-def _inputs(joints: list[Joint], closing: list[Joint], choices: Choices) -> list[Input]:
-    """One per degree of freedom of the actuated joints; joints that close loops only if requested."""
+def _inputs(joints: list[Joint], closing: list[Joint], given: Mapping[str, UrdfJoint], choices: Choices) -> list[Input]:
+    """One per degree of freedom of the actuated joints; those that close loops or follow another only if requested."""
     by_name = {j.name: j for j in (*joints, *closing)}
     if choices.actuated is None:
-        chosen = [j for j in joints if j.kind != "floating"]
+        chosen = [j for j in joints if j.kind != "floating" and j.name not in choices.geared]
     else:
         moving = {j.name: j for j in by_name.values() if j.nv}
         for name in choices.actuated:
             checks.one_of("load_urdf(actuated=...): joint that moves", name, moving)
         chosen = [by_name[name] for name in choices.actuated]
-    return [Input(j.name, dof=d) for j in chosen for d in range(j.nv)]
+    return [
+        Input(j.name, dof=d, limits=(-given[j.name].effort, given[j.name].effort), speed=given[j.name].velocity)
+        for j in chosen
+        for d in range(j.nv)
+    ]
 
 
 def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: Notes) -> None:

@@ -11,6 +11,7 @@ from sim.io.meshes.hull import CORNERS
 from sim.io.urdf.assemble import Choices, assemble
 from sim.io.urdf.collision_meshes import mesh_choices, with_shapes
 from sim.io.urdf.loops import read_loops
+from sim.io.urdf.mimic import can_follow
 from sim.io.urdf.report import Notes, UrdfMechanism
 from sim.io.urdf.robot import Robot, read_robot
 from sim.io.urdf.xml import parse
@@ -18,7 +19,7 @@ from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
 from sim.mechanism.parts import LAWS, Contact
 
-MIMIC = ("free", "locked", "gear")
+MIMIC = ("auto", "free", "locked", "gear")
 
 
 def load_urdf(
@@ -33,7 +34,7 @@ def load_urdf(
     mesh_corners: int = CORNERS,
     mesh_dirs: Sequence[str | Path] = (),
     locked: Collection[str] = (),
-    mimic: str = "free",
+    mimic: str = "auto",
     repair: bool = False,
     neutral: Mapping[str, ArrayLike] | None = None,
     position: ArrayLike = (0.0, 0.0, 0.0),
@@ -64,10 +65,12 @@ def load_urdf(
             time. With 8 a hull takes the time of a box.
         mesh_dirs: folders with meshes, before those of ROS_PACKAGE_PATH and the ones around the file.
         locked: names of the joints that are held at their neutral coordinate, as if they were fixed.
-        mimic: treatment of joints that follow another one: "gear" couples them (see Gear), "free" and "locked" ignore
-            that.
-        repair: whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or more, and
-            a moving link without mass by a ball of 1 g and 1 cm; False refuses them.
+        mimic: treatment of joints that follow another one: "gear" couples them (see Gear) and refuses those that it
+            cannot, "auto" couples them and lets those go free, with a warning; "free" and "locked" ignore it. A coupled
+            joint has no input of its own.
+        repair: whether an inertia that no rigid body has is replaced by the nearest one of a ball's extent or more. One
+            that is missing becomes that of the collision shapes, which also give a link without mass one, with 1000
+            kg/m^3; without shapes it is a ball of 1 g and 1 cm. False refuses them.
         neutral: coordinates of the neutral state by joint [rad, m]; others are at zero, or in the middle of their range
             if that excludes zero. The base then stands so high that the lowest contact touches.
         position: (3,) place of the root's frame, if it is fixed [m].
@@ -119,12 +122,16 @@ def _held(robot: Robot, locked: Collection[str], mimic: str, notes: Notes) -> tu
     for name in held:
         checks.one_of("load_urdf(locked=...): joint", name, robot.joints)
     following = [name for name in robot.mimics if name not in held]
-    if following and mimic == "gear":
-        notes.add("joints that follow another one, by a gear", following)
+    geared = [name for name in following if mimic == "gear" or (mimic == "auto" and can_follow(robot, name, held))]
+    following = [name for name in following if name not in geared]
+    if geared:
+        notes.add("joints that follow another one, by a gear", geared)
+    if following and mimic == "auto":
+        notes.add("mimic joints that follow none with a coordinate; each moves freely", following, warn=True)
     elif following:
         fate = "no longer follow another one: each moves freely" if mimic == "free" else "are held where they are"
         notes.add(f"mimic joints are not modelled; these {fate}", following, warn=True)
     return (
         frozenset([*held, *following] if mimic == "locked" else held),
-        tuple(following) if mimic == "gear" else (),
+        tuple(geared),
     )

@@ -238,6 +238,11 @@ def read_joint(element: Element, ends: tuple[str, str], pose: Pose, notes: Notes
         limit.number(field, np.inf) if limit and field in limit.attributes else np.inf
         for field in ("effort", "velocity")
     ]
+    for k, field in enumerate(("effort", "velocity")):
+        if bounds[k] <= 0.0:
+            bounds[k] = np.inf
+            if kind != "fixed":
+                notes.add(f"joints without a largest {field}, because the file gives zero or less", [name])
     return UrdfJoint(
         name,
         kind,

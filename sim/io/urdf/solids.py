@@ -23,11 +23,16 @@ def body_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
 
     Each has the friction of its link, where the file gives one.
     """
-    found = named(_solids(body, com, "collisions"))
+    found = collision_shapes(body, com)
     if found:
         return found
     seen = _solids(body, com, "visuals")
     return (replace(max(seen, key=lambda shape: shape.volume()), name=""),) if seen else ()
+
+
+def collision_shapes(body: MergedLinks, com: Floats) -> tuple[Solid, ...]:
+    """All primitives among the collision shapes of a body, and the hulls of its meshes."""
+    return named(_solids(body, com, "collisions"))
 
 
 def body_visuals(body: MergedLinks, com: Floats) -> tuple[Visual, ...]:
