@@ -53,6 +53,8 @@ from sim.mechanism.shapes import (
     String as String,
 )
 from sim.simulator.simulator import Simulator as Simulator
+from sim.simulator.inverse_kinematics import IkResult as IkResult, ik as ik
+from sim.simulator.kinematics import Kinematics as Kinematics
 from sim.mechanism.terrain import Terrain as Terrain
 from sim.mechanism.visual import Visual as Visual
 from sim.io.urdf.load import load_urdf as load_urdf

@@ -1,0 +1,256 @@
+"""ik: coordinates at which frames are where they shall be, within the limits of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.mechanism.shapes import rotation_matrix
+from sim.simulator.kinematics import Kinematics
+from sim.simulator.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+COM = "center of mass"  # a target of this name
+_ACCEPT, _LEAST, _MOST = 1e-12, 1e-12, 1e6  # damping where it begins, and its range
+_SMALL = 1e-12  # [rad, m] a step that ends the iterations
+_SPREAD = 0.5  # [rad, m] of the coordinates of a further start
+_TURN = 1.0  # [rad] largest change of a coordinate in an iteration
+
+
+Target = tuple[Floats | None, Floats | None]  # place, rotation
+
+
+@dataclass(frozen=True)
+class IkResult:
+    """q (nq,), and how near the targets it is."""
+
+    q: Floats
+    success: bool
+    message: str
+    error: float  # largest distance [m] or angle [rad] from a target
+    errors: dict[str, float]  # by target
+    iterations: int
+
+    __repr__ = brief_repr
+
+
+def ik(
+    sim: Simulator | Kinematics,
+    targets: Mapping[str, Any],
+    start: ArrayLike | None = None,
+    *,
+    fixed: Sequence[str] = (),
+    limits: bool = True,
+    tolerance: float = 1e-8,
+    max_iterations: int = 200,
+    attempts: int = 8,
+) -> IkResult:
+    """Coordinates near `start` with frames at their targets: Levenberg and Marquardt's method, steps within the limits.
+
+    Each step is min |J dq + r|^2 + damping |dq|^2 under lo <= q + dq <= hi, solved as a bounded problem, so that joints
+    slide along their limits.
+
+    Args:
+        sim: the simulator, or its Kinematics with frames that were added.
+        targets: by frame, its place (3,) [m]; or with its orientation, (place, quaternion (w, x, y, z)) or (None,
+            quaternion). "center of mass" is a place, too.
+        start: coordinates (nq,), by default those of the neutral state.
+        fixed: names of joints that keep their coordinates, "floating_base" for one.
+        limits: whether joint limits hold; cones are not looked at.
+        tolerance: largest error of a success [m, rad].
+        max_iterations: of the method, from one start.
+        attempts: starts, the further ones at random around the best coordinates so far: arms have postures in which no
+            small motion helps.
+
+    Returns:
+        IkResult, whose message says which target is farthest when there is no solution nearby.
+
+    Raises:
+        ValueError: a frame or a joint is unknown, or a target has another form.
+    """
+    kin = sim if isinstance(sim, Kinematics) else Kinematics(sim)
+    wanted = {name: _target(kin, name, given) for name, given in targets.items()}
+    if not wanted:
+        raise ValueError("ik(targets): expected at least one target")
+    neutral = kin.sim.neutral()[: kin.sim.nq]
+    q = np.array(neutral if start is None else checks.array("ik(start=...)", start, (kin.sim.nq,)))
+    low, high, free = _bounds(kin, fixed, limits)
+    q = _inside(kin, q, low, high)
+    search = _Search(kin, wanted, low, high, free, 0.1 * tolerance, max_iterations)
+    q, r, count = search.descend(q)
+    rng = np.random.default_rng(0)
+    for _ in range(attempts - 1):
+        if max(_errors(wanted, r).values()) <= tolerance:
+            break
+        dq = np.zeros(kin.sim.nv)
+        dq[free] = _SPREAD * rng.normal(size=len(free))
+        other, r_other, more = search.descend(_inside(kin, kin.moved(q, dq), low, high))
+        count += more
+        if r_other @ r_other < r @ r:
+            q, r = other, r_other
+    errors = _errors(wanted, r)
+    worst = max(errors, key=lambda name: errors[name])
+    success = errors[worst] <= tolerance
+    message = (
+        f"All targets are met to {errors[worst]:.2g}."
+        if success
+        else f"{worst!r} stays {errors[worst]:.3g} from its target: out of reach, or too far from start."
+    )
+    return IkResult(q, success, message, errors[worst], errors, count)
+
+
+class _Search(NamedTuple):
+    """What the iterations need."""
+
+    kin: Kinematics
+    wanted: Mapping[str, Target]
+    low: Floats
+    high: Floats
+    free: NDArray[np.int64]
+    enough: float
+    max_iterations: int
+
+    def descend(self, q: Floats) -> tuple[Floats, Floats, int]:
+        """(coordinates, residual, iterations) from a start within the limits."""
+        kin, free = self.kin, self.free
+        r, J = _residual(kin, q, self.wanted)
+        damping, count = _ACCEPT, 0
+        while count < self.max_iterations and np.abs(r).max() > self.enough and damping < _MOST:
+            count += 1
+            dq = np.zeros(kin.sim.nv)
+            dq[free] = _step(J[:, free], r, damping, *(b[free] for b in _room(kin, q, self.low, self.high)))
+            tried = kin.moved(q, dq)
+            r_tried, J_tried = _residual(kin, tried, self.wanted)
+            if r_tried @ r_tried < r @ r:
+                small = float(np.abs(dq).max()) < _SMALL
+                q, r, J, damping = tried, r_tried, J_tried, max(_LEAST, 0.1 * damping)
+                if small:
+                    break
+            else:
+                damping = max(1e-6, 10.0 * damping)
+        return q, r, count
+
+
+def _target(kin: Kinematics, name: str, given: Any) -> Target:
+    """Place and rotation of one target."""
+    call = f"ik(targets): {name!r}"
+    if name != COM:
+        checks.one_of("ik(targets)", name, [*kin.frames, COM])
+    pair = isinstance(given, tuple | list) and len(given) == 2
+    place, quat = given if pair else (given, None)
+    if place is None and quat is None:
+        raise ValueError(f"{call}: expected a place (3,), or (place, quaternion), got {given!r}")
+    if name == COM and quat is not None:
+        raise ValueError(f"{call}: it has a place, but no orientation")
+    at = None if place is None else checks.array(call, place, (3,))
+    return at, None if quat is None else rotation_matrix(checks.quaternion(call, quat))
+
+
+def _residual(kin: Kinematics, q: Floats, wanted: Mapping[str, Target]) -> tuple[Floats, Floats]:
+    """Distances and rotation vectors from the targets, (m,), and their Jacobian (m, nv)."""
+    rows: list[Floats] = []
+    blocks: list[Floats] = []
+    for name, (place, turn) in wanted.items():
+        if name == COM:
+            assert place is not None
+            rows.append(kin.center_of_mass(q) - place)
+            blocks.append(kin.com_jacobian(q))
+            continue
+        at, R = kin.pose(name, q)
+        J = kin.jacobian(name, q)
+        if place is not None:
+            rows.append(at - place)
+            blocks.append(J[:3])
+        if turn is not None:
+            w = _rotation_vector(R @ turn.T)
+            rows.append(w)
+            blocks.append(_left_inverse(w) @ J[3:])
+    return np.concatenate(rows), np.concatenate(blocks)
+
+
+def _rotation_vector(R: Floats) -> Floats:
+    """w with exp([w]) = R, |w| <= pi."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(R).as_rotvec())
+
+
+def _left_inverse(w: Floats) -> Floats:
+    """d w / d(angular velocity, world axes): I - [w]/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) [w]^2, a = |w|."""
+    a = float(np.linalg.norm(w))
+    W = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    if a < 1e-4:
+        factor = 1.0 / 12.0
+    else:  # at half a turn, where the vector jumps, any finite one
+        factor = 1.0 / a**2 - (1.0 + np.cos(a)) / (2.0 * a * max(np.sin(a), 1e-9))
+    return np.asarray(np.eye(3) - 0.5 * W + factor * W @ W)
+
+
+def _step(J: Floats, r: Floats, damping: float, low: Floats, high: Floats) -> Floats:
+    """The bounded, damped step."""
+    from scipy.optimize import lsq_linear
+
+    n = J.shape[1]
+    A = np.concatenate([J, np.sqrt(damping) * np.eye(n)])
+    b = np.concatenate([-r, np.zeros(n)])
+    plain = np.linalg.lstsq(A, b, rcond=None)[0]
+    if np.all((plain >= low) & (plain <= high)):
+        return np.asarray(plain)
+    return np.clip(lsq_linear(A, b, (low - 1e-12, high + 1e-12), tol=1e-12).x, low, high)
+
+
+def _bounds(kin: Kinematics, fixed: Sequence[str], limits: bool) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Limits by degree of freedom, infinite where there are none, and the degrees of freedom that may move."""
+    mech = kin.mechanism
+    low, high = np.full(mech.nv, -np.inf), np.full(mech.nv, np.inf)
+    free = np.ones(mech.nv, dtype=bool)
+    for name in fixed:
+        checks.one_of("ik(fixed=...)", name, mech.joint_names)
+    for joint in mech.joints:
+        at = mech.v_slice(joint.name)
+        free[at] = joint.name not in fixed
+        if limits and joint.limits:
+            low[at], high[at] = np.array(joint.limits, dtype=np.float64).T
+    return low, high, np.flatnonzero(free)
+
+
+def _coordinates(kin: Kinematics, q: Floats) -> Floats:
+    """The coordinate of every degree of freedom, zero of those of quaternions, which have no limits."""
+    out = np.zeros(kin.sim.nv)
+    for joint in kin.mechanism.joints:
+        count = joint.ntrans if joint.nrot == 3 else joint.nv
+        v, first = kin.mechanism.v_slice(joint.name).start, kin.mechanism.q_slice(joint.name).start
+        out[v : v + count] = q[first : first + count]
+    return out
+
+
+def _room(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Bounds of a step."""
+    at = _coordinates(kin, q)
+    return np.clip(low - at, -_TURN, 0.0), np.clip(high - at, 0.0, _TURN)
+
+
+def _inside(kin: Kinematics, q: Floats, low: Floats, high: Floats) -> Floats:
+    """q with its coordinates moved to their limits where they are beyond."""
+    at = _coordinates(kin, q)
+    return kin.moved(q, np.clip(at, low, high) - at)
+
+
+def _errors(wanted: Mapping[str, Target], r: Floats) -> dict[str, float]:
+    """By target, the larger one of its distance and angle."""
+    out, k = {}, 0
+    for name, parts in wanted.items():
+        sizes = []
+        for part in parts:
+            if part is not None:
+                sizes.append(float(np.linalg.norm(r[k : k + 3])))
+                k += 3
+        out[name] = max(sizes)
+    return out
