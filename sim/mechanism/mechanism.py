@@ -45,6 +45,7 @@ class Mechanism:
         collisions: bodies and obstacles that keep apart (default none).
         loops: joints that close loops (default none).
         gears: joint coordinates that follow others (default none).
+        scenery: parts of pictures that are fixed to the world (default none).
 
     Raises:
         ValueError: the parts are no tree, a name is unknown or used twice, or a value is out of range.
@@ -60,7 +61,7 @@ class Mechanism:
     collisions: Sequence[Collision] = ()
     loops: Sequence[Joint] = ()
     gears: Sequence[Gear] = ()
-    scenery: Sequence[Visual] = ()  # of pictures, fixed to the world
+    scenery: Sequence[Visual] = ()
 
     def __post_init__(self) -> None:
         checks.name("Mechanism(name=...)", self.name)

@@ -121,11 +121,22 @@ class Polytope(Solid):
         return self.central_inertia(mass)
 
     def mass_centre(self) -> Floats:
-        """Centre of the solid (3,), in the axes of its body from the centre of mass [m]."""
+        """Centre of the solid.
+
+        Returns:
+            (3,) place from the centre of mass of the body, body axes [m].
+        """
         return self.place(self.centroid)
 
     def central_inertia(self, mass: float) -> Floats:
-        """Inertia (3, 3) about that centre, in body axes [kg m^2]: C = m/V int (x - c)(x - c)^T, J = tr(C) I - C."""
+        """Inertia about the centre of the solid: C = m/V int (x - c)(x - c)^T, J = tr(C) I - C.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+        """
         volume, first, second = self._moments()
         C = mass / volume * (second - np.outer(first, first) / volume)
         R = rotation_matrix(self.orientation)

@@ -203,15 +203,33 @@ class Solid:
         return np.asarray((R * self.principal(mass)) @ R.T)
 
     def place(self, points: ArrayLike) -> Floats:
-        """Points (..., 3) of the frame of the shape, in the axes of its body from the centre of mass [m]."""
+        """Points of the frame of the shape in its body.
+
+        Args:
+            points: (..., 3) places in the frame of the shape [m].
+
+        Returns:
+            (..., 3) the same from the centre of mass of the body, body axes [m].
+        """
         return np.asarray(points) @ rotation_matrix(self.orientation).T + np.asarray(self.center)
 
     def mass_centre(self) -> Floats:
-        """Centre of the solid (3,), in the axes of its body from the centre of mass [m]."""
+        """Centre of the solid.
+
+        Returns:
+            (3,) place from the centre of mass of the body, body axes [m].
+        """
         return np.array(self.center, dtype=np.float64)
 
     def central_inertia(self, mass: float) -> Floats:
-        """Inertia (3, 3) about that centre, in body axes [kg m^2]."""
+        """Inertia about the centre of the solid.
+
+        Args:
+            mass: mass [kg].
+
+        Returns:
+            (3, 3) inertia in body axes [kg m^2].
+        """
         return self.inertia(mass)
 
 

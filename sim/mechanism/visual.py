@@ -18,11 +18,17 @@ STEEL = (0.56, 0.64, 0.72)  # colour of what has none
 class Visual:
     """A shape, the mesh of a file, or triangles, placed in a body.
 
-    shape      a solid with its own place, or
-    mesh       path of an STL, OBJ or DAE file, read when it is drawn (the extra `meshes`), scaled and placed by
-    center, orientation    from the centre of mass [m], and to body axes; or
-    triangles  (vertices (n, 3), faces (k, 3)), placed likewise
-    color      red, green, blue, or with alpha, from 0 to 1; None: that of the mesh, or grey
+    Attributes:
+        shape: a solid with its own place (default None: a mesh or triangles).
+        mesh: path of an STL, OBJ or DAE file, read when it is drawn by the extra `meshes` (default none).
+        triangles: (vertices (n, 3), faces (k, 3)) (default none).
+        scale: (3,) factors of a mesh or triangles (default 1).
+        center: (3,) origin of a mesh or triangles, from the centre of mass, body axes [m] (default zero).
+        orientation: (4,) unit quaternion (w, x, y, z) from the axes of a mesh or triangles to body axes (default none).
+        color: red, green, blue, or with alpha, from 0 to 1 (default None: that of the mesh, or grey).
+
+    Raises:
+        ValueError: for none or several of shape, mesh and triangles, or a value out of range.
     """
 
     shape: Solid | None = None

@@ -12,13 +12,14 @@ from sim.mechanism.mechanism import Mechanism
 
 def with_contacts(mech: Mechanism, field: str, value: Any) -> Mechanism:
     """The mechanism with another friction or law, of all contacts and collisions or by name."""
+    parts: tuple[Any, ...] = (*mech.contacts, *mech.collisions)
     if isinstance(value, Mapping):
-        names = tuple(part.name for part in (*mech.contacts, *mech.collisions))
+        names = tuple(part.name for part in parts)
         for name in value:
             checks.one_of(f"Simulator.replace({field}=...)", name, names)
         chosen = value
     else:
-        chosen = {part.name: value for part in (*mech.contacts, *mech.collisions)}
+        chosen = {part.name: value for part in parts}
     return replace(
         mech,
         contacts=[replace(c, **{field: chosen.get(c.name, getattr(c, field))}) for c in mech.contacts],

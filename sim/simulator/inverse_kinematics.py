@@ -29,7 +29,16 @@ Target = tuple[Floats | None, Floats | None]  # place, rotation
 
 @dataclass(frozen=True)
 class IkResult:
-    """q (nq,), and how near the targets it is."""
+    """Coordinates, and how near the targets they are.
+
+    Attributes:
+        q: (nq,) coordinates.
+        success: whether all errors are within the tolerance.
+        message: sentence about the outcome.
+        error: largest distance or angle from a target [m, rad].
+        errors: the same by target.
+        iterations: number of iterations from all starts.
+    """
 
     q: Floats
     success: bool

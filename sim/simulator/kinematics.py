@@ -31,6 +31,9 @@ class Kinematics:
         M(q) = sum J_i^T diag(m_i I, J_i) J_i,   tau = M dv + b(q, v) + g(q)
 
     Loops, gears, springs, dampers and contacts are left out: these are equations of the tree of joints.
+
+    Args:
+        sim: the simulator.
     """
 
     def __init__(self, sim: Simulator) -> None:
@@ -76,7 +79,15 @@ class Kinematics:
         self._frames[name] = body, at, turn @ own
 
     def pose(self, frame: str, q: ArrayLike) -> tuple[Floats, Floats]:
-        """(place (..., 3) [m], rotation (..., 3, 3) to world axes) of a frame at q (..., nq)."""
+        """Place and orientation of a frame.
+
+        Args:
+            frame: name of the frame.
+            q: (..., nq) coordinates.
+
+        Returns:
+            (place (..., 3) [m], rotation (..., 3, 3) to world axes).
+        """
         body, point, turn = self._frame("Kinematics.pose(frame)", frame)
         q = self._q("Kinematics.pose(q)", q)
         if body < 0:
@@ -86,12 +97,29 @@ class Kinematics:
         return z[..., :3] + R @ point, R @ turn
 
     def velocity(self, frame: str, q: ArrayLike, v: ArrayLike) -> Floats:
-        """(..., 6) velocity of the frame's origin [m/s] and angular velocity [rad/s], world axes."""
+        """Velocity of a frame.
+
+        Args:
+            frame: name of the frame.
+            q: (..., nq) coordinates.
+            v: (..., nv) joint velocities.
+
+        Returns:
+            (..., 6) velocity of the frame's origin [m/s] and angular velocity [rad/s], world axes.
+        """
         J = self.jacobian(frame, q)
         return np.asarray((J @ _rows("Kinematics.velocity(v)", v, self.sim.nv)[..., None])[..., 0])
 
     def jacobian(self, frame: str, q: ArrayLike) -> Floats:
-        """(..., 6, nv) velocity of the frame's origin and angular velocity, world axes, by joint velocities."""
+        """Jacobian of a frame's velocity by joint velocities.
+
+        Args:
+            frame: name of the frame.
+            q: (..., nq) coordinates.
+
+        Returns:
+            (..., 6, nv) rows of the velocity of the frame's origin, then of the angular velocity, world axes.
+        """
         body, point, _ = self._frame("Kinematics.jacobian(frame)", frame)
         q = self._q("Kinematics.jacobian(q)", q)
         if body < 0:
@@ -100,18 +128,40 @@ class Kinematics:
         return _shifted(J[..., body, :, :], R[..., body, :, :] @ point)
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
-        """(..., 3) centre of mass of all bodies [m]."""
+        """Centre of mass of all bodies.
+
+        Args:
+            q: (..., nq) coordinates.
+
+        Returns:
+            (..., 3) place [m].
+        """
         q = self._q("Kinematics.center_of_mass(q)", q)
         z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))
         return np.asarray(self._mass @ z[..., :3] / self._mass.sum())
 
     def com_jacobian(self, q: ArrayLike) -> Floats:
-        """(..., 3, nv) velocity of the centre of mass by joint velocities."""
+        """Jacobian of the velocity of the centre of mass by joint velocities.
+
+        Args:
+            q: (..., nq) coordinates.
+
+        Returns:
+            (..., 3, nv) Jacobian.
+        """
         J, _ = self._body_jacobians(self._q("Kinematics.com_jacobian(q)", q))
         return np.einsum("b,...bkd->...kd", self._mass, J[..., :3, :]) / self._mass.sum()
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """(..., 6) linear momentum [kg m/s], and angular momentum about the centre of mass [kg m^2/s], world axes."""
+        """Momentum of all bodies about their centre of mass.
+
+        Args:
+            q: (..., nq) coordinates.
+            v: (..., nv) joint velocities.
+
+        Returns:
+            (..., 6) linear [kg m/s] and angular momentum [kg m^2/s], world axes.
+        """
         q = self._q("Kinematics.centroidal_momentum(q)", q)
         v = _rows("Kinematics.centroidal_momentum(v)", v, self.sim.nv)
         z = self.sim.bodies(q, np.zeros((*q.shape[:-1], self.sim.nv)))
@@ -123,7 +173,14 @@ class Kinematics:
         return np.concatenate([p.sum(axis=-2), (spin + np.cross(arm, p)).sum(axis=-2)], axis=-1)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
-        """M (..., nv, nv), armature included [kg, kg m, kg m^2]."""
+        """Mass matrix M, armature included.
+
+        Args:
+            q: (..., nq) coordinates.
+
+        Returns:
+            (..., nv, nv) matrix [kg, kg m, kg m^2].
+        """
         J, R = self._body_jacobians(self._q("Kinematics.mass_matrix(q)", q))
         linear, angular = J[..., :3, :], J[..., 3:, :]
         M = np.einsum("b,...bki,...bkj->...ij", self._mass, linear, linear)
@@ -131,16 +188,30 @@ class Kinematics:
         return np.asarray(M + np.diag(np.concatenate([np.asarray(j.armature) for j in self.mechanism.joints])))
 
     def gravity_torques(self, q: ArrayLike) -> Floats:
-        """g(q) (..., nv): forces of the joints that hold the mechanism at rest against gravity [N, N m]."""
+        """Forces g(q) of the joints that hold the mechanism at rest against gravity.
+
+        Args:
+            q: (..., nq) coordinates.
+
+        Returns:
+            (..., nv) forces and torques [N, N m].
+        """
         J, _ = self._body_jacobians(self._q("Kinematics.gravity_torques(q)", q))
         weight = np.outer(self._mass, np.asarray(self.mechanism.gravity))
         return -np.einsum("bk,...bkd->...d", weight, J[..., :3, :])
 
     def bias_forces(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """b(q, v) (nv,): forces of the joints that keep v constant, without gravity [N, N m].
+        """Forces b(q, v) of the joints that keep v constant, without gravity.
 
         b = sum J_i^T [m_i a_i; J_i al_i + w_i x J_i w_i] with the accelerations of the bodies d/dt (J_i(q) v) at
         constant v, by central differences of order 8 along the motion: exact to about 1e-11 of their size.
+
+        Args:
+            q: (nq,) coordinates.
+            v: (nv,) joint velocities.
+
+        Returns:
+            (nv,) forces and torques [N, N m].
         """
         q = checks.array("Kinematics.bias_forces(q)", q, (self.sim.nq,))
         v = checks.array("Kinematics.bias_forces(v)", v, (self.sim.nv,))
@@ -158,7 +229,16 @@ class Kinematics:
         return np.einsum("bkd,bk->d", J, np.concatenate([force, torque], axis=1))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, acceleration: ArrayLike) -> Floats:
-        """tau (nv,) = M dv + b + g: forces of the joints for an acceleration (nv,) of the tree [N, N m]."""
+        """Forces of the joints for an acceleration of the tree, tau = M dv + b + g.
+
+        Args:
+            q: (nq,) coordinates.
+            v: (nv,) joint velocities.
+            acceleration: (nv,) rate of the joint velocities [m/s^2, rad/s^2].
+
+        Returns:
+            (nv,) forces and torques [N, N m].
+        """
         dv = checks.array("Kinematics.inverse_dynamics(acceleration)", acceleration, (self.sim.nv,))
         return np.asarray(self.mass_matrix(q) @ dv + self.bias_forces(q, v) + self.gravity_torques(q))
 
@@ -171,7 +251,15 @@ class Kinematics:
         return _rows(call, q, self.sim.nq)
 
     def moved(self, q: Floats, dq: Floats) -> Floats:
-        """q (nq,) moved by a perturbation dq (nv,), as in `Simulator.integrate`."""
+        """Coordinates moved by a perturbation, as in `Simulator.integrate`.
+
+        Args:
+            q: (nq,) coordinates.
+            dq: (nv,) perturbation.
+
+        Returns:
+            (nq,) coordinates.
+        """
         x = np.concatenate([q, np.zeros(self.sim.nv)])
         return np.asarray(self.sim.integrate(x, np.concatenate([dq, np.zeros(self.sim.nv)])))[: self.sim.nq]
 
