@@ -141,6 +141,15 @@ def test_a_mesh_stands_on_the_ground(tmp_path: Path, suffix: str) -> None:
     assert mech.neutral[2] == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize(("scale", "size"), [("2", 0.4), ("1 1 2", 0.4), ("1 1 2 1", 0.4), ("1 1 -1", 0.2)])
+def test_scales_of_meshes(tmp_path: Path, scale: str, size: float) -> None:
+    save(tmp_path / "box.stl", trimesh.creation.box(extents=(0.1, 0.1, 0.2)))
+    mech = dojo.load_urdf(write(tmp_path, link("a", inertial(), collision(mesh("box.stl", scale)))))
+    assert np.ptp([c.point[2] for c in mech.contacts]) == pytest.approx(size)
+    with pytest.raises(dojo.UrdfError, match="scale='1 0 1': expected numbers other than zero"):
+        dojo.load_urdf(write(tmp_path, link("a", inertial(), collision(mesh("box.stl", "1 0 1")))))
+
+
 def test_choices_of_meshes(tmp_path: Path) -> None:
     save(tmp_path / "ball.stl", trimesh.creation.icosphere(subdivisions=3, radius=0.2))
     path = write(tmp_path, link("a", inertial(), collision(mesh("ball.stl"))))

@@ -190,9 +190,17 @@ def _geometry(element: Element, palette: Palette) -> Geometry:
         raise shape.error(f"expected sizes >= 0, got {', '.join(f'{s:g}' for s in sizes)}")
     if shape.tag != "mesh":
         return Geometry(shape.tag, sizes, _pose(element), color=color)
-    scale = tuple(float(x) for x in shape.vector("scale", 3, (1.0, 1.0, 1.0)))
-    name = shape.attributes.get("filename", "").strip()
+    scale, name = _scale(shape), shape.attributes.get("filename", "").strip()
     return Geometry("mesh", (), _pose(element), name, scale, color)
+
+
+def _scale(mesh: Element) -> tuple[float, ...]:
+    """Factors of a mesh: three numbers, or one for all; a fourth, as some files have it, means nothing."""
+    count = len(mesh.attributes.get("scale", "1 1 1").split())
+    given = [float(x) for x in mesh.vector("scale", count if count in (1, 4) else 3, (1.0, 1.0, 1.0))]
+    if not all(given):
+        raise mesh.error(f"scale={mesh.attributes['scale']!r}: expected numbers other than zero")
+    return tuple(given * 3) if len(given) == 1 else tuple(given[:3])
 
 
 def _palette(root: Element) -> Palette:
