@@ -80,6 +80,7 @@ def test_one_shape_twice_is_one_shape(tmp_path: Path) -> None:
     assert len(mech.bodies[0].shapes) == 1
 
 
+@pytest.mark.filterwarnings("ignore:.*inertias that no rigid body has were repaired:sim.io.urdf.report.UrdfWarning")
 def test_masses_and_inertias_that_a_file_lacks_are_those_of_the_shapes(tmp_path: Path) -> None:
     """One link has a mass without inertia, one neither; the third has shapes, but an impossible inertia."""
     box = collision('<box size="0.2 0.4 0.6"/>', "0.1 0 0")

@@ -123,7 +123,8 @@ def _neutral(robot: Robot, choices: Choices, name: str, depth: int = 0) -> float
 def _inertias(groups: list[MergedLinks], choices: Choices, notes: Notes) -> dict[str, RigidInertia]:
     """Inertia of every body in its own frame; impossible inertias are repaired or refused."""
     out = {body.name: combined(body.inertias) for body in groups}
-    if groups and not choices.repair and not any(part.mass for part in out.values()):
+    shaped = choices.repair and any(collision_shapes(body, out[body.name].com) for body in groups)
+    if groups and not shaped and not any(part.mass for part in out.values()):
         raise UrdfError(f"load_urdf: {choices.file}: nothing that moves has a mass")
     bad: list[str] = []
     for body in groups:
