@@ -181,6 +181,7 @@ class Engine:
         ]
         self.no_wrenches, self._no_contacts = nothing[:2]
         self.unknown = tuple(nothing[2:])  # derivatives and cone variables of steps that a policy does not know
+        self.unkept = self._no_contacts, *self.unknown[:2]  # contacts and derivatives of motions without
 
     def __getstate__(self) -> tuple[Model, Settings]:
         """Tables and kernels are addresses in this process: another one makes its own."""
@@ -204,6 +205,10 @@ class Engine:
     def table(self) -> Table:
         """Table of this thread's first Data."""
         return self._scratch.table()
+
+    def chunks(self, count: int) -> Table:
+        """Tables of this thread's Data for a parallel call over `count` items, one per chunk."""
+        return self._scratch.chunks(count)
 
     def external(self, wrenches: Cube | None) -> Cube:
         """External wrenches as kernels take them, (T, nbody, 6), or (0, nbody, 6) where there are none."""

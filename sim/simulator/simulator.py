@@ -35,8 +35,8 @@ from sim.simulator.results import (
     path_of,
     sentence,
 )
+from sim.simulator.row_batch import RowStepping
 from sim.simulator.settings import Settings, default_kappa
-from sim.simulator.state_space import StateSpace
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -46,7 +46,7 @@ _SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divi
 _ORDERS = (2, 4, 6, 8)
 
 
-class Simulator(StateSpace):
+class Simulator(RowStepping):
     """A mechanism, a time step, and the accuracy of its steps.
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.

@@ -1,0 +1,250 @@
+"""Steps of independent rows: each its own state, input, parameters and smoothing, on all cores."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.integrators.batch import RowTables, linearize_rows, roll_rows
+from sim.integrators.rollout import BatchBuffers, Linearized
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.model.pace import DEADLINE, pieces
+from sim.simulator.engine import DIVISIBLE, REPORT, Engine, finite_rows
+from sim.simulator.link import link_gradient, link_step
+from sim.simulator.results import Result, ended
+from sim.simulator.state_space import StateSpace
+from solvers.status import MESSAGES, Status
+from solvers.types import Integers
+
+Floats = NDArray[np.float64]
+
+_KEPT = 512  # models
+
+
+@dataclass(frozen=True)
+class BatchStep(Result):
+    """One knot of every row. An unsolved row keeps its state, and its derivatives are zero."""
+
+    x: Floats  # (n, nx)
+    status: Integers  # (n,) Status of each row
+    iterations: Integers  # (n,) of its last step
+    A: Floats  # (n, ndx, ndx) derivatives by its state, or (0, ndx, ndx)
+    B: Floats  # (n, ndx, nu) by its input, held over the knot
+    detail: str = ""
+    unsolved: Integers = field(init=False)  # numbers of the rows that were not solved
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unsolved", np.flatnonzero(self.status != Status.SOLVED))
+
+    __repr__ = brief_repr
+
+
+class RowModels:
+    """Engines by values of parameters; those of the last rows are kept."""
+
+    def __init__(self, simulator: Any) -> None:
+        self._simulator = simulator
+        self._kept: OrderedDict[bytes, Engine] = OrderedDict()
+
+    def of(self, call: str, parameters: Mapping[str, ArrayLike] | None, count: int) -> tuple[list[Engine], Integers]:
+        """Distinct engines, and which of them each of `count` rows has."""
+        if not parameters:
+            return [self._simulator._engine], np.zeros(count, dtype=np.int64)
+        sizes = {name: len(self._simulator.parameters((name,)).values) for name in parameters}
+        columns = []
+        for name, values in parameters.items():
+            given = checks.floats(f"{call}: {name!r}", values)
+            shaped = given[:, None] if given.ndim == 1 and sizes[name] == 1 else given
+            try:
+                columns.append(np.broadcast_to(shaped, (count, sizes[name])))
+            except ValueError:
+                raise ValueError(
+                    f"{call}: {name!r}: expected shape ({count}, {sizes[name]}), or one row of it, got {given.shape}"
+                ) from None
+        rows, index = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)
+        bounds = np.cumsum([0, *sizes.values()])
+        engines = []
+        for row in rows:
+            key = repr(tuple(sizes)).encode() + row.tobytes()
+            if key not in self._kept:
+                values = {name: row[a:b] for name, a, b in zip(sizes, bounds[:-1], bounds[1:], strict=True)}
+                self._kept[key] = self._simulator.with_parameters(values)._engine
+            self._kept.move_to_end(key)
+            engines.append(self._kept[key])
+        while len(self._kept) > max(_KEPT, len(rows)):
+            self._kept.popitem(last=False)
+        return engines, index.reshape(-1)
+
+
+@dataclass(frozen=True)
+class RowBatch:
+    """Rows that are stepped together."""
+
+    engines: Sequence[Engine]
+    index: Integers  # (n,) which engine each row has
+    xs: Floats  # (n, nx)
+    us: Floats  # (n, nu)
+    substeps: int
+    kappas: Floats  # (n,), NaN for that of the engine
+
+    def step(self, derivatives: bool) -> BatchStep:
+        """One knot of every row."""
+        first = self.engines[0]
+        n = len(self.us)
+        A, B = (np.empty((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
+        x_next, reports = np.array(self.xs), np.zeros((n, REPORT))
+        if first.settings.order > 2:
+            self._by_engine(derivatives, A, B, x_next, reports)
+        elif n and derivatives:
+            self._linearize(A, B, x_next, reports)
+        elif n:
+            self._roll(x_next, reports)
+        for i in np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE))):
+            self._divide(int(i), derivatives, A, B, x_next, reports)
+        if derivatives:
+            infinite = ~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED)
+            reports[infinite, 0] = Status.NOT_FINITE
+        unsolved = reports[:, 0] != Status.SOLVED
+        x_next[unsolved] = self.xs[unsolved]
+        A[unsolved[: len(A)]], B[unsolved[: len(B)]] = 0.0, 0.0
+        return BatchStep(x_next, reports[:, 0].astype(np.int64), reports[:, 1].astype(np.int64), A, B)
+
+    def _kappa(self, row: int) -> float | None:
+        """That of a row, or None for its engine's."""
+        level = float(self.kappas[row])
+        return None if np.isnan(level) else level
+
+    def _tables(self, derivatives: bool) -> tuple[RowTables, int]:
+        """Tables of all rows, and the number of chunks."""
+        n, needs = len(self.us), (link_step, link_gradient)[: 2 if derivatives else 1]
+        works = self.engines[0].chunks(n)
+        count = len(works)
+        chunk = np.searchsorted(np.arange(1, count + 1) * n // count, np.arange(n), side="right")
+        models = np.array([engine.linked(*needs) for engine in self.engines])[self.index]
+        scratch = works[chunk]
+        for k, engine in enumerate(self.engines):  # a Data has the contact frames of its Model
+            if not np.array_equal(engine.model.contact_frame, self.engines[0].model.contact_frame):
+                scratch[self.index == k] = engine.chunks(n)[chunk[self.index == k]]
+        settings = np.array([engine.settings.array() for engine in self.engines])[self.index]
+        given = ~np.isnan(self.kappas)
+        settings[given, 1] = self.kappas[given]
+        return RowTables(models, scratch, settings), count
+
+    def _linearize(self, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
+        """Steps and their derivatives."""
+        rows, chunks = self._tables(derivatives=True)
+        line = Linearized(self.xs, self.us, self.engines[0].no_wrenches, A, B, x_next, reports)
+        done = np.zeros(len(self.us), dtype=np.int64)
+        pace = np.zeros(DEADLINE + 1)
+        for _ in pieces(pace, 2):
+            rows.settings[:, DEADLINE] = pace[DEADLINE]
+            linearize_rows(rows, self.substeps, line, done, chunks)
+            if np.all(done == self.substeps):
+                break
+
+    def _roll(self, x_next: Floats, reports: Floats) -> None:
+        """Steps alone."""
+        rows, chunks = self._tables(derivatives=False)
+        first, n = self.engines[0], len(self.us)
+        xs = np.empty((n, self.substeps + 1, first.nx))
+        xs[:, 0] = self.xs
+        us = np.repeat(self.us[:, None], self.substeps, axis=1)
+        knots = np.zeros(n, dtype=np.int64)
+        motions = BatchBuffers(xs, us, reports[:, None], knots, first.no_wrenches, *first.unkept)
+        pace = np.zeros(DEADLINE + 1)
+        for _ in pieces(pace, 2):
+            rows.settings[:, DEADLINE] = pace[DEADLINE]
+            roll_rows(rows, motions, chunks)
+            if np.all((knots == self.substeps) | (reports[:, 0] != Status.SOLVED)):
+                break
+        x_next[:] = xs[:, -1]
+
+    def _divide(self, row: int, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
+        """A row that was not solved in whole steps."""
+        engine = self.engines[self.index[row]]
+        us = np.repeat(self.us[row : row + 1], self.substeps, axis=0)
+        rolled = engine.roll(self.xs[row], us, kappa=self._kappa(row), derivatives=derivatives)
+        reports[row] = rolled.reports[min(rolled.knot, self.substeps - 1)]
+        if rolled.knot < self.substeps:
+            return
+        x_next[row] = rolled.xs[-1]
+        if derivatives:
+            A[row], B[row] = np.eye(engine.ndx), 0.0
+            for dx, du in zip(rolled.A, rolled.B, strict=True):
+                A[row], B[row] = dx @ A[row], dx @ B[row] + du
+
+    def _by_engine(self, derivatives: bool, A: Floats, B: Floats, x_next: Floats, reports: Floats) -> None:
+        """Steps of higher order, the rows of an engine at a time."""
+        for k, engine in enumerate(self.engines):
+            rows = np.flatnonzero(self.index == k)
+            xs, us = self.xs[rows], self.us[rows]
+            if derivatives:
+                A[rows], B[rows], x_next[rows], reports[rows] = engine.linearize(xs, us, self.substeps, None)
+            else:
+                found, reports[rows, 0], _ = engine.roll_batch(xs, np.repeat(us[:, None], self.substeps, axis=1))
+                x_next[rows] = found[:, -1]
+
+
+class RowStepping(StateSpace):
+    """Steps of independent rows, for simulators."""
+
+    def step_batch(
+        self,
+        X: ArrayLike,
+        U: ArrayLike,
+        substeps: int = 1,
+        derivatives: bool = False,
+        kappa: ArrayLike | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        *,
+        throw: bool = False,
+    ) -> BatchStep:
+        """One knot of independent rows, over all cores: row i goes from X[i] by `substeps` steps with U[i] held.
+
+        A row starts from its own state alone, so its result depends neither on the other rows nor on the cores.
+
+        Args:
+            X: (n, nx) states.
+            U: (n, nu) inputs [N, N m].
+            substeps: time steps per knot.
+            derivatives: whether to return those of every row by its state and input, too.
+            kappa: central-path parameter, one or (n,); that of the simulator by default. Order 2 only.
+            parameters: {name: (n,) or (n, components), or one row for all}, as in `parameters`: the rows are those of
+                `with_parameters`, with the kappa of this simulator. A model is made once for each row of new values,
+                and kept.
+            throw: raise SimulationError where a step is not solved.
+
+        Returns:
+            BatchStep with the states after the knot, and A (n, ndx, ndx), B (n, ndx, nu).
+        """
+        call = "Simulator.step_batch"
+        inputs = self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
+        count = len(inputs)
+        states = self._arguments.states(f"{call}(X)", checks.array(f"{call}(X)", X, (count, self.nx)))
+        steps = checks.whole_number(f"{call}(substeps=...)", substeps)
+        kappas = np.full(count, np.nan)
+        if kappa is not None:
+            if self.order > 2:
+                raise ValueError(f"{call}(kappa=...): steps of order {self.order} have none")
+            kappas[:] = checks.array(f"{call}(kappa=...)", kappa, () if np.ndim(kappa) == 0 else (count,))
+            if not np.all(kappas > 0.0):
+                raise ValueError(f"{call}(kappa=...): expected numbers above 0, got {kappa!r}")
+        engines, index = self._row_models.of(f"{call}(parameters=...)", parameters, count)
+        found = RowBatch(engines, index, states, inputs, steps, kappas).step(bool(derivatives))
+        if len(found.unsolved):
+            i = int(found.unsolved[0])
+            reason = Status(int(found.status[i]))
+            found = replace(found, detail=f"{call}: row {i}: {MESSAGES[reason]}")
+        return ended(found, throw)
+
+    @cached_property
+    def _row_models(self) -> RowModels:
+        """Models of rows with other parameters."""
+        return RowModels(self)
