@@ -5,6 +5,7 @@ from dojo_opt import (
     constraint as constraint,
     cost as cost,
     gaits as gaits,
+    learn as learn,
     models as models,
     plots as plots,
     problems as problems,
@@ -14,6 +15,7 @@ from dojo_opt import (
 )
 from dojo_opt.gaits.equilibrium import equilibrium as equilibrium
 from dojo_opt.identification.parameter_space import ParameterSpace as ParameterSpace
+from dojo_opt.learn.environment import Environment as Environment
 from dojo_opt.mpc.controller import MPC as MPC
 from dojo_opt.mpc.moving import Sampled as Sampled
 from dojo_opt.planning.ilqr import ilqr as ilqr
@@ -23,7 +25,6 @@ from dojo_opt.planning.problem import Problem as Problem
 from dojo_opt.planning.residual import kernel as kernel
 from dojo_opt.planning.tracking import tracking_gains as tracking_gains
 from dojo_opt.plant.disturbances import Disturbances as Disturbances
-from dojo_opt.plant.environment import Environment as Environment
 from dojo_opt.plant.loop import ClosedLoop as ClosedLoop, closed_loop as closed_loop
 from dojo_opt.plant.perturbation import Perturbation as Perturbation, Push as Push
 from dojo_opt.plant.plant import Plant as Plant

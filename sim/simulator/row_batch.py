@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ from sim.integrators.rollout import BatchBuffers, Linearized
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.model.pace import DEADLINE, pieces
-from sim.simulator.engine import DIVISIBLE, REPORT, Engine, finite_rows
+from sim.simulator.engine import DIVISIBLE, REPORT, Engine, finite_rows, refuse
 from sim.simulator.link import link_gradient, link_step
 from sim.simulator.results import Result, ended
 from sim.simulator.state_space import StateSpace
@@ -38,10 +38,11 @@ class BatchStep(Result):
     A: Floats  # (n, ndx, ndx) derivatives by its state, or (0, ndx, ndx)
     B: Floats  # (n, ndx, nu) by its input, held over the knot
     detail: str = ""
-    unsolved: Integers = field(init=False)  # numbers of the rows that were not solved
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "unsolved", np.flatnonzero(self.status != Status.SOLVED))
+    @property
+    def unsolved(self) -> Integers:
+        """Numbers of the rows that were not solved."""
+        return np.flatnonzero(self.status)
 
     __repr__ = brief_repr
 
@@ -106,14 +107,14 @@ class RowBatch:
             self._linearize(A, B, x_next, reports)
         elif n:
             self._roll(x_next, reports)
-        for i in np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE))):
-            self._divide(int(i), derivatives, A, B, x_next, reports)
-        if derivatives:
-            infinite = ~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED)
-            reports[infinite, 0] = Status.NOT_FINITE
-        unsolved = reports[:, 0] != Status.SOLVED
-        x_next[unsolved] = self.xs[unsolved]
-        A[unsolved[: len(A)]], B[unsolved[: len(B)]] = 0.0, 0.0
+        for i in np.flatnonzero(reports[:, 0]):
+            if int(reports[i, 0]) in DIVISIBLE:
+                self._divide(int(i), derivatives, A, B, x_next, reports)
+        if derivatives and (refuse(reports, n, A, B) < n or reports[:, 0].any()):
+            reports[~(finite_rows(A) & finite_rows(B)) & (reports[:, 0] == Status.SOLVED), 0] = Status.NOT_FINITE
+        for i in np.flatnonzero(reports[:, 0]):
+            x_next[i] = self.xs[i]
+            A[i : i + 1], B[i : i + 1] = 0.0, 0.0
         return BatchStep(x_next, reports[:, 0].astype(np.int64), reports[:, 1].astype(np.int64), A, B)
 
     def _kappa(self, row: int) -> float | None:
@@ -130,7 +131,7 @@ class RowBatch:
         models = np.array([engine.linked(*needs) for engine in self.engines])[self.index]
         scratch = works[chunk]
         for k, engine in enumerate(self.engines):  # a Data has the contact frames of its Model
-            if not np.array_equal(engine.model.contact_frame, self.engines[0].model.contact_frame):
+            if k and not np.array_equal(engine.model.contact_frame, self.engines[0].model.contact_frame):
                 scratch[self.index == k] = engine.chunks(n)[chunk[self.index == k]]
         settings = np.array([engine.settings.array() for engine in self.engines])[self.index]
         given = ~np.isnan(self.kappas)

@@ -1,0 +1,108 @@
+"""Policies of Gymnasium's tasks, learnt on one core: returns over processor time, with their spread over seeds.
+
+python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 2 3 4      runs and saves
+python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
+python benchmarks/evaluate_policy.py HalfCheetah-v5 DIR/*.policy.npz                        in MuJoCo
+
+A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
+OPENBLAS_NUM_THREADS=1. Policies are also evaluated at time steps and smoothings that they have not learnt on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import dojo_opt as dojo
+from dojo_opt.learn.gymnasium_tasks import TRANSFER
+from dojo_opt.learn.registration import TASKS
+
+LOCOMOTION = dojo.learn.Randomisation(substeps=(2, 4), kappa=(10.0**-4, 10.0**-2.5))
+SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
+    "HalfCheetah": {
+        "shac": {"epochs": 900, "randomisation": TRANSFER},
+        "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER},
+    },
+    "Hopper": {
+        "shac": {"epochs": 900, "horizon": 32, "randomisation": LOCOMOTION},
+        "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+    },
+    "Walker2d": {
+        "shac": {"epochs": 900, "horizon": 32, "randomisation": LOCOMOTION},
+        "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
+    },
+    "Ant": {
+        "shac": {"epochs": 900, "randomisation": dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))},
+        "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0},
+    },
+    "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
+    "Cartpole": {"shac": {"epochs": 100}, "ars": {"epochs": 30}},
+}
+UNSEEN = ((10, 3e-5), (7, 2e-3))  # time steps per action, smoothing [N s m]
+
+
+def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) -> None:
+    """One run, unless it is saved."""
+    path = folder / f"{name}_{algorithm}_{seed}.npz"
+    if path.exists():
+        return
+    task = getattr(dojo.learn, TASKS[name][0])()
+    options = SETTINGS[name][algorithm] | ({} if epochs is None else {"epochs": epochs})
+    learned = getattr(dojo.learn, algorithm)(task, seed=seed, verbose=True, **options)
+    learned.save(path)
+    learned.policy.save(path.with_suffix(".policy.npz"))
+    print(f"{name} seed {seed}: {learned!r}")
+    for substeps, kappa in UNSEEN:
+        found = dojo.learn.evaluate(learned.policy, 8, 100, substeps=substeps, kappa=kappa)
+        print(
+            f"  {substeps} time steps per action, kappa {kappa:g}: {found.returns.mean():.1f} +- "
+            f"{found.returns.std():.1f}, {found.lengths.mean():.0f} steps, {found.unsolved} unsolved",
+            flush=True,
+        )
+
+
+def figure(folder: Path, name: str) -> None:
+    """Median and range over seeds of each algorithm, of what is saved."""
+    from matplotlib.figure import Figure
+
+    page = Figure(figsize=(6.5, 4.0), layout="constrained")
+    axes = page.subplots()
+    for algorithm in SETTINGS[name]:
+        curves = []
+        for path in sorted(folder.glob(f"{name}_{algorithm}_?.npz")):
+            history = dojo.learn.Learned.load(path).history
+            curves.append(np.array([(r["seconds"], r["evaluated"]) for r in history if r["evaluated"] is not None]))
+        if curves:
+            rows = min(map(len, curves))
+            seconds = np.median([c[:rows, 0] for c in curves], axis=0)
+            returns = np.array([c[:rows, 1] for c in curves])
+            axes.plot(seconds, np.median(returns, axis=0), marker=".", label=f"{algorithm}, {len(curves)} seeds")
+            axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
+    axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name)
+    axes.legend()
+    page.savefig(folder / f"{name}.png", dpi=150)
+    print(f"wrote {folder / f'{name}.png'}")
+
+
+def main() -> None:
+    """Run, save, draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("task", choices=SETTINGS)
+    parser.add_argument("--algorithms", nargs="+", default=["shac"])
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
+    parser.add_argument("--epochs", type=int, default=None)
+    parser.add_argument("--only-figure", action="store_true")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    for algorithm in [] if given.only_figure else given.algorithms:
+        for seed in given.seeds:
+            run(given.folder, given.task, algorithm, seed, given.epochs)
+    figure(given.folder, given.task)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+"""Learning: tasks, policies, and algorithms that find policies, with and without derivatives of the simulator."""
+
+from dojo_opt.learn.evaluation import Evaluation, evaluate
+from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, pendulum, walker2d
+from dojo_opt.learn.learned import Learned
+from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
+from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
+from dojo_opt.learn.shac import ShacOptions, shac
+from dojo_opt.learn.task import Task
+
+__all__ = [
+    "Evaluation",
+    "GradientSearchOptions",
+    "Learned",
+    "Policy",
+    "PolicyGradient",
+    "PolicyRollout",
+    "RandomSearchOptions",
+    "Randomisation",
+    "ShacOptions",
+    "Task",
+    "ant",
+    "ars",
+    "cartpole",
+    "evaluate",
+    "gradient_search",
+    "half_cheetah",
+    "hopper",
+    "pendulum",
+    "roll_policy_batch",
+    "shac",
+    "walker2d",
+]

@@ -1,0 +1,219 @@
+"""Environment: a task or a planning problem as a Gymnasium environment (`pip install "dojo-opt[gym]"`)."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.task import Task
+from dojo_opt.planning.problem import Problem
+from dojo_opt.plant.monte_carlo import Sampler
+from dojo_opt.plant.plant import Plant
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
+
+try:
+    import gymnasium
+except ImportError:
+    gymnasium = None
+
+Vector = NDArray[np.float64]
+Outcome = tuple[Vector, float, bool, bool, dict[str, Any]]
+
+__all__ = ["Environment"]
+
+_PICTURE = 4.8  # inches, of 100 pixels
+
+
+class _TaskEpisode:
+    """Episodes of a task."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.sim = task, task.sim
+        self.observations, self.steps, self.knot_time = task.observations, task.steps, task.knot_time
+        self.edge, self.kind = np.ones(task.sim.nu), np.float32
+        self.x, self._count = np.zeros((1, task.sim.nx)), task.steps
+
+    def reset(self, rng: np.random.Generator) -> Vector:
+        """To a first state."""
+        self.x[0], self._count = self.task.start(rng), 0
+        return self.task.observe(self.x)[0][0]
+
+    def step(self, action: Vector) -> Outcome:
+        """One action, held over the time steps of the task."""
+        task, before = self.task, self.x
+        if self._count >= task.steps:
+            raise RuntimeError("Environment.step: the episode is over; call reset()")
+        actions = np.asarray(action, dtype=np.float64).reshape(1, -1)
+        found = task.sim.step_batch(before, task.inputs(np.clip(actions, -1.0, 1.0)), task.substeps)
+        self._count += 1
+        self.x = found.x
+        reward, over = task.rewards(before, actions, self.x)[0][0], bool(task.ends(self.x)[0])
+        info = {} if found.success else {"message": found.message}
+        if found.success:
+            reward += task.survival * (not over)
+        else:
+            reward, over = 0.0, True
+        return task.observe(self.x)[0][0], float(reward), over, self._count >= task.steps, info
+
+    def state(self) -> Vector:
+        """The present one."""
+        return self.x[0]
+
+
+class _ProblemEpisode:
+    """Episodes of a problem: one is one horizon, a step is one of its knots."""
+
+    def __init__(self, problem: Problem, plant: Plant | None, sampler: Sampler | None) -> None:
+        self.problem = problem.with_own_terms()
+        self._plant = self.plant = Plant(problem.sim, problem.start) if plant is None else plant
+        self.sim, self.knot_time, self.steps, self._sampler = problem.sim, problem.knot_time, problem.horizon, sampler
+        self._substeps = round(problem.knot_time / self.plant.sim.time_step)
+        if abs(self._substeps * self.plant.sim.time_step - problem.knot_time) > 1e-9:
+            raise ValueError(
+                f"Environment(plant=...): expected a time step that divides a knot of {problem.knot_time:g} s, got "
+                f"{self.plant.sim.time_step:g} s"
+            )
+        self.observations, nu = problem.sim.nx, problem.sim.nu
+        lo, hi = problem.control_limits or (np.full(nu, -np.inf), np.full(nu, np.inf))
+        bounded = np.isfinite(lo) & np.isfinite(hi)
+        low, high = np.where(bounded, lo, -1.0), np.where(bounded, hi, 1.0)
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        self.edge, self.kind = np.where(bounded, 1.0, np.inf), np.float64
+        self._xs, self._us = np.tile(problem.start, (problem.horizon + 1, 1)), np.zeros((problem.horizon, nu))
+        self._knot = 0
+
+    def reset(self, rng: np.random.Generator) -> Vector:
+        """Back to the start, under another perturbation when there is a sampler."""
+        if self._sampler is not None:
+            self.plant = self._plant.perturbed(self._sampler(rng))
+        self.plant.reset()
+        self._knot = 0
+        self._xs[:] = self.plant.x
+        return self.plant.measure().copy()
+
+    def step(self, action: Vector) -> Outcome:
+        """One knot with the input held."""
+        t = self._knot
+        info: dict[str, Any] = {}
+        if t >= self.problem.horizon:
+            raise RuntimeError("Environment.step: the episode is over; call reset()")
+        chosen = checks.array("Environment.step(action)", action, (self.problem.sim.nu,))
+        self._us[t] = self._middle + self._half * chosen
+        for _ in range(self._substeps):
+            _, result = self.plant.step(self._us[t])
+            if not result.success:
+                info["message"] = result.message
+                break
+        self._knot = t + 1
+        self._xs[t + 1 :] = self.plant.x
+        if self.plant.fallen(self.plant.x):
+            info["message"] = "The robot has fallen."
+        over = self._knot == self.problem.horizon
+        reward = -self._cost(t) - (self._cost(t + 1) if over else 0.0)
+        if over:
+            info["violation"] = self.problem.violation(self._xs, self._us)
+        return self.plant.measure().copy(), reward, "message" in info, over, info
+
+    def _cost(self, knot: int) -> float:
+        """Cost of one knot."""
+        total = 0.0
+        for term in self.problem.costs:
+            term.update(self._xs, self._us)
+            rows = term.knots == knot
+            total += float(np.sum(term.weight[rows] * term.residual[rows] ** 2))
+        return total
+
+    def state(self) -> Vector:
+        """The present one."""
+        return self.plant.x
+
+
+class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
+    """A Task, or a Problem with a plant, for reinforcement learning.
+
+        task          observation, reward, end and number of steps are its own; actions in [-1, 1], beyond which inputs
+                      are limited, as by actuators; an unsolved step ends the episode with `info["message"]`
+        problem       one episode is one horizon, a step is one knot
+          observation   state x (nx,), measured
+          action        (nu,) in [-1, 1] between the problem's control limits; inputs [N, N m] where it has none
+          reward        minus the problem's costs at the knot, and with the last step those at the end
+          terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
+          truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
+
+    plant    of a problem, by default its own simulator from its start; its time step divides a knot. sampler: generator
+             -> Perturbation, drawn at every reset from the environment's seed. render_mode: None or "rgb_array".
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
+
+    def __init__(
+        self,
+        source: Task | Problem,
+        plant: Plant | None = None,
+        sampler: Sampler | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if gymnasium is None:
+            raise ImportError('dojo.Environment needs gymnasium: pip install "dojo-opt[gym]"')
+        if not isinstance(source, Task | Problem):
+            raise TypeError(f"Environment(source): expected a Task or a Problem, got {source!r}")
+        if plant is not None and not isinstance(plant, Plant):
+            raise TypeError(f"Environment(plant=...): expected a Plant, as Plant(simulator), got {plant!r}")
+        if sampler is not None and not callable(sampler):
+            raise TypeError(f"Environment(sampler=...): expected a function of a generator, got {sampler!r}")
+        if isinstance(source, Task) and not (plant is None and sampler is None):
+            raise ValueError("Environment(plant=..., sampler=...): a task has its own simulator and first states")
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f'Environment(render_mode=...): expected None or "rgb_array", got {render_mode!r}')
+        self.render_mode = render_mode
+        self._episode: _TaskEpisode | _ProblemEpisode = (
+            _TaskEpisode(source) if isinstance(source, Task) else _ProblemEpisode(source, plant, sampler)
+        )
+        e = self._episode
+        self.metadata = {**type(self).metadata, "render_fps": round(1.0 / e.knot_time)}
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (e.observations,), np.float64)
+        self.action_space = gymnasium.spaces.Box((-e.edge).astype(e.kind), e.edge.astype(e.kind), dtype=e.kind)
+
+    @property
+    def sim(self) -> Simulator:
+        """The simulator of the task, or of the problem."""
+        return self._episode.sim
+
+    @property
+    def problem(self) -> Problem:
+        """The problem; a ValueError where it is a task."""
+        if isinstance(self._episode, _TaskEpisode):
+            raise ValueError("Environment.problem: this is the environment of a task")
+        return self._episode.problem
+
+    @property
+    def plant(self) -> Plant:
+        """The plant of a problem, with the present perturbation; a ValueError where it is a task."""
+        if isinstance(self._episode, _TaskEpisode):
+            raise ValueError("Environment.plant: this is the environment of a task")
+        return self._episode.plant
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Vector, dict[str, Any]]:
+        """To a first state, drawn from the environment's seed."""
+        super().reset(seed=seed)
+        return self._episode.reset(self.np_random), {}
+
+    def step(self, action: Vector) -> Outcome:
+        """One action: (observation, reward, terminated, truncated, info)."""
+        return self._episode.step(action)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """A picture (480, 480, 3) of the robot, with render_mode="rgb_array"."""
+        if self.render_mode is None:
+            return None
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        from dojo_opt.plots.thumbnail import thumbnail
+
+        figure = thumbnail(self.sim.mechanism, self._episode.state()[: self.sim.nq], size=_PICTURE)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()

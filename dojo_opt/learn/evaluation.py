@@ -1,0 +1,75 @@
+"""Evaluation: returns of whole episodes under a policy without noise."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.randomisation import Drawn
+from sim.mechanism.checks import whole_number
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+__all__ = ["Evaluation", "evaluate"]
+
+
+class Evaluation(NamedTuple):
+    """Episodes under a policy."""
+
+    returns: Floats  # (n,) sums of rewards
+    lengths: Integers  # (n,) actions until they ended
+    unsolved: int  # episodes that ended with a step that was not solved
+    states: Floats  # (steps + 1, nx) of the first episode
+
+
+def evaluate(
+    policy: Policy,
+    episodes: int = 8,
+    seed: int = 0,
+    *,
+    substeps: int | None = None,
+    kappa: float | None = None,
+) -> Evaluation:
+    """Returns of episodes, all at once on all cores.
+
+    Args:
+        policy: a policy with a task.
+        episodes: number of episodes.
+        seed: of their first states.
+        substeps: time steps per action; those of the task by default.
+        kappa: smoothing [N s m]; that of the task by default.
+
+    Returns:
+        Evaluation; the same for the same seed.
+    """
+    task = policy.task
+    if task is None:
+        raise ValueError("evaluate(policy): expected a policy with a task")
+    count = whole_number("evaluate(episodes)", episodes)
+    model = Drawn.of(task)
+    if substeps is not None:
+        steps = whole_number("evaluate(substeps=...)", substeps)
+        model = Drawn(task.sim.replace(time_step=task.knot_time / steps, kappa=task.sim.kappa), steps, None, {}, 0.0)
+    xs = task.starts([np.random.default_rng((seed, i)) for i in range(count)])
+    returns, lengths, unsolved = np.zeros(count), np.zeros(count, dtype=np.int64), 0
+    alive, path = np.arange(count), [xs[0].copy()]
+    for _ in range(task.steps):
+        x = xs[alive]
+        actions = policy.actions(task.observe(x)[0])
+        found = model.sim.step_batch(x, task.inputs(actions), model.substeps, kappa=kappa)
+        bad = found.status != Status.SOLVED
+        over = task.ends(found.x)
+        returns[alive] += np.where(bad, 0.0, task.rewards(x, actions, found.x)[0] + task.survival * ~over)
+        lengths[alive] += ~bad
+        xs[alive], unsolved = found.x, unsolved + int(bad.sum())
+        if alive[0] == 0:
+            path.append(xs[0].copy())
+        alive = alive[~(bad | over)]
+        if not len(alive):
+            break
+    return Evaluation(returns, lengths, unsolved, np.array(path))

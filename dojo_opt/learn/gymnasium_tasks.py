@@ -1,0 +1,189 @@
+"""Tasks of Gymnasium, version 5: its models, observations, rewards, ends and limits, in this simulator.
+
+The models are the MJCF files in Gymnasium's own package. Where a random first state is below the ground, which is hard
+here, it is lifted onto it. Forces of contacts are neither observed nor paid for: the ant is the one of
+`include_cfrc_ext_in_observation=False, contact_cost_weight=0`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.randomisation import Randomisation
+from dojo_opt.learn.task import Task, never
+from sim.io.mjcf.load import load_mjcf
+from sim.io.mjcf.report import MjcfMechanism
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.stance import gaps
+from sim.simulator.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+__all__ = ["TRANSFER", "ant", "cartpole", "half_cheetah", "hopper", "pendulum", "walker2d"]
+
+_CLEARANCE = 1e-3  # [m] of lifted first states
+_KAPPA = 1e-4  # [N s m]
+_FASTEST = 10.0  # [m/s, rad/s] observed velocity of hopper and walker
+
+# Models on which policies of the half-cheetah learn to run in other simulators, too.
+TRANSFER = Randomisation(
+    values={"friction:*": (0.3, 0.5)},
+    factors={"spring": (0.8, 1.2), "damper": (0.6, 1.4), "armature": (0.85, 1.15), "mass": (0.9, 1.1)},
+    substeps=(2, 2, 3, 5),
+    kappa=(10.0**-3.5, 10.0**-1.7),
+    noise=0.05,
+)
+
+
+def _model(file: str) -> MjcfMechanism:
+    """A model of Gymnasium's package."""
+    found = find_spec("gymnasium")
+    if found is None or found.origin is None:
+        raise ImportError('tasks of Gymnasium read its models: pip install "dojo-opt[gym,mjcf]"')
+    return load_mjcf(Path(found.origin).parent / "envs" / "mujoco" / "assets" / file)
+
+
+def _starts(mech: Mechanism, height: int, position: float, velocity: Callable[..., Floats]) -> Callable[..., Floats]:
+    """First states: uniform noise of the coordinates, and the given one of the velocities (generator, nv)."""
+    home, quaternions = np.asarray(mech.neutral, dtype=np.float64), []
+    for joint in mech.joints:
+        if joint.nrot == 3:
+            stop = mech.q_slice(joint.name).stop
+            quaternions.append(slice(stop - 4, stop))
+
+    def start(rng: np.random.Generator) -> Floats:
+        q = home + rng.uniform(-position, position, len(home))
+        for part in quaternions:
+            q[part] /= np.linalg.norm(q[part])
+        v = velocity(rng, mech.nv)
+        least = min(gaps(mech, q), default=np.inf)
+        q[height] += max(_CLEARANCE - least, 0.0) if height >= 0 else 0.0
+        return np.concatenate([q, v])
+
+    return start
+
+
+def _tailed(skipped: int, nq: int, fastest: float) -> Callable[..., Any]:
+    """Observation of all coordinates but the first ones, and of velocities up to a limit."""
+
+    def observation(x, out):  # type: ignore[no-untyped-def]
+        for i in range(skipped, x.shape[0]):
+            out[i - skipped] = x[i] if i < nq else min(max(x[i], -fastest), fastest)
+
+    return observation
+
+
+def _runs(time: float, effort: float) -> Callable[..., Any]:
+    """Reward of the forward velocity, minus that of the effort."""
+
+    def reward(x, a, after):  # type: ignore[no-untyped-def]
+        total = (after[0] - x[0]) / time
+        for i in range(a.shape[0]):
+            total -= effort * a[i] * a[i]
+        return total
+
+    return reward
+
+
+def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -> Task:
+    """A task of a model, with its gears as limits."""
+    assert mech.report is not None
+    sim = Simulator(mech, time_step=time_step, kappa=_KAPPA)
+    return Task(sim, substeps, low=mech.report.low, high=mech.report.high, **fields)
+
+
+def half_cheetah() -> Task:
+    """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each."""
+    mech = _model("half_cheetah.xml")
+    return _task(
+        mech, 5, 0.01, observation=_tailed(1, mech.nq, np.inf), observations=17, reward=_runs(0.05, 0.1),
+        start=_starts(mech, 1, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), name="HalfCheetah",
+    )  # fmt: skip
+
+
+def hopper() -> Task:
+    """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each."""
+    mech = _model("hopper.xml")
+
+    def terminated(x):  # type: ignore[no-untyped-def]
+        for i in range(2, x.shape[0]):
+            if not abs(x[i]) < 100.0:
+                return True
+        return not (x[1] > 0.7 and abs(x[2]) < 0.2)
+
+    return _task(
+        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=11, reward=_runs(0.008, 1e-3),
+        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
+        name="Hopper",
+    )  # fmt: skip
+
+
+def walker2d() -> Task:
+    """Walker2d-v5: walk forward without falling; 17 observations, 6 actions, 0.008 s each."""
+    mech = _model("walker2d_v5.xml")
+
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not (0.8 < x[1] < 2.0 and abs(x[2]) < 1.0)
+
+    return _task(
+        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=17, reward=_runs(0.008, 1e-3),
+        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
+        name="Walker2d",
+    )  # fmt: skip
+
+
+def ant() -> Task:
+    """Ant-v5 without forces of contacts: run along x; 27 observations, 8 actions, 0.05 s each."""
+    mech = _model("ant.xml")
+
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not 0.2 <= x[2] <= 1.0
+
+    return _task(
+        mech, 5, 0.01, observation=_tailed(2, mech.nq, np.inf), observations=27, reward=_runs(0.05, 0.5),
+        start=_starts(mech, 2, 0.1, lambda rng, n: 0.1 * rng.standard_normal(n)), terminated=terminated, survival=1.0,
+        name="Ant",
+    )  # fmt: skip
+
+
+def cartpole() -> Task:
+    """InvertedPendulum-v5: balance a pole on a cart; 4 observations, 1 action, 0.04 s each."""
+    mech = _model("inverted_pendulum.xml")
+
+    def terminated(x):  # type: ignore[no-untyped-def]
+        return not abs(x[1]) <= 0.2
+
+    def reward(x, a, after):  # type: ignore[no-untyped-def]
+        return 0.0
+
+    return _task(
+        mech, 2, 0.02, observation=_tailed(0, mech.nq, np.inf), observations=4, reward=reward,
+        start=_starts(mech, -1, 0.01, lambda rng, n: rng.uniform(-0.01, 0.01, n)), terminated=terminated, survival=1.0,
+        name="Cartpole",
+    )  # fmt: skip
+
+
+def pendulum() -> Task:
+    """Pendulum-v1: swing up with little torque; 3 observations, 1 action, 0.05 s each. Speed has no limit here."""
+    rod = Body("rod", 1.0, (1.0 / 12.0, 1.0 / 12.0, 1e-3))
+    pivot = Joint("revolute", None, "rod", child_point=(0.0, 0.0, -0.5), axis=(0.0, 1.0, 0.0), name="pivot")
+    mech = Mechanism([rod], [pivot], [], [Input("pivot")], gravity=(0.0, 0.0, -10.0), name="pendulum")
+
+    def observation(x, out):  # type: ignore[no-untyped-def]
+        out[0], out[1], out[2] = np.cos(x[0]), np.sin(x[0]), x[1]
+
+    def reward(x, a, after):  # type: ignore[no-untyped-def]
+        angle = (x[0] + np.pi) % (2.0 * np.pi) - np.pi
+        return -(angle**2) - 0.1 * x[1] ** 2 - 0.001 * (2.0 * a[0]) ** 2
+
+    return Task(
+        Simulator(mech, time_step=0.05), 1, observation, 3, reward, np.array([-2.0]), np.array([2.0]),
+        lambda rng: rng.uniform([-np.pi, -1.0], [np.pi, 1.0]), never, steps=200, name="Pendulum",
+    )  # fmt: skip

@@ -1,0 +1,94 @@
+"""Policy: a function from states to inputs, compiled for one state and in NumPy for many."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.learn.network import Network, number_of, perceptron
+from dojo_opt.learn.task import Task
+from sim.mechanism import checks
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Policy"]
+
+_SPAN = 10.0  # standard deviations: scaled observations beyond are cut off, without a derivative
+
+
+@dataclass
+class Policy:
+    """a = s(network((o - mean) / deviation)), where s is tanh, or a clamp to [-1, 1] of linear policies.
+
+        u = policy(x)                                               an input (nu,) [N, N m] for a state
+        dojo.closed_loop(policy.controller, plant, 10.0, control_step=policy.task.knot_time)
+
+    Attributes:
+        network: shape of the network.
+        weights: (network.count,) its weights.
+        mean: (no,) of observations.
+        deviation: (no,) of observations, above 0.
+        task: the Task; not saved.
+    """
+
+    network: Network
+    weights: Floats
+    mean: Floats
+    deviation: Floats
+    task: Task | None = field(default=None, repr=False)
+
+    def scaled(self, observations: Floats) -> Floats:
+        """Scaled and limited to ten standard deviations."""
+        return np.clip((observations - self.mean) / self.deviation, -_SPAN, _SPAN)
+
+    @property
+    def linear(self) -> bool:
+        """Whether the network has no hidden layer."""
+        return len(self.network.sizes) == 2
+
+    def actions(self, observations: Floats) -> Floats:
+        """(n, nu) actions of rows of observations."""
+        y = self.network.forward(self.weights, self.scaled(observations))[0]
+        return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
+
+    def action(self, observation: Floats) -> Floats:
+        """(nu,) action of one observation."""
+        sizes, work = self._buffers
+        first = perceptron(sizes, self.weights, number_of(self.network.activation), self.scaled(observation), work)
+        y = work[first : first + sizes[-1]]
+        return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
+
+    def __call__(self, x: ArrayLike) -> Floats:
+        """Input (nu,) for a state (nx,)."""
+        if self.task is None:
+            raise ValueError("Policy(x): a loaded policy has no task; Policy.load(path, task)")
+        state = checks.array("Policy(x)", x, (self.task.sim.nx,))
+        return self.task.inputs(self.action(self.task.observe(state[None])[0][0]))
+
+    def controller(self, time: float, x: Floats) -> Floats:
+        """As `dojo.closed_loop` takes a controller."""
+        return self(x)
+
+    @cached_property
+    def _buffers(self) -> tuple[Any, Floats]:
+        sizes = np.array(self.network.sizes, dtype=np.int64)
+        return sizes, np.zeros(2 * max(self.network.sizes))
+
+    def save(self, path: str | Path) -> None:
+        """Write the policy to an .npz file, which NumPy reads without this package."""
+        shape = json.dumps({"sizes": self.network.sizes, "activation": self.network.activation})
+        np.savez(path, network=shape, weights=self.weights, mean=self.mean, deviation=self.deviation)
+
+    @classmethod
+    def load(cls, path: str | Path, task: Task | None = None) -> Policy:
+        """Read a file that `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            shape = json.loads(str(data["network"]))
+            network = Network(tuple(shape["sizes"]), shape["activation"])
+            return cls(network, data["weights"], data["mean"], data["deviation"], task)

@@ -1,0 +1,181 @@
+"""Motions of many rows under a policy, and the gradient of their rewards by its weights and the first states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.network import Network
+from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.randomisation import Drawn
+from dojo_opt.learn.task import Task
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+__all__ = ["Noise", "PolicyGradient", "PolicyRollout", "roll_policy_batch"]
+
+_SPAN = 10.0  # as in policy.py
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of a rollout: before the squashing of actions, and of scaled observations."""
+
+    actions: Floats  # (T, n, nu)
+    observations: Floats  # (T, n, no)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviations: tuple[float, float]) -> Noise:
+        """Normal, with the deviations of actions and observations."""
+        actions = deviations[0] * rng.standard_normal((*shape, task.sim.nu))
+        return cls(actions, deviations[1] * rng.standard_normal((*shape, task.observations)))
+
+
+@dataclass(frozen=True)
+class PolicyGradient:
+    """Gradient of sum_t,i w_ti r_ti + ... of a rollout."""
+
+    weights: Floats  # (count,) by the weights of the policy
+    states: Floats  # (n, ndx) by the first states
+    clipped: int  # costates of a row and step that were longer than the limit
+    largest: float  # costate before the limit
+
+
+class PolicyRollout:
+    """A rollout (T steps, n rows), and what its derivatives need.
+
+    x            (T + 1, n, nx) states; where a row started anew, its new state
+    after        (T, n, nx) states after each step
+    actions      (T, n, nu); rewards (T, n)
+    terminated   (T, n) the episode has ended there; unsolved (T, n) the step was not solved, and has no reward
+    cut          (T, n) the next step starts from another state: of both, and of episodes that were cut off
+    """
+
+    def __init__(self, policy: Policy, steps: int, rows: int) -> None:
+        assert policy.task is not None
+        self.policy, self.task = policy, policy.task
+        sim = self.task.sim
+        self.x = np.zeros((steps + 1, rows, sim.nx))
+        self.after = np.zeros((steps, rows, sim.nx))
+        self.observations = np.zeros((steps, rows, self.task.observations))
+        self.actions, self.rewards = np.zeros((steps, rows, sim.nu)), np.zeros((steps, rows))
+        self.terminated, self.unsolved, self.cut = (np.zeros((steps, rows), dtype=np.bool_) for _ in range(3))
+        self._slopes: list[tuple[Floats, ...]] = []
+        self._inside: list[Flags] = []
+        self._kept: list[list[Floats]] = []
+
+    def act(self, t: int, noise: Noise | None, slopes: bool) -> Floats:
+        """The actions (n, nu) of step t; returns the derivatives of the observations."""
+        policy = self.policy
+        self.observations[t], rates = self.task.observe(self.x[t], slopes)
+        scaled = (self.observations[t] - policy.mean) / policy.deviation
+        if noise is not None:
+            scaled = scaled + noise.observations[t]
+        y, kept = policy.network.forward(policy.weights, np.clip(scaled, -_SPAN, _SPAN))
+        if noise is not None:
+            y = y + noise.actions[t]
+        self.actions[t] = np.clip(y, -1.0, 1.0) if policy.linear else np.tanh(y)
+        if slopes:
+            self._inside.append(np.abs(scaled) < _SPAN)
+            self._kept.append(kept)
+        return rates
+
+    def keep(self, *slopes: Floats) -> None:
+        """Keep the derivatives of a step: observation, A, B, reward."""
+        self._slopes.append(slopes)
+
+    def gradient(self, weights: Floats, ends: Floats | None = None, limit: float = np.inf) -> PolicyGradient:
+        """Gradient of sum_t,i weights_ti r_ti + sum_t,i e_ti(after_ti), by one sweep from the end.
+
+            l_t = A_t^T m_t + dr/dx + O_t^T dL/do_t,    m_t = l_t+1 + dr/dx' + e_t',    dL/da_t = B_t^T m_t + dr/da
+
+        Args:
+            weights: (T, n) of the rewards.
+            ends: (T, n, ndx) derivatives e' of further terms by the states after the steps.
+            limit: length of the costate l of a row, beyond which it is shortened.
+        """
+        policy, ndx, nu = self.policy, self.task.sim.ndx, self.task.sim.nu
+        rows = self.x.shape[1]
+        costate, out, clipped, largest = np.zeros((rows, ndx)), np.zeros(policy.network.count), 0, 0.0
+        half = 0.5 * (self.task.high - self.task.low)
+        for t in range(len(self.actions) - 1, -1, -1):
+            rates, A, B, reward = self._slopes[t]
+            costate[self.cut[t]] = 0.0
+            scale = np.where(self.unsolved[t], 0.0, weights[t])[:, None]
+            after = costate + scale * reward[:, ndx + nu :]
+            if ends is not None:
+                after += ends[t]
+            by_action = half * np.matmul(after[:, None], B)[:, 0] + scale * reward[:, ndx : ndx + nu]
+            costate = np.matmul(after[:, None], A)[:, 0] + scale * reward[:, :ndx]
+            a = self.actions[t]
+            by_output = by_action * (np.abs(a) < 1.0 if policy.linear else 1.0 - a**2)
+            by_scaled = policy.network.backward(policy.weights, self._kept[t], by_output, out)
+            costate += np.matmul((by_scaled * self._inside[t] / policy.deviation)[:, None], rates)[:, 0]
+            length = np.sqrt(np.einsum("ni,ni->n", costate, costate))
+            largest = max(largest, float(length.max(initial=0.0)))
+            long = length > limit
+            clipped += int(long.sum())
+            costate[long] *= (limit / length[long])[:, None]
+        return PolicyGradient(out, costate, clipped, largest)
+
+
+def roll_policy_batch(
+    policy: Policy,
+    starts: Floats,
+    steps: int,
+    *,
+    drawn: Drawn | None = None,
+    noise: Noise | None = None,
+    slopes: bool = False,
+    kappa_grad: float | None = None,
+    restart: Callable[[int, Flags, Flags, Floats], Flags] | None = None,
+) -> PolicyRollout:
+    """Rows under a policy, each from its own state, on all cores.
+
+    Args:
+        policy: a policy with a task.
+        starts: (n, nx) first states.
+        steps: actions of each row.
+        drawn: models of the rows; that of the task by default.
+        noise: of actions and observations; none by default.
+        slopes: whether `gradient` will be asked for.
+        kappa_grad: smoothing of the derivatives [N s m]; that of the motion by default.
+        restart: function of (step, terminated (n,), unsolved (n,), states (n, nx)) that replaces the states of rows
+            that start anew, and returns which these are (n,); by default rows go on, unsolved ones stand still.
+    """
+    task = policy.task
+    if task is None:
+        raise ValueError("roll_policy_batch(policy): expected a policy with a task")
+    model = Drawn.of(task) if drawn is None else drawn
+    out = PolicyRollout(policy, steps, len(starts))
+    out.x[0] = starts
+    one_pass = slopes and kappa_grad is None
+    for t in range(steps):
+        rates = out.act(t, noise, slopes)
+        x, inputs = out.x[t], task.inputs(out.actions[t])
+        found = model.sim.step_batch(x, inputs, model.substeps, one_pass, model.kappa, model.parameters)
+        A, B, unsolved = found.A, found.B, found.status != Status.SOLVED
+        if slopes and not one_pass:
+            smooth = model.sim.step_batch(x, inputs, model.substeps, True, kappa_grad, model.parameters)
+            A, B, unsolved = smooth.A, smooth.B, unsolved | (smooth.status != Status.SOLVED)
+        out.after[t] = out.x[t + 1] = found.x
+        out.rewards[t], by_reward = task.rewards(x, out.actions[t], found.x, slopes)
+        out.terminated[t], out.unsolved[t] = task.ends(found.x), unsolved
+        out.rewards[t] += task.survival * ~out.terminated[t]
+        out.rewards[t, unsolved] = 0.0
+        if slopes:
+            out.keep(rates, A, B, by_reward)
+        out.cut[t] = unsolved
+        if restart is not None:
+            out.cut[t] |= restart(t, out.terminated[t], unsolved, out.x[t + 1])
+    return out
+
+
+def value_network(task: Task, hidden: tuple[int, ...], activation: str) -> Network:
+    """The shape of a critic."""
+    return Network((task.observations, *hidden, 1), activation)

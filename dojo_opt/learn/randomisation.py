@@ -1,0 +1,102 @@
+"""Randomisation: models that a policy learns on, drawn around that of a task."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.task import Task
+from sim.mechanism import checks
+from sim.simulator.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Models", "Randomisation"]
+
+
+@dataclass(frozen=True)
+class Randomisation:
+    """Ranges that models are drawn from, uniformly; with none, all rows have that of the task.
+
+    Attributes:
+        values: {parameter: (low, high)}; one value for all its components, of names as in `Simulator.parameters`.
+        factors: {parameter: (low, high)}; one factor on all its components.
+        substeps: time steps per action; one is chosen for all rows of an epoch (default (): those of the task).
+        kappa: (low, high) of the smoothing [N s m], drawn by row and epoch, logarithmically (default None).
+        noise: of observations, in their standard deviations (default 0).
+        models: number of models per choice of substeps (default 16).
+    """
+
+    values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    factors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    substeps: tuple[int, ...] = ()
+    kappa: tuple[float, float] | None = None
+    noise: float = 0.0
+    models: int = 16
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in {**self.values, **self.factors}.items():
+            if not low <= high:
+                raise ValueError(f"Randomisation: {name!r}: expected low <= high, got {low} and {high}")
+        if set(self.values) & set(self.factors):
+            raise ValueError("Randomisation(values=..., factors=...): a parameter is in both")
+        for count in self.substeps:
+            checks.whole_number("Randomisation(substeps=...)", count)
+        if self.kappa is not None and not 0.0 < self.kappa[0] <= self.kappa[1]:
+            raise ValueError(f"Randomisation(kappa=...): expected 0 < low <= high, got {self.kappa}")
+        checks.number("Randomisation(noise=...)", self.noise, at_least=0.0)
+        checks.whole_number("Randomisation(models=...)", self.models)
+
+
+class Models:
+    """The models of a randomisation, and those of the rows of an epoch."""
+
+    def __init__(self, task: Task, randomisation: Randomisation, rng: np.random.Generator) -> None:
+        self._task, self._given = task, randomisation
+        self._choices = randomisation.substeps or (task.substeps,)
+        sim, count = task.sim, randomisation.models
+        self._sims: dict[int, Simulator] = {}
+        self._tables: dict[int, dict[str, Floats]] = {}
+        for substeps in dict.fromkeys(self._choices):
+            self._sims[substeps] = sim.replace(time_step=task.knot_time / substeps, kappa=sim.kappa)
+            table = {}
+            for name, (low, high) in randomisation.values.items():
+                size = len(sim.parameters((name,)).values)
+                table[name] = np.repeat(rng.uniform(low, high, (count, 1)), size, axis=1)
+            for name, (low, high) in randomisation.factors.items():
+                table[name] = rng.uniform(low, high, (count, 1)) * sim.parameters((name,)).values
+            self._tables[substeps] = table
+
+    def draw(self, rng: np.random.Generator, rows: int) -> Drawn:
+        """The models of an epoch."""
+        substeps = int(rng.choice(self._choices))
+        chosen = rng.integers(self._given.models, size=rows)
+        kappa = None
+        if self._given.kappa is not None:
+            kappa = np.exp(rng.uniform(*np.log(self._given.kappa), size=rows))
+        parameters = {name: table[chosen] for name, table in self._tables[substeps].items()}
+        return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The models of the rows of a batch."""
+
+    sim: Simulator
+    substeps: int
+    kappa: Floats | None  # (n,)
+    parameters: Mapping[str, Floats]  # each (n, components)
+    noise: float
+
+    def rows(self, chosen: NDArray[np.int64]) -> Drawn:
+        """Those of some rows."""
+        kappa = None if self.kappa is None else self.kappa[chosen]
+        return replace(self, kappa=kappa, parameters={name: table[chosen] for name, table in self.parameters.items()})
+
+    @classmethod
+    def of(cls, task: Task) -> Drawn:
+        """That of the task, for all rows."""
+        return cls(task.sim, task.substeps, None, {}, 0.0)

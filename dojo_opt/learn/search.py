@@ -1,0 +1,337 @@
+"""Search over the weights of a policy by whole episodes: random directions, and the gradient of the return.
+
+    ars               w += rate / (b s) sum over the b best of N directions d of (R(w + noise d) - R(w - noise d)) d
+    gradient_search   w += rate / |g|   g,   g the mean gradient of the return of n rows
+
+ARS is V2-t of Mania, Guy and Recht 2018 (arXiv 1803.07055), s the standard deviation of the 2b returns; the other is
+the gradient search of Dojo (arXiv 2203.00806), here with the derivatives of the closed loop, and the 2-norm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.evaluation import evaluate
+from dojo_opt.learn.learned import Learned, Progress
+from dojo_opt.learn.network import Network
+from dojo_opt.learn.observation_statistics import ObservationStatistics
+from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy_rollout import roll_policy_batch
+from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
+from dojo_opt.learn.task import Task
+from sim.mechanism import checks
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+
+__all__ = ["GradientSearchOptions", "RandomSearchOptions", "ars", "gradient_search"]
+
+
+@dataclass(frozen=True)
+class RandomSearchOptions:
+    """Settings of `ars`.
+
+    Attributes:
+        epochs: number of updates (default 100).
+        directions: N of them per update, with two rollouts each (default 32).
+        best: b of them that are used (default 4).
+        rate: step of an update (default 0.02).
+        noise: size of a direction (default 0.03).
+        horizon: control steps of a rollout (default None: those of the task).
+        hidden: sizes of hidden layers (default (): a linear policy).
+        activation: "tanh" or "elu" (default "tanh").
+        shift: subtracted from the reward of every step, against the reward of mere survival (default 0).
+        randomisation: models that the policy learns on (default: that of the task).
+        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        episodes: of an evaluation (default 8).
+        time_limit: of the processor time [s] (default inf).
+        callback: function of the record of each epoch; it may raise StopIteration to end (default None).
+        verbose: whether to print one line per evaluation (default False).
+        stream: file for these lines (default None: the standard output).
+    """
+
+    epochs: int = 100
+    directions: int = 32
+    best: int = 4
+    rate: float = 0.02
+    noise: float = 0.03
+    horizon: int | None = None
+    hidden: tuple[int, ...] = ()
+    activation: str = "tanh"
+    shift: float = 0.0
+    randomisation: Randomisation = Randomisation()
+    evaluations: int = 10
+    episodes: int = 8
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
+    verbose: bool = False
+    stream: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "directions", "best", "episodes"):
+            checks.whole_number(f"ars({name}=...)", getattr(self, name))
+        if self.best > self.directions:
+            raise ValueError(f"ars(best=...): expected at most {self.directions}, as directions, got {self.best}")
+
+
+@dataclass(frozen=True)
+class GradientSearchOptions:
+    """Settings of `gradient_search`.
+
+    Attributes:
+        epochs: number of updates (default 100).
+        environments: rows of the batch, whose gradients are averaged (default 8).
+        rate: length of an update (default 0.05).
+        horizon: control steps of a rollout (default None: those of the task).
+        hidden: sizes of hidden layers (default (): a linear policy).
+        activation: "tanh" or "elu" (default "tanh").
+        costate: largest length of the costate of a row; longer ones are shortened and counted (default 1e3).
+        kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
+        randomisation: models that the policy learns on (default: that of the task).
+        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        episodes: of an evaluation (default 8).
+        time_limit: of the processor time [s] (default inf).
+        callback: function of the record of each epoch; it may raise StopIteration to end (default None).
+        verbose: whether to print one line per evaluation (default False).
+        stream: file for these lines (default None: the standard output).
+    """
+
+    epochs: int = 100
+    environments: int = 8
+    rate: float = 0.05
+    horizon: int | None = None
+    hidden: tuple[int, ...] = ()
+    activation: str = "tanh"
+    costate: float = 1e3
+    kappa_grad: float | None = None
+    randomisation: Randomisation = Randomisation()
+    evaluations: int = 10
+    episodes: int = 8
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
+    verbose: bool = False
+    stream: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "environments", "episodes"):
+            checks.whole_number(f"gradient_search({name}=...)", getattr(self, name))
+        checks.number("gradient_search(costate=...)", self.costate, above=0.0)
+
+
+class Search:
+    """A policy that moves, its random numbers, and its record."""
+
+    algorithm = ""
+
+    def __init__(self, task: Task, options: Any, seed: int) -> None:
+        self.task, self.options, self.seed = task, options, seed
+        self.rng = np.random.default_rng((seed, 1))
+        self.models = Models(task, options.randomisation, np.random.default_rng((seed, 3)))
+        network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
+        n = task.observations
+        weights = network.start(np.random.default_rng((seed, 0)), 0.1) if options.hidden else np.zeros(network.count)
+        self.policy = Policy(network, weights, np.zeros(n), np.ones(n), task)
+        self.statistics = ObservationStatistics(n)
+        self.horizon = task.steps if options.horizon is None else options.horizon
+        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+        self.chosen = self.policy
+
+    def train(self) -> dict[str, Any]:
+        """One update: its record, without an evaluation."""
+        self.policy.mean[:], self.policy.deviation[:] = self.statistics.sums[0], self.statistics.deviation()
+        found, length, share = self.update()
+        self.epoch += 1
+        return {
+            "epoch": self.epoch, "steps": self.steps, "return": found, "evaluated": None, "gradient": length,
+            "clipped": share, "unsolved": self.unsolved, "infinite": self.infinite,
+        }  # fmt: skip
+
+    def update(self) -> tuple[float, float, float]:
+        """Move the policy: (mean return, length of the gradient, share of clipped costates)."""
+        raise NotImplementedError
+
+    def assess(self) -> float:
+        """Mean return of the present policy, which is kept if it is the best."""
+        p = self.policy
+        policy = Policy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
+        found = float(evaluate(policy, self.options.episodes, self.seed).returns.mean())
+        if found > self.best:
+            self.best, self.chosen = found, policy
+        return found
+
+    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best")
+
+    def state(self) -> dict[str, Any]:
+        """All that `resume` needs."""
+        out: dict[str, Any] = {name: getattr(self, name) for name in self._NUMBERS}
+        out |= {"weights": self.policy.weights.copy(), "sums": self.statistics.sums.copy()}
+        return out | {"rng": self.rng.bit_generator.state}
+
+    def resume(self, learned: Learned) -> None:
+        """Go on where a run ended."""
+        for name in self._NUMBERS:
+            setattr(self, name, learned.state[name])
+        self.policy.weights[:], self.statistics.sums[:] = learned.state["weights"], learned.state["sums"]
+        self.rng.bit_generator.state = learned.state["rng"]
+        p = learned.policy
+        self.chosen = Policy(p.network, p.weights, p.mean, p.deviation, self.task)
+
+
+class RandomSearch(Search):
+    """ARS."""
+
+    algorithm = "ars"
+
+    def update(self) -> tuple[float, float, float]:
+        """As Search.update; a pair shares its first state and its model."""
+        o, policy = self.options, self.policy
+        directions = self.rng.standard_normal((o.directions, policy.network.count))
+        x = self.task.starts([self.rng] * o.directions)
+        drawn = self.models.draw(self.rng, o.directions)
+        pairs = np.concatenate([np.arange(o.directions)] * 2)
+        signs = np.repeat([1.0, -1.0], o.directions)[:, None]
+        found = self._returns(policy.weights + signs * o.noise * directions[pairs], x[pairs], drawn.rows(pairs))
+        ahead, back = found[: o.directions], found[o.directions :]
+        best = np.argsort(-np.maximum(ahead, back), kind="stable")[: o.best]
+        spread = float(np.concatenate([ahead[best], back[best]]).std())
+        step = ((ahead - back)[best] @ directions[best]) / (o.best * max(spread, 1e-9))
+        if np.all(np.isfinite(step)):
+            policy.weights += o.rate * step
+        else:
+            self.infinite += 1
+        return float(found.mean()), float(np.linalg.norm(step)), 0.0
+
+    def _returns(self, weights: Floats, xs: Floats, drawn: Drawn) -> Floats:
+        """(n,) returns of rows with their own weights; observations are counted."""
+        task, policy, o = self.task, self.policy, self.options
+        out, alive, x = np.zeros(len(xs)), np.arange(len(xs)), np.array(xs)
+        layers = [policy.network.layers(w) for w in weights]
+        stacked = [(np.array([w[k][0] for w in layers]), np.array([w[k][1] for w in layers])) for k in range(len(layers[0]))]
+        for _ in range(self.horizon):
+            here, rows = x[alive], drawn.rows(alive)
+            seen = task.observe(here)[0]
+            self.statistics.add(seen)
+            y = policy.scaled(seen)
+            for k, (W, b) in enumerate(stacked):
+                y = np.matmul(y[:, None], W[alive])[:, 0] + b[alive]
+                if k < len(stacked) - 1:
+                    y = np.tanh(y) if o.activation == "tanh" else np.where(y > 0, y, np.expm1(np.minimum(y, 0.0)))
+            actions = np.clip(y, -1.0, 1.0) if policy.linear else np.tanh(y)
+            found = rows.sim.step_batch(here, task.inputs(actions), rows.substeps, False, rows.kappa, rows.parameters)
+            bad, over = found.status != Status.SOLVED, task.ends(found.x)
+            rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - o.shift
+            out[alive] += np.where(bad, 0.0, rewards)
+            x[alive] = found.x
+            self.steps, self.unsolved = self.steps + len(alive), self.unsolved + int(bad.sum())
+            alive = alive[~(bad | over)]
+            if not len(alive):
+                break
+        return out
+
+
+class GradientSearch(Search):
+    """Gradient search."""
+
+    algorithm = "gradient_search"
+
+    def update(self) -> tuple[float, float, float]:
+        """As Search.update; a row ends with its episode."""
+        o, task, policy = self.options, self.task, self.policy
+        x = task.starts([self.rng] * o.environments)
+        drawn = self.models.draw(self.rng, o.environments)
+        roll = roll_policy_batch(policy, x, self.horizon, drawn=drawn, slopes=True, kappa_grad=o.kappa_grad)
+        over = np.logical_or.accumulate(roll.terminated | roll.unsolved, axis=0)
+        weights = np.ones_like(roll.rewards)
+        weights[1:] = ~over[:-1]
+        self.steps += int(weights.sum())
+        self.unsolved += int((roll.unsolved & (weights > 0.0)).sum())
+        found = roll.gradient(weights / o.environments, limit=o.costate)
+        self.statistics.add(roll.observations[weights > 0.0])
+        length = float(np.linalg.norm(found.weights))
+        if np.isfinite(length):
+            policy.weights += o.rate / max(length, 1e-9) * found.weights
+        else:
+            self.infinite += 1
+        return float((weights * roll.rewards).sum() / o.environments), length, found.clipped / weights.size
+
+
+def run_search(search: Search, resume: Learned | None) -> Learned:
+    """All epochs of a search."""
+    o, name = search.options, search.algorithm
+    if resume is not None:
+        if resume.algorithm != name or resume.seed != search.seed or (
+            resume.state["weights"].shape != search.policy.weights.shape
+        ):  # fmt: skip
+            raise ValueError(f"{name}(resume=...): expected a run with seed {search.seed} and this policy, got {resume!r}")
+        search.resume(resume)
+    progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
+    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
+    status, state = Status.SOLVED, search.state()
+    try:
+        while search.epoch < o.epochs and status == Status.SOLVED:
+            record = search.train()
+            if search.epoch in marks:
+                record["evaluated"] = search.assess()
+            state = search.state()
+            status = progress.add(**record)
+    except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
+        status = Status.INTERRUPTED
+    success = search.epoch == o.epochs
+    if not np.isfinite(search.best):
+        search.assess()
+    status = Status.SOLVED if success else status
+    return Learned(
+        search.chosen, success, status, progress.message(status), name, search.seed, search.best, search.steps,
+        search.unsolved, search.infinite, progress.seconds, progress.records, state,
+    )  # fmt: skip
+
+
+def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
+    """Augmented random search, without derivatives: see the module, and `RandomSearchOptions` for the options.
+
+    Args:
+        task: what to learn.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        resume: a run to go on with, of the same task, seed and options.
+        **options: fields of `RandomSearchOptions`.
+
+    Returns:
+        Learned, with the best of the evaluated policies.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a value out of range, or a run that does not fit.
+    """
+    if not isinstance(task, Task):
+        raise TypeError(f"ars(task): expected a Task, got {task!r}")
+    checks.keywords("ars(...)", options, [f.name for f in fields(RandomSearchOptions)])
+    number = checks.whole_number("ars(seed=...)", seed, 0)
+    return run_search(RandomSearch(task, RandomSearchOptions(**options), number), resume)
+
+
+def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
+    """Ascend the gradient of the return of whole episodes: see the module, and `GradientSearchOptions`.
+
+    Args:
+        task: what to learn.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        resume: a run to go on with, of the same task, seed and options.
+        **options: fields of `GradientSearchOptions`.
+
+    Returns:
+        Learned, with the best of the evaluated policies.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a value out of range, or a run that does not fit.
+    """
+    if not isinstance(task, Task):
+        raise TypeError(f"gradient_search(task): expected a Task, got {task!r}")
+    checks.keywords("gradient_search(...)", options, [f.name for f in fields(GradientSearchOptions)])
+    number = checks.whole_number("gradient_search(seed=...)", seed, 0)
+    return run_search(GradientSearch(task, GradientSearchOptions(**options), number), resume)

@@ -1,0 +1,323 @@
+"""SHAC: short-horizon actor-critic, with the derivatives of the simulator (Xu et al. 2022, arXiv 2204.07137).
+
+    L(weights) = -1/(n H) sum_i [ sum_t gamma^t r_t + gamma^H V(x_H) ],   V trained on TD(lambda) returns
+
+A row of the batch goes on where the last epoch left it; the sums start anew where its episode ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.evaluation import evaluate
+from dojo_opt.learn.learned import Learned, Progress
+from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
+from dojo_opt.learn.observation_statistics import ObservationStatistics
+from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
+from dojo_opt.learn.randomisation import Models, Randomisation
+from dojo_opt.learn.task import Task
+from sim.mechanism import checks
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+__all__ = ["ShacOptions", "shac"]
+
+
+@dataclass(frozen=True)
+class ShacOptions:
+    """Settings of `shac`.
+
+    Attributes:
+        epochs: number of epochs; each is one rollout of the batch and one step of the policy (default 900).
+        environments: rows of the batch (default 64).
+        horizon: control steps of an epoch (default 16).
+        hidden: sizes of the hidden layers of policy and critic (default (64, 64)).
+        activation: "tanh" or "elu" (default "tanh").
+        gamma: discount of a control step (default 0.99).
+        trace: lambda of TD(lambda) (default 0.95).
+        rate: first learning rate of the policy, falling linearly to zero (default 1e-3).
+        critic_rate: learning rate of the critic (default 2e-3).
+        betas: of Adam (default (0.7, 0.95)).
+        norm: largest length of the gradient (default 1).
+        costate: largest length of the costate of a row; longer ones are shortened and counted (default 100).
+        deviation: first and last standard deviation of the noise of actions, before they are squashed (default .4, .3).
+        passes: passes of the critic over the data of an epoch (default 4).
+        batches: minibatches per pass (default 4).
+        blend: share of the critic in its target network after an epoch (default 0.3).
+        randomisation: models that the policy learns on (default: that of the task).
+        kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
+        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
+        episodes: of an evaluation (default 8).
+        time_limit: of the processor time [s] (default inf).
+        callback: function of the record of each epoch; it may raise StopIteration to end (default None).
+        verbose: whether to print one line per evaluation (default False).
+        stream: file for these lines (default None: the standard output).
+    """
+
+    epochs: int = 900
+    environments: int = 64
+    horizon: int = 16
+    hidden: tuple[int, ...] = (64, 64)
+    activation: str = "tanh"
+    gamma: float = 0.99
+    trace: float = 0.95
+    rate: float = 1e-3
+    critic_rate: float = 2e-3
+    betas: tuple[float, float] = (0.7, 0.95)
+    norm: float = 1.0
+    costate: float = 100.0
+    deviation: tuple[float, float] = (0.4, 0.3)
+    passes: int = 4
+    batches: int = 4
+    blend: float = 0.3
+    randomisation: Randomisation = Randomisation()
+    kappa_grad: float | None = None
+    evaluations: int = 10
+    episodes: int = 8
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
+    verbose: bool = False
+    stream: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "environments", "horizon", "passes", "batches", "episodes"):
+            checks.whole_number(f"shac({name}=...)", getattr(self, name))
+        checks.whole_number("shac(evaluations=...)", self.evaluations, 0)
+        checks.one_of("shac(activation=...)", self.activation, ACTIVATIONS)
+        for name in ("gamma", "trace", "blend"):
+            checks.share(f"shac({name}=...)", getattr(self, name))
+        for name in ("rate", "critic_rate", "norm", "costate"):
+            checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        if not isinstance(self.randomisation, Randomisation):
+            raise TypeError(f"shac(randomisation=...): expected a Randomisation, got {self.randomisation!r}")
+
+
+class _Shac:
+    """Policy, critic, environments and random numbers of a run."""
+
+    def __init__(self, task: Task, options: ShacOptions, seed: int) -> None:
+        self.task, self.options, self.seed = task, options, seed
+        o, rng = options, np.random.default_rng((seed, 0))
+        self.rng, self.restarts = np.random.default_rng((seed, 1)), np.random.default_rng((seed, 2))
+        self.models = Models(task, o.randomisation, np.random.default_rng((seed, 3)))
+        network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
+        self.critic = value_network(task, o.hidden, o.activation)
+        self.policy = Policy(network, network.start(rng, 0.1), *self._scale(None), task)
+        self.value = self.critic.start(rng)
+        self.target = self.value.copy()
+        self.actor_adam, self.critic_adam = Adam(network.count, o.betas), Adam(self.critic.count, o.betas)
+        self.statistics = ObservationStatistics(task.observations)
+        self.x = task.starts([self.restarts] * o.environments)
+        self.age = self.restarts.integers(task.steps, size=o.environments)
+        self.running, self.known = np.zeros(o.environments), np.zeros(o.environments, dtype=np.bool_)
+        self.finished: list[float] = []
+        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+        self.chosen = self.policy
+        self.statistics.add(task.observe(self.x)[0])
+
+    def _scale(self, statistics: ObservationStatistics | None) -> tuple[Floats, Floats]:
+        """(mean, deviation) of observations."""
+        n = self.task.observations
+        return (np.zeros(n), np.ones(n)) if statistics is None else (statistics.sums[0].copy(), statistics.deviation())
+
+    # -- values --------------------------------------------------------------------------------------------------------
+
+    def values(self, weights: Floats, states: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
+        """(V (n,) of states (n, nx), dV/dx (n, ndx) or none); the network gives V (1 - gamma)."""
+        observations, rates = self.task.observe(states, slopes)
+        out, kept = self.critic.forward(weights, self.policy.scaled(observations))
+        unit = 1.0 / max(1.0 - self.options.gamma, 1e-3)
+        if not slopes:
+            return unit * out[:, 0], np.zeros((0, 0))
+        inside = np.abs((observations - self.policy.mean) / self.policy.deviation) < 10.0
+        g = self.critic.backward(weights, kept, np.full((len(states), 1), unit)) * inside / self.policy.deviation
+        return unit * out[:, 0], np.matmul(g[:, None], rates)[:, 0]
+
+    # -- one epoch -----------------------------------------------------------------------------------------------------
+
+    def restart(self, t: int, terminated: Flags, unsolved: Flags, states: Floats) -> Flags:
+        """Which rows start anew after step t; their states are replaced."""
+        self.age += 1
+        anew = terminated | unsolved | (self.age >= self.task.steps)
+        rows = np.flatnonzero(anew)
+        if len(rows):
+            states[rows] = self.task.starts([self.restarts] * len(rows))
+            self.age[rows] = 0
+        return anew
+
+    def train(self) -> dict[str, Any]:
+        """One epoch: its record, without an evaluation."""
+        o, n = self.options, self.options.environments
+        self.policy.mean[:], self.policy.deviation[:] = self._scale(self.statistics)
+        share = self.epoch / o.epochs
+        deviation = o.deviation[0] + share * (o.deviation[1] - o.deviation[0])
+        drawn = self.models.draw(self.rng, n)
+        noise = Noise.draw(self.rng, self.task, (o.horizon, n), (deviation, o.randomisation.noise))
+        roll = roll_policy_batch(
+            self.policy, self.x, o.horizon, drawn=drawn, noise=noise, slopes=True,
+            kappa_grad=o.kappa_grad, restart=self.restart,
+        )  # fmt: skip
+        self._count(roll)
+        after, by_value = self.values(self.target, roll.after.reshape(o.horizon * n, -1), slopes=True)
+        after, by_value = after.reshape(o.horizon, n), by_value.reshape(o.horizon, n, -1)
+        length, share_clipped = self._improve(roll, by_value, o.rate * (1.0 - share))
+        self._fit(roll, self._returns(roll, after))
+        self.statistics.add(roll.observations.reshape(o.horizon * n, -1))
+        self.x = roll.x[-1].copy()
+        self.epoch += 1
+        self.steps += o.horizon * n
+        recent = float(np.mean(self.finished)) if self.finished else None
+        return {
+            "epoch": self.epoch, "steps": self.steps, "return": recent, "evaluated": None, "gradient": length,
+            "clipped": share_clipped, "unsolved": self.unsolved, "infinite": self.infinite,
+        }  # fmt: skip
+
+    def _count(self, roll: PolicyRollout) -> None:
+        """Returns of finished episodes, the last n of them, and unsolved steps."""
+        self.unsolved += int(roll.unsolved.sum())
+        for rewards, cut in zip(roll.rewards, roll.cut, strict=True):
+            self.running += rewards
+            self.finished += [float(v) for v in self.running[cut & self.known]]
+            self.known |= cut
+            self.running[cut] = 0.0
+        self.finished = self.finished[-self.options.environments :]
+
+    def _improve(self, roll: PolicyRollout, by_value: Floats, rate: float) -> tuple[float, float]:
+        """Step of the policy: (length of the gradient, share of clipped costates)."""
+        o = self.options
+        weights, ends = np.zeros_like(roll.rewards), np.zeros_like(by_value)
+        discount = np.ones(o.environments)
+        for t in range(o.horizon):
+            weights[t] = discount
+            last = roll.cut[t] | (t == o.horizon - 1)
+            going = last & ~roll.terminated[t] & ~roll.unsolved[t]
+            ends[t, going] = (o.gamma * discount)[going, None] * by_value[t, going]
+            discount = np.where(roll.cut[t], 1.0, o.gamma * discount)
+        found = roll.gradient(weights, ends, o.costate)
+        gradient, length = clipped(-found.weights / weights.size, o.norm)
+        if np.isfinite(length):
+            self.actor_adam.step(self.policy.weights, gradient, rate)
+        else:
+            self.infinite += 1
+        return length, found.clipped / weights.size
+
+    def _returns(self, roll: PolicyRollout, after: Floats) -> Floats:
+        """TD(lambda) returns (T, n) from the values of the states after the steps."""
+        o = self.options
+        out, later = np.zeros_like(after), after[-1]
+        for t in range(o.horizon - 1, -1, -1):
+            later = np.where(roll.cut[t], after[t], (1.0 - o.trace) * after[t] + o.trace * later)
+            later = np.where(roll.terminated[t], 0.0, later)
+            out[t] = later = roll.rewards[t] + o.gamma * later
+        return out
+
+    def _fit(self, roll: PolicyRollout, returns: Floats) -> None:
+        """Steps of the critic towards the returns of solved steps, then of its target network."""
+        o = self.options
+        solved = ~roll.unsolved.ravel()
+        inputs = self.policy.scaled(roll.observations.reshape(-1, self.task.observations))[solved]
+        goals = returns.ravel()[solved] * max(1.0 - o.gamma, 1e-3)
+        for _ in range(o.passes):
+            for rows in np.array_split(self.rng.permutation(len(goals)), o.batches):
+                out, kept = self.critic.forward(self.value, inputs[rows])
+                gradient = np.zeros(self.critic.count)
+                self.critic.backward(self.value, kept, 2.0 * (out - goals[rows, None]) / max(len(rows), 1), gradient)
+                gradient, length = clipped(gradient, o.norm)
+                if np.isfinite(length):
+                    self.critic_adam.step(self.value, gradient, o.critic_rate)
+        self.target += o.blend * (self.value - self.target)
+
+    # -- results -------------------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> Policy:
+        """A copy of the policy as it is now."""
+        p = self.policy
+        return Policy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
+
+    def assess(self) -> float:
+        """Mean return of the present policy, which is kept if it is the best."""
+        policy = self.snapshot()
+        found = float(evaluate(policy, self.options.episodes, self.seed).returns.mean())
+        if found > self.best:
+            self.best, self.chosen = found, policy
+        return found
+
+    _ARRAYS = ("x", "age", "running", "known", "value", "target")
+    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best", "finished", "seed")
+
+    def state(self) -> dict[str, Any]:
+        """All that `resume` needs."""
+        out: dict[str, Any] = {name: getattr(self, name).copy() for name in self._ARRAYS}
+        out |= {name: getattr(self, name) for name in self._NUMBERS} | {"finished": list(self.finished)}
+        out |= {"weights": self.policy.weights.copy(), "sums": self.statistics.sums.copy()}
+        out |= {"actor": self.actor_adam.moments.copy(), "critic": self.critic_adam.moments.copy()}
+        return out | {"rng": self.rng.bit_generator.state, "restarts": self.restarts.bit_generator.state}
+
+    def resume(self, learned: Learned) -> None:
+        """Go on where a run ended."""
+        given = learned.state
+        for name in self._ARRAYS:
+            setattr(self, name, given[name].copy())
+        for name in self._NUMBERS:
+            setattr(self, name, given[name])
+        self.finished = list(given["finished"])
+        self.policy.weights[:], self.statistics.sums[:] = given["weights"], given["sums"]
+        self.actor_adam.moments[:], self.critic_adam.moments[:] = given["actor"], given["critic"]
+        self.rng.bit_generator.state, self.restarts.bit_generator.state = given["rng"], given["restarts"]
+        p = learned.policy
+        self.chosen = Policy(p.network, p.weights, p.mean, p.deviation, self.task)
+
+
+def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
+    """Learn a policy with the derivatives of the simulator: see the module, and `ShacOptions` for the options.
+
+    Args:
+        task: what to learn.
+        seed: of all random numbers; the same seed gives the same policy, to the last bit, on any number of cores.
+        resume: a run to go on with, of the same task, seed and options: epochs that are done are not done again.
+        **options: fields of `ShacOptions`.
+
+    Returns:
+        Learned, with the best of the evaluated policies.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a value out of range, or a run that does not fit.
+    """
+    if not isinstance(task, Task):
+        raise TypeError(f"shac(task): expected a Task, got {task!r}")
+    checks.keywords("shac(...)", options, [f.name for f in fields(ShacOptions)])
+    o = ShacOptions(**options)
+    run = _Shac(task, o, checks.whole_number("shac(seed=...)", seed, 0))
+    if resume is not None:
+        if resume.algorithm != "shac" or resume.seed != seed or resume.state["weights"].shape != run.policy.weights.shape:
+            raise ValueError(f"shac(resume=...): expected a run of shac with seed {seed} and this policy, got {resume!r}")
+        run.resume(resume)
+    progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
+    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
+    status, state = Status.SOLVED, run.state()
+    try:
+        while run.epoch < o.epochs and status == Status.SOLVED:
+            record = run.train()
+            if run.epoch in marks:
+                record["evaluated"] = run.assess()
+            state = run.state()
+            status = progress.add(**record)
+    except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
+        status = Status.INTERRUPTED
+    success = run.epoch == o.epochs
+    if not np.isfinite(run.best):
+        run.assess()
+    status = Status.SOLVED if success else status
+    return Learned(
+        run.chosen, success, status, progress.message(status), "shac", seed, run.best, run.steps, run.unsolved,
+        run.infinite, progress.seconds, progress.records, state,
+    )  # fmt: skip

@@ -1,0 +1,206 @@
+"""Task: what a policy is to do, as compiled functions of states and actions, and its motion in batches."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.planning.captured import fingerprint
+from dojo_opt.planning.manifold import displace, tangent_layout
+from dojo_opt.planning.residual import kernel
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
+from sim.simulator.simulator import Simulator
+from solvers.compiler import users_loop
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+__all__ = ["Task", "never"]
+
+_STEP = float(np.cbrt(np.finfo(float).eps))
+_KEPT = 64  # loops
+
+
+def never(x: Floats) -> bool:
+    """No state ends an episode."""
+    return False
+
+
+def _observation_loop(observation: Callable[..., Any]) -> Any:
+    @users_loop
+    def evaluate(layout, xs, work, values, slopes):  # type: ignore[no-untyped-def]
+        """values[i] = o(x_i), and slopes[i] = do/dx by central differences on the manifold, if it has rows."""
+        n, nx, d = layout.shape[0], xs.shape[1], values.shape[1]
+        for row in range(xs.shape[0]):
+            work[0, :nx] = xs[row]
+            observation(work[0, :nx], values[row])
+            for i in range(n if slopes.shape[0] > 0 else 0):
+                step = _STEP * max(1.0, abs(xs[row, layout[i]])) if layout[i] >= 0 else _STEP
+                displace(layout, xs[row], i, step, work[0, :nx])
+                observation(work[0, :nx], work[1, :d])
+                displace(layout, xs[row], i, -step, work[0, :nx])
+                observation(work[0, :nx], work[2, :d])
+                for j in range(d):
+                    slopes[row, j, i] = (work[1, j] - work[2, j]) / (2.0 * step)
+
+    return evaluate
+
+
+def _reward_loop(reward: Callable[..., Any]) -> Any:
+    @users_loop
+    def evaluate(layout, xs, acts, nexts, work, values, slopes):  # type: ignore[no-untyped-def]
+        """values[i] = r(x, a, x'), and slopes[i] = dr/d(dx, a, dx') by central differences, if it has rows."""
+        n, nx, m = layout.shape[0], xs.shape[1], acts.shape[1]
+        for row in range(xs.shape[0]):
+            work[0, :nx], work[1, :m], work[2, :nx] = xs[row], acts[row], nexts[row]
+            values[row] = reward(work[0, :nx], work[1, :m], work[2, :nx])
+            for i in range(2 * n + m if slopes.shape[0] > 0 else 0):
+                step, total = _STEP, 0.0
+                for sign in (1.0, -1.0):
+                    work[0, :nx], work[1, :m], work[2, :nx] = xs[row], acts[row], nexts[row]
+                    if i < n:
+                        displace(layout, xs[row], i, sign * step, work[0, :nx])
+                    elif i < n + m:
+                        work[1, i - n] += sign * step
+                    else:
+                        displace(layout, nexts[row], i - n - m, sign * step, work[2, :nx])
+                    total += sign * reward(work[0, :nx], work[1, :m], work[2, :nx])
+                slopes[row, i] = total / (2.0 * step)
+
+    return evaluate
+
+
+def _end_loop(terminated: Callable[..., Any]) -> Any:
+    @users_loop
+    def evaluate(xs, out):  # type: ignore[no-untyped-def]
+        """out[i] = whether the episode ends in x_i."""
+        for row in range(xs.shape[0]):
+            out[row] = terminated(xs[row])
+
+    return evaluate
+
+
+_loops: OrderedDict[Any, Any] = OrderedDict()  # by fingerprints, the most recently used last
+
+
+def _loop(make: Callable[[Any], Any], function: Callable[..., Any]) -> Any:
+    """The loop around a function; functions that compile to the same code share it."""
+    key = make, fingerprint(function)
+    if key not in _loops:
+        _loops[key] = make(kernel(function))
+        if len(_loops) > _KEPT:
+            _loops.popitem(last=False)
+    _loops.move_to_end(key)
+    return _loops[key]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a policy observes, what it is rewarded for, and when an episode ends. Actions are in [-1, 1].
+
+    The functions are compiled, as by `dojo.kernel`, and differentiated by central differences on the manifold of
+    states; they must not write into their arguments other than `out`.
+
+    Attributes:
+        sim: simulator.
+        substeps: its time steps per action, which is held.
+        observation: function (x (nx,), out) that writes an observation into out.
+        observations: number of entries of an observation.
+        reward: function (x, a (nu,), x') of the state before, the action, and the state after; a number.
+        low: (nu,) inputs of the action -1 [N, N m].
+        high: (nu,) inputs of the action 1.
+        start: function of a generator that draws a first state (nx,).
+        terminated: function of x that tells whether an episode ends there (default `never`).
+        survival: reward of every step that does not end the episode, beside `reward` (default 0).
+        steps: actions after which an episode is cut off (default 1000).
+        name: its name (default "task").
+    """
+
+    sim: Simulator
+    substeps: int
+    observation: Callable[..., Any]
+    observations: int
+    reward: Callable[..., Any]
+    low: Floats
+    high: Floats
+    start: Callable[[np.random.Generator], Floats]
+    terminated: Callable[..., Any] = never
+    survival: float = 0.0
+    steps: int = 1000
+    name: str = "task"
+
+    __repr__ = brief_repr
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.sim, Simulator):
+            raise TypeError(f"Task(sim): expected a Simulator, got {self.sim!r}")
+        for name in ("substeps", "observations", "steps"):
+            checks.whole_number(f"Task({name}=...)", getattr(self, name))
+        for name in ("observation", "reward", "start", "terminated"):
+            if not callable(getattr(self, name)):
+                raise TypeError(f"Task({name}=...): expected a function, got {getattr(self, name)!r}")
+        for name in ("low", "high"):
+            object.__setattr__(self, name, checks.array(f"Task({name}=...)", getattr(self, name), (self.sim.nu,)))
+        if not np.all(self.low < self.high):
+            raise ValueError(f"Task(low=..., high=...): expected low < high, got {self.low} and {self.high}")
+
+    @property
+    def knot_time(self) -> float:
+        """Time of an action [s]."""
+        return self.substeps * self.sim.time_step
+
+    @cached_property
+    def _layout(self) -> Any:
+        return tangent_layout(self.sim, self.sim.neutral())
+
+    @cached_property
+    def _observation_loop(self) -> Any:
+        return _loop(_observation_loop, self.observation)
+
+    @cached_property
+    def _reward_loop(self) -> Any:
+        return _loop(_reward_loop, self.reward)
+
+    @cached_property
+    def _end_loop(self) -> Any:
+        return _loop(_end_loop, self.terminated)
+
+    @cached_property
+    def _work(self) -> Floats:
+        return np.zeros((3, max(self.sim.nx, self.sim.nu, self.observations)))
+
+    def inputs(self, actions: Floats) -> Floats:
+        """(..., nu) inputs of actions in [-1, 1] [N, N m]."""
+        return 0.5 * (self.high + self.low) + 0.5 * (self.high - self.low) * actions
+
+    def observe(self, xs: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
+        """(observations (n, no), their derivatives (n, no, ndx), or none)."""
+        n = len(xs)
+        values = np.zeros((n, self.observations))
+        out = np.zeros((n if slopes else 0, self.observations, self.sim.ndx))
+        self._observation_loop(self._layout, xs, self._work.copy(), values, out)
+        return values, out
+
+    def rewards(self, xs: Floats, actions: Floats, nexts: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
+        """(rewards (n,) without those of survival, their derivatives (n, ndx + nu + ndx), or none)."""
+        n, width = len(xs), 2 * self.sim.ndx + self.sim.nu
+        values, out = np.zeros(n), np.zeros((n if slopes else 0, width))
+        self._reward_loop(self._layout, xs, actions, nexts, self._work.copy(), values, out)
+        return values, out
+
+    def ends(self, xs: Floats) -> Flags:
+        """(n,) whether episodes end in these states."""
+        out = np.zeros(len(xs), dtype=np.bool_)
+        self._end_loop(xs, out)
+        return out
+
+    def starts(self, rngs: Any) -> Floats:
+        """First states (n, nx), each from its own generator."""
+        return np.array([checks.array("Task(start=...)", self.start(rng), (self.sim.nx,)) for rng in rngs])

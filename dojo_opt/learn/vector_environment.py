@@ -1,0 +1,105 @@
+"""VectorEnvironment: many environments of one task, stepped as one compiled batch on all cores."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.learn.task import Task
+from sim.mechanism.checks import whole_number
+from solvers.status import Status
+
+try:
+    import gymnasium
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
+except ImportError:
+    gymnasium = VectorEnv = None
+
+Floats = NDArray[np.float64]
+
+__all__ = ["VectorEnvironment"]
+
+
+class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[misc]
+    """`num_envs` environments of a task: see Environment. Rows do not depend on one another.
+
+    An environment whose episode is over starts anew: by default with the next step (NEXT_STEP, whose action it
+    ignores), or at once with the last observation in `info["final_obs"]` (SAME_STEP), or by `reset(options=
+    {"reset_mask": ...})` (DISABLED).
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(
+        self, task: Task, num_envs: int = 1, autoreset_mode: Any = None, max_episode_steps: int | None = None
+    ) -> None:
+        if gymnasium is None:
+            raise ImportError('VectorEnvironment needs gymnasium: pip install "dojo-opt[gym]"')
+        self.task, self.num_envs = task, whole_number("VectorEnvironment(num_envs=...)", num_envs)
+        mode = AutoresetMode.NEXT_STEP if autoreset_mode is None else AutoresetMode(autoreset_mode)
+        self.metadata = {**type(self).metadata, "autoreset_mode": mode}
+        self._mode, self._limit = mode, task.steps if max_episode_steps is None else max_episode_steps
+        box = gymnasium.spaces.Box
+        self.single_observation_space = box(-np.inf, np.inf, (task.observations,), np.float64)
+        self.single_action_space = box(-1.0, 1.0, (task.sim.nu,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.x, self._age = np.zeros((num_envs, task.sim.nx)), np.zeros(num_envs, dtype=np.int64)
+        self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._generators = [np.random.default_rng() for _ in range(num_envs)]
+        self.render_mode = None
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """To first states. seed: environment i has seed + i; or one seed each.
+
+        options: {"reset_mask": (num_envs,) bool} resets some of them.
+        """
+        mask = np.ones(self.num_envs, dtype=np.bool_)
+        if options is not None and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"], dtype=np.bool_)
+        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        for i in np.flatnonzero(mask):
+            if seeds[i] is not None:
+                self._generators[i] = gymnasium.utils.seeding.np_random(seeds[i])[0]
+        self._restart(mask)
+        return self.task.observe(self.x)[0], {}
+
+    def _restart(self, mask: NDArray[np.bool_]) -> None:
+        """First states where the mask says so."""
+        for i in np.flatnonzero(mask):
+            self.x[i] = self.task.start(self._generators[i])
+        self._age[mask], self._over[mask] = 0, False
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """One action of every environment."""
+        task, info = self.task, {}
+        anew = self._over.copy() if self._mode == AutoresetMode.NEXT_STEP else np.zeros(self.num_envs, dtype=np.bool_)
+        if self._mode == AutoresetMode.DISABLED and self._over.any():
+            raise RuntimeError("VectorEnvironment.step: an episode is over; reset it with a reset_mask")
+        self._restart(anew)
+        given = np.asarray(actions, dtype=np.float64).reshape(self.num_envs, task.sim.nu)
+        rows = np.flatnonzero(~anew)
+        before, acts = self.x[rows], given[rows]
+        found = task.sim.step_batch(before, task.inputs(np.clip(acts, -1.0, 1.0)), task.substeps)
+        bad, ends = found.status != Status.SOLVED, task.ends(found.x)
+        rewards, terminated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=np.bool_)
+        values = task.rewards(before, acts, found.x)[0] + task.survival * ~ends
+        rewards[rows], terminated[rows] = np.where(bad, 0.0, values), ends | bad
+        self.x[rows], self._age[rows] = found.x, self._age[rows] + 1
+        truncated = self._age >= self._limit
+        self._over = terminated | truncated
+        observations = task.observe(self.x)[0]
+        if self._mode == AutoresetMode.SAME_STEP and self._over.any():
+            over = self._over.copy()
+            final = np.full(self.num_envs, None, dtype=object)
+            for i in np.flatnonzero(over):
+                final[i] = observations[i].copy()
+            info = {"final_obs": final, "_final_obs": over, "final_info": {}, "_final_info": over}
+            self._restart(over)
+            observations[over] = task.observe(self.x[over])[0]
+        return observations, rewards, terminated, truncated, info

@@ -1,0 +1,92 @@
+"""Steps of independent rows: each as if it were alone, with derivatives, parameters and smoothing of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from solvers.compiler import threads
+
+
+def _rows(sim, n=7):
+    rng = np.random.default_rng(3)
+    X = np.array([sim.integrate(sim.neutral(), 0.2 * rng.standard_normal(sim.ndx)) for _ in range(n)])
+    X[:, 2] += 0.6  # some touch the ground, some fly
+    return X, rng.standard_normal((n, sim.nu))
+
+
+@pytest.fixture(scope="module")
+def sim():
+    return dojo.Simulator(dojo.models.ant(), time_step=0.02, kappa=1e-4)
+
+
+def test_a_row_is_the_rollout_of_its_state_whatever_its_neighbours(sim):
+    X, U = _rows(sim)
+    found = sim.step_batch(X, U, substeps=3, derivatives=True)
+    assert found.success
+    for x, u, end in zip(X, U, found.x, strict=True):
+        np.testing.assert_array_equal(end, sim.rollout(x, np.tile(u, (3, 1))).x[-1])
+    order = np.array([6, 2, 4, 0])
+    again = sim.step_batch(X[order], U[order], substeps=3, derivatives=True)
+    np.testing.assert_array_equal(again.A, found.A[order])
+    np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3).x, found.x)
+    with threads(1):
+        np.testing.assert_array_equal(sim.step_batch(X, U, substeps=3, derivatives=True).B, found.B)
+
+
+def test_derivatives_are_those_of_central_differences(sim):
+    X, U = _rows(sim)
+    X, U, kappa, eps = X[:2], U[:2], np.array([1e-3, 3e-4]), 1e-5
+    found = sim.step_batch(X, U, 2, True, kappa)
+
+    def end(dx, du):
+        moved = np.array([sim.integrate(x, dx) for x in X])
+        ends = sim.step_batch(moved, U + du, 2, kappa=kappa).x
+        return np.array([sim.difference(b, a) for a, b in zip(found.x, ends, strict=True)])
+
+    for j in range(sim.ndx):
+        e = eps * np.eye(sim.ndx)[j]
+        slope = (end(e, 0.0) - end(-e, 0.0)) / (2 * eps)
+        np.testing.assert_allclose(found.A[:, :, j], slope, atol=2e-4 * max(1.0, np.abs(slope).max()))
+    for j in range(sim.nu):
+        e = eps * np.eye(sim.nu)[j]
+        slope = (end(np.zeros(sim.ndx), e) - end(np.zeros(sim.ndx), -e)) / (2 * eps)
+        np.testing.assert_allclose(found.B[:, :, j], slope, atol=1e-5)
+
+
+def test_rows_have_their_own_parameters(sim):
+    X, U = _rows(sim, 4)
+    values = {"friction:*": np.array([0.1, 0.9, 0.1, 0.5]), "time_step": np.array([0.02, 0.01, 0.01, 0.02])}
+    found = sim.step_batch(X, U, 2, parameters=values)
+    for i in range(4):
+        alone = sim.with_parameters({name: value[i] for name, value in values.items()})
+        np.testing.assert_array_equal(found.x[i], alone.rollout(X[i], np.tile(U[i], (2, 1))).x[-1])
+
+
+def test_an_unsolved_row_stands_still_and_is_named():
+    sim = dojo.Simulator(dojo.models.sphere(), time_step=0.05, max_iterations=1, divide=False)
+    X = np.tile(sim.neutral(), (3, 1))
+    X[:, 2] += 2.0
+    X[1, 2] = 0.4  # below the ground
+    found = sim.step_batch(X, np.zeros((3, sim.nu)), derivatives=True)
+    assert found.unsolved.tolist() == [1] and not found.A[1].any() and found.A[0].any()
+    np.testing.assert_array_equal(found.x[1], X[1])
+    assert "row 1" in found.message
+    with pytest.raises(dojo.SimulationError, match="row 1"):
+        sim.step_batch(X, np.zeros((3, sim.nu)), throw=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"kappa": [1.0, 1.0]}, r"step_batch\(kappa=\.\.\.\): expected shape \(3,\)"),
+        ({"kappa": -1.0}, r"kappa=\.\.\.\): expected numbers above 0"),
+        ({"parameters": {"friction:*": [1.0, 2.0]}}, r"'friction:\*': expected shape \(3, 1\)"),
+        ({"substeps": 0}, r"substeps=\.\.\.\)"),
+    ],
+)
+def test_bad_arguments_are_named(sim, change, message):
+    X, U = _rows(sim, 3)
+    with pytest.raises(ValueError, match=message):
+        sim.step_batch(X, U, **change)
