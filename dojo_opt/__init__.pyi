@@ -14,6 +14,7 @@ from dojo_opt import (
     viewer as viewer,
 )
 from dojo_opt.gaits.equilibrium import equilibrium as equilibrium
+from dojo_opt.identification.identify import Identified as Identified, identify as identify
 from dojo_opt.identification.parameter_space import ParameterSpace as ParameterSpace
 from dojo_opt.learn.environment import Environment as Environment
 from dojo_opt.mpc.controller import MPC as MPC

@@ -1,4 +1,9 @@
-"""Learning: tasks, policies, and algorithms that find policies, with and without derivatives of the simulator."""
+"""Learning: tasks, policies, and algorithms that find policies, with and without derivatives of the simulator.
+
+Where Gymnasium is installed, the tasks are registered with it: `gymnasium.make("dojo/HalfCheetah-v0")`.
+"""
+
+from importlib.util import find_spec
 
 from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, pendulum, walker2d
@@ -9,6 +14,11 @@ from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
+
+if find_spec("gymnasium") is not None:
+    from dojo_opt.learn.registration import register
+
+    register()
 
 __all__ = [
     "Evaluation",

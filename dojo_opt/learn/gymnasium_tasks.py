@@ -7,6 +7,7 @@ here, it is lifted onto it. Forces of contacts are neither observed nor paid for
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.task import Task, never
 from sim.io.mjcf.load import load_mjcf
-from sim.io.mjcf.report import MjcfMechanism
+from sim.io.mjcf.report import MjcfMechanism, MjcfWarning
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Input, Joint
 from sim.mechanism.stance import gaps
@@ -47,7 +48,9 @@ def _model(file: str) -> MjcfMechanism:
     found = find_spec("gymnasium")
     if found is None or found.origin is None:
         raise ImportError('tasks of Gymnasium read its models: pip install "dojo-opt[gym,mjcf]"')
-    return load_mjcf(Path(found.origin).parent / "envs" / "mujoco" / "assets" / file)
+    with warnings.catch_warnings():  # about collisions that could be added
+        warnings.simplefilter("ignore", MjcfWarning)
+        return load_mjcf(Path(found.origin).parent / "envs" / "mujoco" / "assets" / file)
 
 
 def _starts(mech: Mechanism, height: int, position: float, velocity: Callable[..., Floats]) -> Callable[..., Floats]:

@@ -90,13 +90,25 @@ class Learned:
 
     def save(self, path: str | Path) -> None:
         """Write everything but the task to an .npz file."""
-        names = ("success", "message", "algorithm", "seed", "best", "steps", "unsolved", "infinite", "seconds", "history")
+        names = (
+            "success",
+            "message",
+            "algorithm",
+            "seed",
+            "best",
+            "steps",
+            "unsolved",
+            "infinite",
+            "seconds",
+            "history",
+        )
         meta = {name: getattr(self, name) for name in names} | {"status": int(self.status)}
-        arrays = {f"state_{k}": v for k, v in self.state.items() if isinstance(v, np.ndarray)}
+        arrays: dict[str, Any] = {f"state_{k}": v for k, v in self.state.items() if isinstance(v, np.ndarray)}
         meta["state"] = {k: v for k, v in self.state.items() if not isinstance(v, np.ndarray)}
         p = self.policy
         meta["network"] = {"sizes": p.network.sizes, "activation": p.network.activation}
-        np.savez(path, meta=json.dumps(meta), weights=p.weights, mean=p.mean, deviation=p.deviation, **arrays)
+        arrays |= {"weights": p.weights, "mean": p.mean, "deviation": p.deviation, "meta": np.array(json.dumps(meta))}
+        np.savez(path, **arrays)
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> Learned:

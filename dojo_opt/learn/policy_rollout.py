@@ -30,7 +30,9 @@ class Noise:
     observations: Floats  # (T, n, no)
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviations: tuple[float, float]) -> Noise:
+    def draw(
+        cls, rng: np.random.Generator, task: Task, shape: tuple[int, int], deviations: tuple[float, float]
+    ) -> Noise:
         """Normal, with the deviations of actions and observations."""
         actions = deviations[0] * rng.standard_normal((*shape, task.sim.nu))
         return cls(actions, deviations[1] * rng.standard_normal((*shape, task.observations)))

@@ -76,7 +76,8 @@ class Models:
         chosen = rng.integers(self._given.models, size=rows)
         kappa = None
         if self._given.kappa is not None:
-            kappa = np.exp(rng.uniform(*np.log(self._given.kappa), size=rows))
+            low, high = np.log(self._given.kappa)
+            kappa = np.exp(rng.uniform(low, high, rows))
         parameters = {name: table[chosen] for name, table in self._tables[substeps].items()}
         return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise)
 

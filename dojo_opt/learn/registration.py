@@ -1,6 +1,6 @@
 """Names of Gymnasium: `gymnasium.make("dojo/HalfCheetah-v0")`, and `make_vec` with one compiled batch.
 
-Gymnasium finds `register` by itself where dojo-opt is installed; in a source tree, import this module.
+`import dojo_opt.learn` registers them, and so does `gymnasium.make("dojo_opt.learn:dojo/HalfCheetah-v0")`.
 """
 
 from __future__ import annotations
@@ -62,6 +62,3 @@ def register() -> None:
                 max_episode_steps=steps,
                 kwargs={"task": name},
             )
-
-
-register()

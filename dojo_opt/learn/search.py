@@ -211,7 +211,9 @@ class RandomSearch(Search):
         task, policy, o = self.task, self.policy, self.options
         out, alive, x = np.zeros(len(xs)), np.arange(len(xs)), np.array(xs)
         layers = [policy.network.layers(w) for w in weights]
-        stacked = [(np.array([w[k][0] for w in layers]), np.array([w[k][1] for w in layers])) for k in range(len(layers[0]))]
+        stacked = [
+            (np.array([w[k][0] for w in layers]), np.array([w[k][1] for w in layers])) for k in range(len(layers[0]))
+        ]
         for _ in range(self.horizon):
             here, rows = x[alive], drawn.rows(alive)
             seen = task.observe(here)[0]
@@ -267,7 +269,9 @@ def run_search(search: Search, resume: Learned | None) -> Learned:
         if resume.algorithm != name or resume.seed != search.seed or (
             resume.state["weights"].shape != search.policy.weights.shape
         ):  # fmt: skip
-            raise ValueError(f"{name}(resume=...): expected a run with seed {search.seed} and this policy, got {resume!r}")
+            raise ValueError(
+                f"{name}(resume=...): expected a run with seed {search.seed} and this policy, got {resume!r}"
+            )
         search.resume(resume)
     progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
     marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}

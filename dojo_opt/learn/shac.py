@@ -298,8 +298,14 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
     o = ShacOptions(**options)
     run = _Shac(task, o, checks.whole_number("shac(seed=...)", seed, 0))
     if resume is not None:
-        if resume.algorithm != "shac" or resume.seed != seed or resume.state["weights"].shape != run.policy.weights.shape:
-            raise ValueError(f"shac(resume=...): expected a run of shac with seed {seed} and this policy, got {resume!r}")
+        if (
+            resume.algorithm != "shac"
+            or resume.seed != seed
+            or resume.state["weights"].shape != run.policy.weights.shape
+        ):
+            raise ValueError(
+                f"shac(resume=...): expected a run of shac with seed {seed} and this policy, got {resume!r}"
+            )
         run.resume(resume)
     progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
     marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
     {"reset_mask": ...})` (DISABLED).
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}
 
     def __init__(
         self, task: Task, num_envs: int = 1, autoreset_mode: Any = None, max_episode_steps: int | None = None
@@ -62,7 +62,9 @@ class VectorEnvironment(VectorEnv if gymnasium else object):  # type: ignore[mis
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options is not None and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"], dtype=np.bool_)
-        seeds = [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        seeds = (
+            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
+        )
         for i in np.flatnonzero(mask):
             if seeds[i] is not None:
                 self._generators[i] = gymnasium.utils.seeding.np_random(seeds[i])[0]

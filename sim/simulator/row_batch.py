@@ -75,8 +75,8 @@ class RowModels:
         for row in rows:
             key = repr(tuple(sizes)).encode() + row.tobytes()
             if key not in self._kept:
-                values = {name: row[a:b] for name, a, b in zip(sizes, bounds[:-1], bounds[1:], strict=True)}
-                self._kept[key] = self._simulator.with_parameters(values)._engine
+                own = {name: row[a:b] for name, a, b in zip(sizes, bounds[:-1], bounds[1:], strict=True)}
+                self._kept[key] = self._simulator.with_parameters(own)._engine
             self._kept.move_to_end(key)
             engines.append(self._kept[key])
         while len(self._kept) > max(_KEPT, len(rows)):

@@ -1,0 +1,317 @@
+"""identify: parameters of a simulator from measured motions, by Gauss-Newton over multiple shooting.
+
+    min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2),    r of windows.py
+
+Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
+is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
+counts linearly. Levenberg and Marquardt's damping; parameters stay within their bounds by projection.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.identification.parameter_space import ParameterSpace
+from dojo_opt.identification.windows import Predictor, Window, WindowErrors, cut_windows
+from sim.mechanism import checks
+from sim.mechanism.brief import brief_table
+from sim.simulator.simulator import Simulator
+from solvers.status import MESSAGES, Status
+
+Floats = NDArray[np.float64]
+
+__all__ = ["Identified", "IdentifyOptions", "identify"]
+
+_DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
+_UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not tell
+COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
+_HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
+
+
+@dataclass(frozen=True, repr=False)
+class Identified:
+    """Parameters and how well the data determine them."""
+
+    success: bool
+    status: Status
+    message: str
+    labels: tuple[str, ...]  # of the values
+    values: Floats  # (n,)
+    start: Floats  # (n,) before
+    covariance: Floats  # (n, n); infinite on the diagonal where the data tell nothing
+    simulator: Simulator  # with the values
+    rms: float  # root mean square of the errors over their noise: 1 where the noise is as stated
+    unseen: list[dict[str, float]]  # combinations, by label, that change no prediction
+    outliers: float  # share of states that count less than fully
+    unsolved: int  # windows that could not be predicted at the end, and do not count
+    starts: list[Floats] = field(default_factory=list)  # (nx,) of every window
+    history: list[dict[str, Any]] = field(default_factory=list)
+    seconds: float = 0.0  # processor time
+
+    @property
+    def deviation(self) -> Floats:
+        """(n,) standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Floats:
+        """(n, n) of the estimates; NaN where the data tell nothing."""
+        d = self.deviation
+        with np.errstate(invalid="ignore"):
+            return self.covariance / np.outer(d, d)
+
+    def __repr__(self) -> str:
+        return f"Identified({self.closing_line()})"
+
+    def _repr_html_(self) -> str:
+        return brief_table(self.closing_line(), ("parameter", "value", "deviation", "before"), self._rows())
+
+    def _rows(self) -> list[tuple[Any, ...]]:
+        return list(zip(self.labels, self.values, self.deviation, self.start, strict=True))
+
+    def closing_line(self) -> str:
+        """One line: how it ended."""
+        return (
+            f"{self.status.name}: {self.message} rms {self.rms:.3f} of the noise, {100 * self.outliers:.1f} % "
+            f"outliers, {self.unsolved} windows unsolved, {self.seconds:.1f} s"
+        )
+
+    def summary(self) -> str:
+        """The table of parameters and a closing line."""
+        lines = [f"{'parameter':32} {'value':>12} {'deviation':>12} {'before':>12}"]
+        lines += [f"{name:32} {value:12.6g} {sd:12.3g} {old:12.6g}" for name, value, sd, old in self._rows()]
+        for combination in self.unseen:
+            terms = " ".join(f"{v:+.2f} {k}" for k, v in combination.items())
+            lines.append(f"not told by the data: {terms}")
+        return "\n".join([*lines, self.closing_line()])
+
+
+class _Fit:
+    """Parameters, starts and their normal equations."""
+
+    def __init__(
+        self, space: ParameterSpace, windows: list[Window], predictor: Predictor, outlier: float, base: Simulator
+    ) -> None:
+        self.space, self.windows, self.predictor, self.outlier, self.base = space, windows, predictor, outlier, base
+        self.theta = space.values.copy()
+        self.starts = [w.x[0].copy() for w in windows]
+        # coordinates differ in size by orders of magnitude
+        self.unit = np.maximum(np.abs(space.values), 1e-3)
+
+    def errors(self, theta: Floats, starts: list[Floats], kappa: float, slopes: bool) -> list[WindowErrors] | None:
+        """Of all windows; None where the parameters are impossible."""
+        try:
+            sim = self.space.simulator(theta).replace(kappa=kappa)
+        except ValueError:
+            return None
+        predict = self.predictor.predict
+        return [
+            predict(sim, theta, w, s, kappa, slopes) for w, s in zip(self.windows, starts, strict=True)
+        ]  # fmt: skip
+
+    def weigh(self, found: list[WindowErrors], usable: list[bool]) -> tuple[float, list[Floats], float]:
+        """(cost, weights of the states of each window, share of outliers)."""
+        total, weights, far, count = 0.0, [], 0, 0
+        for w, use in zip(found, usable, strict=True):
+            size = np.sqrt(np.mean(w.errors**2, axis=1))
+            out = self.outlier / np.maximum(size, self.outlier) * use
+            weights.append(out)
+            inside = size <= self.outlier
+            rho = np.where(inside, size**2, 2.0 * self.outlier * size - self.outlier**2) * w.errors.shape[1]
+            if use:
+                total, far, count = total + float(rho.sum()), far + int((~inside).sum()), count + len(size)
+        return total, weights, far / max(count, 1)
+
+    def system(
+        self, found: list[WindowErrors], weights: list[Floats], damping: float
+    ) -> tuple[Floats, Floats, list[Any]]:
+        """(matrix, right side) of the parameters over their units, and what the starts need to follow."""
+        n, kept = len(self.theta), []
+        H, g = np.zeros((n, n)), np.zeros(n)
+        for w, weight in zip(found, weights, strict=True):
+            rows = np.repeat(np.sqrt(weight), w.errors.shape[1])
+            r = rows * w.errors.ravel()
+            S = rows[:, None] * w.by_start.reshape(len(r), -1)
+            P = rows[:, None] * w.by_theta.reshape(len(r), -1) * self.unit
+            Hss = S.T @ S
+            Hss += np.diag(damping * np.diag(Hss) + 1e-12 * max(np.trace(Hss), 1e-12))
+            back = np.linalg.solve(Hss, np.column_stack([S.T @ P, S.T @ r]))
+            H += P.T @ P - (P.T @ S) @ back[:, :-1]
+            g += P.T @ r - (P.T @ S) @ back[:, -1]
+            kept.append(back)
+        return H, g, kept
+
+    def step(self, found: list[WindowErrors], weights: list[Floats], damping: float) -> tuple[Floats, list[Floats]]:
+        """New parameters, within their bounds, and starts."""
+        H, g, kept = self.system(found, weights, damping)
+        low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
+        H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))
+        free = np.ones(len(g), dtype=np.bool_)
+        d = np.zeros(len(g))
+        for _ in range(len(g)):  # bounds that the step meets hold, and the others answer
+            rest = -g - H[:, ~free] @ d[~free]
+            d[free] = np.linalg.solve(H[np.ix_(free, free)], rest[free])
+            out = free & ((d < low) | (d > high))
+            if not out.any():
+                break
+            d = np.where(out, np.clip(d, low, high), d)
+            free &= ~out
+        theta = np.clip(self.theta + self.unit * d, self.space.low, self.space.high)
+        moves = np.array([-(back[:, -1] + back[:, :-1] @ d) for back in kept])
+        return theta, list(self.base.integrate(np.array(self.starts), moves))
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """Settings of `identify`.
+
+    Attributes:
+        window: steps that are predicted from one start, which is free within the noise (default None: whole motions).
+        every: number of steps from one compared state to the next (default 1).
+        kappas: smoothing of contacts, one after the other [N s m]: a smooth one is felt from afar (default None: that
+            of the simulator).
+        outlier: states whose errors have a root mean square above so many deviations count linearly (default 3).
+        tolerance: share of the cost; a smoothing ends when an iteration brings less (default 1e-4).
+        max_iterations: limit per smoothing (default 30).
+        verbose: whether to print a line per iteration (default False).
+    """
+
+    window: int | None = None
+    every: int = 1
+    kappas: Sequence[float] | None = None
+    outlier: float = 3.0
+    tolerance: float = 1e-4
+    max_iterations: int = 30
+    verbose: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("every", "max_iterations", *(() if self.window is None else ("window",))):
+            checks.whole_number(f"identify({name}=...)", getattr(self, name))
+        for name in ("outlier", "tolerance"):
+            checks.number(f"identify({name}=...)", getattr(self, name), above=0.0)
+        for kappa in self.kappas or ():
+            checks.number("identify(kappas=...)", kappa, above=0.0)
+
+
+def identify(
+    sim: Simulator,
+    trajectories: Sequence[Any],
+    parameters: Sequence[str] = (),
+    bodies: Sequence[str] = (),
+    *,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    noise: ArrayLike = 1.0,
+    **options: Any,
+) -> Identified:
+    """Fit parameters to measured motions: see the module.
+
+    Args:
+        sim: simulator to begin with; its time step is that of the measurements.
+        trajectories: of `rollout`, or (states (T + 1, nx), inputs (T, nu)), measured.
+        parameters: names, as in `Simulator.parameters`.
+        bodies: whose mass, centre and inertia are fitted together, as physical bodies; see `ParameterSpace`.
+        bounds: {name: (low, high)}, as in `ParameterSpace`.
+        noise: standard deviation of the measurement of a state, one or (ndx,); infinite for what is not measured.
+        **options: fields of `IdentifyOptions`.
+
+    Returns:
+        Identified.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a value out of range, or names that are not there.
+    """
+    call = "identify"
+    if not isinstance(sim, Simulator):
+        raise TypeError(f"{call}(sim): expected a Simulator, got {sim!r}")
+    checks.keywords(f"{call}(...)", options, [f.name for f in fields(IdentifyOptions)])
+    o, began = IdentifyOptions(**options), time.process_time()
+    space = ParameterSpace(sim, tuple(parameters), tuple(bodies), bounds)
+    deviations = np.broadcast_to(checks.floats(f"{call}(noise=...)", noise), (sim.ndx,))
+    if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
+        raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
+    predictor = Predictor(space, deviations, o.every)
+    fit = _Fit(space, cut_windows(sim, trajectories, o.window), predictor, o.outlier, sim)
+    history: list[dict[str, Any]] = []
+    levels, status = o.kappas or (sim.kappa,), Status.SOLVED
+    for kappa in levels:
+        status = _descend(fit, kappa, o, began, history)
+    return _identified(fit, levels[-1], status, history, began)
+
+
+def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history: list[dict[str, Any]]) -> Status:
+    """Iterations at one smoothing; how they ended."""
+    found = fit.errors(fit.theta, fit.starts, kappa, slopes=True)
+    if found is None:
+        return Status.SIMULATION_FAILED
+    usable = [w.solved for w in found]
+    cost, weights, far = fit.weigh(found, usable)
+    damping = _DAMPING
+    for _ in range(o.max_iterations):
+        accepted, gain = False, 0.0
+        while damping < _LARGEST and not accepted:
+            theta, starts = fit.step(found, weights, damping)
+            trial = fit.errors(theta, starts, kappa, slopes=False)
+            if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
+                ahead = fit.weigh(trial, usable)[0]
+                accepted, gain = ahead < cost, (cost - ahead) / cost
+            damping = max(damping / 5.0, _LEAST) if accepted else 4.0 * damping
+        if not accepted:
+            return Status.LINE_SEARCH if not history else Status.SOLVED
+        size = float(np.linalg.norm((theta - fit.theta) / fit.unit))
+        fit.theta, fit.starts = theta, starts
+        again = fit.errors(theta, starts, kappa, slopes=True)
+        assert again is not None
+        found, usable = again, [w.solved for w in again]
+        cost, weights, far = fit.weigh(found, usable)
+        values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
+        record = dict(
+            zip(
+                COLUMNS,
+                (len(history) + 1, kappa, cost, np.sqrt(cost / max(values, 1)), damping, size, far,
+                 usable.count(False), time.process_time() - began),
+                strict=True,
+            )
+        )  # fmt: skip
+        if o.verbose:
+            head = [] if history else [_HEADER]
+            line = "{:9d} {:8.1e} {:12.6g} {:9.4f} {:8.1e} {:8.1e} {:8.4f} {:8d} {:8.1f}".format(*record.values())
+            print("\n".join([*head, line]), file=sys.stdout, flush=True)
+        history.append(record)
+        if gain < o.tolerance:
+            return Status.SOLVED
+    return Status.MAX_ITERATIONS
+
+
+def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str, Any]], began: float) -> Identified:
+    """The result, with the covariance of the parameters at the end."""
+    space, n = fit.space, len(fit.theta)
+    found = fit.errors(fit.theta, fit.starts, kappa, slopes=True) or []
+    usable = [w.solved for w in found]
+    cost, weights, far = fit.weigh(found, usable)
+    H, _, _ = fit.system(found, weights, 0.0)
+    count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
+    free = count - n - sum(usable) * fit.base.ndx
+    variance = cost / max(free, 1)
+    sizes, axes = np.linalg.eigh(0.5 * (H + H.T))
+    seen = sizes > _UNSEEN * max(sizes.max(initial=0.0), 1e-300)
+    covariance = variance * (axes[:, seen] / sizes[seen]) @ axes[:, seen].T * np.outer(fit.unit, fit.unit)
+    blind = np.max(np.abs(axes[:, ~seen]), axis=1, initial=0.0) > 1e-3
+    covariance[blind, :] = covariance[:, blind] = np.nan
+    covariance[blind, blind] = np.inf
+    unseen = [
+        {space.labels[i]: float(axis[i]) for i in np.argsort(-np.abs(axis)) if abs(axis[i]) > 0.05}
+        for axis in axes[:, ~seen].T
+    ]
+    return Identified(
+        status == Status.SOLVED, status, MESSAGES[status], space.labels, fit.theta, space.values, covariance,
+        space.simulator(fit.theta), float(np.sqrt(cost / max(count, 1))), unseen, far, usable.count(False), fit.starts,
+        history, time.process_time() - began,
+    )  # fmt: skip

@@ -1,0 +1,129 @@
+"""Windows of measured motions: predicted from a free start, with derivatives by the start and by parameters.
+
+r_0 = s (-) m_0,    r_t = x_t(s, theta) (-) m_t,    both over the noise of the measurement
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.identification.parameter_space import ParameterSpace
+from dojo_opt.planning.manifold import tangent_layout
+from sim.mechanism import checks
+from sim.simulator.results import Trajectory, path_of
+from sim.simulator.simulator import Simulator
+from solvers.status import Status
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+__all__ = ["Window", "WindowErrors", "cut_windows", "difference_slopes"]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A piece of a measured motion: it is predicted as a whole from its start."""
+
+    trajectory: int  # its number among those given
+    first: int  # step of the trajectory it begins at
+    x: Floats  # (T + 1, nx) measured states
+    u: Floats  # (T, nu)
+
+
+def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None) -> list[Window]:
+    """Windows of `length` steps that follow one another, the last one shorter; whole motions for None."""
+    call, out = "identify(trajectories)", []
+    for number, given in enumerate(trajectories):
+        raw = (given.x, given.u) if isinstance(given, Trajectory) else path_of(call, given)
+        us = checks.array(call, raw[1], ("T", sim.nu))
+        xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
+        size = len(us) if length is None else length
+        for first in range(0, len(us), max(size, 1)):
+            last = min(first + size, len(us))
+            out.append(Window(number, first, xs[first : last + 1], us[first:last]))
+    if not out:
+        raise ValueError(f"{call}: expected motions of at least one step, got none")
+    return out
+
+
+def difference_slopes(layout: Integers, differences: Floats) -> Floats:
+    """(n, ndx, ndx) derivative of rows x (-) m (n, ndx) by x: 1, and J_r^-1(r) for rotations r of quaternions.
+
+    J_r^-1(r) = 1 + [r]/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) [r]^2,   a = |r|
+    """
+    n, ndx = differences.shape
+    out = np.tile(np.eye(ndx), (n, 1, 1))
+    i = 0
+    while i < ndx:
+        if layout[i] >= 0:
+            i += 1
+            continue
+        r = differences[:, i : i + 3]
+        a = np.linalg.norm(r, axis=1)
+        small = a < 1e-3
+        b = np.where(small, 1.0, a)
+        factor = np.where(small, 1.0 / 12.0, 1.0 / b**2 - (1.0 + np.cos(b)) / (2.0 * b * np.sin(b)))
+        K = np.zeros((n, 3, 3))
+        K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -r[:, 2], r[:, 1], -r[:, 0]
+        K -= K.transpose(0, 2, 1)
+        out[:, i : i + 3, i : i + 3] = np.eye(3) + 0.5 * K + factor[:, None, None] * (K @ K)
+        i += 3
+    return out
+
+
+@dataclass(frozen=True)
+class WindowErrors:
+    """Errors of a prediction over their noise, (m, d) for m compared states and d measured components."""
+
+    errors: Floats
+    by_start: Floats  # (m, d, ndx), or (0, ...)
+    by_theta: Floats  # (m, d, n)
+    solved: bool
+
+
+class Predictor:
+    """Predictions of windows by one simulator of a space."""
+
+    def __init__(self, space: ParameterSpace, noise: Floats, every: int) -> None:
+        self._space, self._every = space, every
+        self.measured = np.flatnonzero(np.isfinite(noise))
+        self._scale = 1.0 / noise[self.measured]
+
+    def steps(self, window: Window) -> Integers:
+        """The compared steps: the start, every so many, and the last one."""
+        last = len(window.u)
+        return np.unique(np.r_[0 : last + 1 : self._every, last])
+
+    def predict(
+        self, sim: Simulator, theta: Floats, window: Window, start: Floats, kappa: float, slopes: bool
+    ) -> WindowErrors:
+        """Errors of a window from a start (nx,), and with `slopes` their derivatives."""
+        rows, space, ndx, n = self.steps(window), self._space, sim.ndx, len(theta)
+        if slopes:
+            xs, line = sim.linearize_rollout(start, window.u, kappa, space.wrt)
+            solved = not np.any(line.status)
+        else:
+            found = sim.rollout_batch(start[None], window.u[None])
+            xs, solved = found.x[0], found.status[0] == Status.SOLVED
+        errors = sim.difference(xs[rows], window.x[rows])
+        scaled = errors[:, self.measured] * self._scale
+        if not slopes:
+            return WindowErrors(scaled, np.zeros((0, 0, ndx)), np.zeros((0, 0, n)), solved)
+        by_theta = space.chain(theta, {name: np.asarray(block) for name, block in line.parameters.items()})
+        S, P = np.eye(ndx), np.zeros((ndx, n))
+        moved = np.empty((len(rows), ndx, ndx + n))
+        k = 0
+        for t in range(len(window.u) + 1):
+            if t == rows[k]:
+                moved[k, :, :ndx], moved[k, :, ndx:] = S, P
+                k += 1
+            if t < len(window.u):
+                S, P = line.A[t] @ S, line.A[t] @ P + by_theta[t]
+        slope = difference_slopes(tangent_layout(sim, sim.neutral()), errors) @ moved
+        slope = slope[:, self.measured] * self._scale[:, None]
+        return WindowErrors(scaled, slope[..., :ndx], slope[..., ndx:], solved)

@@ -1,0 +1,86 @@
+"""Identification: parameters of a simulated motion are found again, with the spread that its noise gives them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.identification.windows import difference_slopes
+
+
+def _arm(damper=0.3, mass=1.0):
+    link = dojo.Body("link", mass, (0.02, 0.02, 0.001))
+    joint = dojo.Joint("revolute", None, "link", child_point=(0, 0, 0.3), axis=(0, 1, 0), damper=damper, name="hinge")
+    return dojo.Simulator(dojo.Mechanism([link], [joint], [], [dojo.Input("hinge")]), time_step=0.02)
+
+
+def _motions(sim, rng, noise, count=3):
+    out = []
+    for _ in range(count):
+        us = np.repeat(rng.uniform(-2, 2, (5, 1)), 8, axis=0)
+        t = sim.rollout(np.array([rng.uniform(-1, 1), 0.0]), us)
+        out.append((t.x + noise * rng.standard_normal(t.x.shape), us))
+    return out
+
+
+def test_estimates_scatter_as_their_covariance_says():
+    truth, rng, sd = _arm(), np.random.default_rng(0), np.array([0.01, 0.05])
+    errors = []
+    for _ in range(8):
+        found = dojo.identify(_arm(0.1, 1.6), _motions(truth, rng, sd), ("damper", "mass"), noise=sd)
+        assert found.success, found
+        errors.append((found.values - [0.3, 1.0]) / found.deviation)
+    assert 0.8 < found.rms < 1.2
+    spread = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert np.all((spread > 0.4) & (spread < 1.8)), spread  # 8 samples: within three deviations of 1
+
+
+def test_outliers_are_resisted():
+    truth, rng, sd = _arm(), np.random.default_rng(1), np.array([0.01, 0.05])
+    motions = _motions(truth, rng, sd)
+    motions[0][0][7::9, 0] += 0.8
+    robust = dojo.identify(_arm(0.1), motions, ("damper",), noise=sd)
+    plain = dojo.identify(_arm(0.1), motions, ("damper",), noise=sd, outlier=1e9)
+    assert abs(robust.values[0] - 0.3) < 0.02 < abs(plain.values[0] - 0.3) and robust.outliers > 0.01
+
+
+def test_what_the_data_cannot_tell_is_named():
+    """Of a body that hangs still on a hinge without gravity, mass and inertia about the hinge act as one."""
+    sim = _arm().replace(gravity=(0.0, 0.0, 0.0))
+    motions = _motions(sim, np.random.default_rng(2), np.zeros(2))
+    found = dojo.identify(sim, motions, ("mass", "inertia:link[yy]"), noise=0.01)
+    assert len(found.unseen) == 1 and set(found.unseen[0]) <= {"mass:link", "inertia:link[yy]"}
+    assert np.isinf(np.diag(found.covariance)).any() and "not told" in found.summary()
+
+
+def test_friction_is_found_through_contacts():
+    def block(mu):
+        return dojo.Simulator(dojo.models.block(friction=mu), time_step=0.02, kappa=1e-5)
+
+    truth, motions = block(0.35), []
+    for speed in (1.0, 1.6, 2.2):
+        x = truth.neutral()
+        x[truth.nq] = speed
+        motions.append((truth.rollout(x, np.zeros((25, truth.nu))).x, np.zeros((25, truth.nu))))
+    found = dojo.identify(block(0.6), motions, ("friction:*",), noise=0.01, kappas=(1e-3, 1e-5), window=12)
+    np.testing.assert_allclose(found.values, 0.35, rtol=2e-3)
+
+
+def test_derivatives_of_differences_are_those_of_central_differences():
+    sim = dojo.Simulator(dojo.models.sphere(), time_step=0.01)
+    from dojo_opt.planning.manifold import tangent_layout
+
+    rng = np.random.default_rng(4)
+    a, b = (sim.integrate(sim.neutral(), rng.standard_normal(sim.ndx)) for _ in range(2))
+    slope = difference_slopes(tangent_layout(sim, sim.neutral()), sim.difference(a, b)[None])[0]
+    for j in range(sim.ndx):
+        e = 1e-6 * np.eye(sim.ndx)[j]
+        central = (sim.difference(sim.integrate(a, e), b) - sim.difference(sim.integrate(a, -e), b)) / 2e-6
+        np.testing.assert_allclose(slope[:, j], central, atol=1e-8)
+
+
+@pytest.mark.parametrize(("change", "message"), [({"noise": -1.0}, "noise"), ({"window": 0}, "window")])
+def test_bad_arguments_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        dojo.identify(_arm(), _motions(_arm(), np.random.default_rng(0), 0.0), ("damper",), **change)

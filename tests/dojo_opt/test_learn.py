@@ -1,0 +1,181 @@
+"""Learning: gradients of rollouts under policies, algorithms that repeat to the bit, and policies as controllers."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.learn.network import Network, perceptron
+from dojo_opt.learn.policy_rollout import Noise
+
+
+def _task(steps=30, gravity=True):
+    """A pendulum is to hang down, as far as the ground lets it, which its end touches."""
+    rod = dojo.Body("rod", 1.0, (0.02, 0.02, 0.001))
+    pivot = dojo.Joint("revolute", None, "rod", child_point=(0, 0, 0.25), axis=(0, 1, 0), damper=0.05, name="pivot")
+    brush = dojo.Contact("rod", point=(0.0, 0.0, -0.25), height=-0.49, friction=0.3)
+    mech = dojo.Mechanism([rod], [pivot], [brush], [dojo.Input("pivot")])
+    sim = dojo.Simulator(mech, time_step=0.02, kappa=1e-3)
+
+    def observation(x, out):
+        out[0], out[1], out[2] = np.cos(x[0]), np.sin(x[0]), 0.2 * x[1]
+
+    def reward(x, a, after):
+        return -(after[0] ** 2) - 0.1 * after[1] ** 2 - 0.01 * a[0] ** 2
+
+    def start(rng):
+        return rng.uniform([0.3, -1.0], [0.9, 1.0])
+
+    def terminated(x):
+        return abs(x[1]) > 15.0
+
+    low, high = np.array([-3.0]), np.array([4.0])
+    return dojo.learn.Task(sim, 2, observation, 3, reward, low, high, start, terminated, steps=steps)
+
+
+@pytest.fixture(scope="module")
+def task():
+    return _task()
+
+
+def _policy(task, hidden=(5, 4), activation="elu"):
+    rng = np.random.default_rng(5)
+    network = Network((task.observations, *hidden, task.sim.nu), activation)
+    return dojo.learn.Policy(network, network.start(rng), 0.1 * rng.standard_normal(3), rng.uniform(0.5, 2, 3), task)
+
+
+@pytest.mark.parametrize(("hidden", "activation"), [((5, 4), "elu"), ((6,), "tanh"), ((), "tanh")])
+def test_gradients_of_returns_are_those_of_central_differences(task, hidden, activation):
+    policy, rng = _policy(task, hidden, activation), np.random.default_rng(6)
+    starts, weights = task.starts([rng] * 3), rng.uniform(0.5, 1.0, (6, 3))
+    noise = Noise.draw(rng, task, (6, 3), (0.1, 0.02))
+    seeds = rng.standard_normal((6, 3, task.sim.ndx))
+
+    def value(states):
+        roll = dojo.learn.roll_policy_batch(policy, states, 6, noise=noise)
+        ends = task.sim.difference(roll.after.reshape(18, -1), np.tile(task.sim.neutral(), (18, 1)))
+        return float((weights * roll.rewards).sum() + (seeds.reshape(18, -1) * ends).sum())
+
+    found = dojo.learn.roll_policy_batch(policy, starts, 6, noise=noise, slopes=True).gradient(weights, seeds)
+    for i in range(0, policy.network.count, 3):
+        kept, sides = policy.weights[i], []
+        for step in (1e-5, -1e-5):
+            policy.weights[i] = kept + step
+            sides.append(value(starts))
+        policy.weights[i] = kept
+        np.testing.assert_allclose(found.weights[i], (sides[0] - sides[1]) / 2e-5, rtol=2e-4, atol=2e-4)
+    for row in range(3):
+        for j in range(task.sim.ndx):
+            e = np.zeros_like(starts)
+            e[row, j] = 1e-5
+            np.testing.assert_allclose(
+                found.states[row, j], (value(starts + e) - value(starts - e)) / 2e-5, rtol=2e-4, atol=2e-4
+            )
+    assert found.clipped == 0
+
+
+def test_a_row_that_starts_anew_passes_no_gradient_back(task):
+    policy, starts = _policy(task), task.starts([np.random.default_rng(0)] * 2)
+
+    def restart(t, terminated, unsolved, states):
+        if t == 2:
+            states[0] = starts[1]
+        return np.array([t == 2, False])
+
+    weights = np.ones((5, 2))
+    weights[:3, 0] = 0.0  # what row 0 earns after its new start does not depend on its first state
+    found = dojo.learn.roll_policy_batch(policy, starts, 5, slopes=True, restart=restart).gradient(weights)
+    assert not found.states[0].any() and found.states[1].any()
+
+
+def test_kappa_of_gradients_is_their_own(task):
+    policy, starts = _policy(task), np.array([[0.25, -1.0], [0.4, -2.0]])
+    hard = dojo.learn.roll_policy_batch(policy, starts, 4, slopes=True)
+    soft = dojo.learn.roll_policy_batch(policy, starts, 4, slopes=True, kappa_grad=0.3)
+    np.testing.assert_array_equal(hard.x, soft.x)
+    assert np.abs(hard.gradient(np.ones((4, 2))).weights - soft.gradient(np.ones((4, 2))).weights).max() > 1e-6
+
+
+def test_one_observation_has_the_action_of_a_batch(task):
+    policy = _policy(task)
+    X = task.starts([np.random.default_rng(k) for k in range(4)])
+    batch = task.inputs(policy.actions(task.observe(X)[0]))
+    np.testing.assert_allclose([policy(x) for x in X], batch, rtol=1e-13)
+    sizes = np.array([2, 1], dtype=np.int64)
+    work = np.zeros(4)
+    first = perceptron(sizes, np.array([2.0, 3.0, 0.5]), 0, np.array([1.0, -1.0]), work)
+    assert work[first] == -0.5
+
+
+ALGORITHMS = {
+    "shac": {"epochs": 12, "environments": 8, "horizon": 8, "hidden": (16,)},
+    "ars": {"epochs": 6, "directions": 6},
+    "gradient_search": {"epochs": 6, "environments": 4, "rate": 0.3},
+}
+MODELS = dojo.learn.Randomisation(
+    values={"friction:*": (0.2, 0.4)},
+    factors={"mass": (0.9, 1.1)},
+    substeps=(1, 2),
+    kappa=(1e-4, 1e-2),
+    noise=0.02,
+    models=3,
+)
+
+
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_a_seed_repeats_to_the_bit_and_a_run_can_be_resumed(task, name, tmp_path):
+    algorithm = getattr(dojo.learn, name)
+    options = ALGORITHMS[name] | {"randomisation": MODELS, "evaluations": 3, "episodes": 2, "seed": 3}
+    whole = algorithm(task, **options)
+    half = algorithm(task, **options, callback=lambda record: _stop(record, options["epochs"] // 2))
+    assert half.status == dojo.Status.STOPPED and not half.success
+    half.save(tmp_path / "half.npz")
+    rest = algorithm(task, **options, resume=dojo.learn.Learned.load(tmp_path / "half.npz", task))
+    assert whole.success and rest.success and whole.infinite == rest.unsolved == 0
+    np.testing.assert_array_equal(whole.policy.weights, rest.policy.weights)
+    np.testing.assert_array_equal(whole.state["weights"], rest.state["weights"])
+    assert [r["return"] for r in whole.history] == [r["return"] for r in rest.history]
+    assert whole.best == rest.best and whole.steps == rest.steps
+    other = algorithm(task, **(options | {"seed": 4}))
+    assert np.abs(other.state["weights"] - whole.state["weights"]).max() > 1e-6
+
+
+def _stop(record, epoch):
+    if record["epoch"] == epoch:
+        raise StopIteration
+
+
+def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_path):
+    lines = io.StringIO()
+    learned = dojo.learn.shac(
+        task, epochs=120, environments=16, horizon=10, hidden=(16,), rate=5e-3, verbose=True, stream=lines
+    )
+    before = dojo.learn.evaluate(_policy(task), 8).returns.mean()
+    assert learned.success and learned.unsolved == learned.infinite == 0
+    assert learned.best > 0.4 * before, (learned.best, before)  # returns are negative
+    assert len(lines.getvalue().splitlines()) == 11 and "SOLVED" in learned.summary()
+    learned.policy.save(tmp_path / "policy.npz")
+    again = dojo.learn.Policy.load(tmp_path / "policy.npz", task)
+    loop = dojo.closed_loop(again.controller, dojo.Plant(task.sim, [0.6, 0.0]), 2.0, control_step=task.knot_time)
+    assert loop.survived and abs(loop.x[-1, 0]) < 0.3
+    assert len(learned.plot().lines) == 2
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda t: dojo.learn.shac(t, epoch=3), r"shac\(\.\.\.\).*epoch"),
+        (lambda t: dojo.learn.ars(t, best=40), r"ars\(best=\.\.\.\): expected at most 32"),
+        (
+            lambda t: dojo.learn.shac(t, resume=dojo.learn.ars(t, epochs=1, directions=4, best=1)),
+            "expected a run of shac",
+        ),
+        (lambda t: dojo.learn.Randomisation(kappa=(1.0, 0.1)), "kappa"),
+    ],
+)
+def test_bad_arguments_are_named(task, call, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        call(task)
