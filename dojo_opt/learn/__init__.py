@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from dojo_opt.learn.evaluation import Evaluation, evaluate
 from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, pendulum, walker2d
 from dojo_opt.learn.learned import Learned
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
@@ -24,7 +24,7 @@ __all__ = [
     "Evaluation",
     "GradientSearchOptions",
     "Learned",
-    "Policy",
+    "LearnedPolicy",
     "PolicyGradient",
     "PolicyRollout",
     "RandomSearchOptions",

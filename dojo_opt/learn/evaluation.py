@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from sim.mechanism.checks import whole_number
 from solvers.status import Status
@@ -28,7 +28,7 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(
-    policy: Policy,
+    policy: LearnedPolicy,
     episodes: int = 8,
     seed: int = 0,
     *,

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.network import Network
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.task import Task
 from sim.mechanism.brief import brief_table
 from solvers.status import MESSAGES, Status
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Learned", "Progress"]
+__all__ = ["Learned", "LearningProgress"]
 
 COLUMNS = ("epoch", "steps", "return", "evaluated", "gradient", "clipped", "unsolved", "infinite", "seconds")
 HEADER = "{:>6} {:>10} {:>9} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
@@ -57,7 +57,7 @@ class Learned:
         state: arrays and numbers to resume from.
     """
 
-    policy: Policy
+    policy: LearnedPolicy
     success: bool
     status: Status
     message: str
@@ -117,7 +117,7 @@ class Learned:
             meta = json.loads(str(data["meta"]))
             shape = meta.pop("network")
             network = Network(tuple(shape["sizes"]), shape["activation"])
-            policy = Policy(network, data["weights"], data["mean"], data["deviation"], task)
+            policy = LearnedPolicy(network, data["weights"], data["mean"], data["deviation"], task)
             state = meta.pop("state") | {k[6:]: data[k] for k in data.files if k.startswith("state_")}
             meta["status"] = Status(meta["status"])
             return cls(policy=policy, state=state, **meta)
@@ -137,7 +137,7 @@ class Learned:
         return axes
 
 
-class Progress:
+class LearningProgress:
     """The table of epochs while an algorithm runs, its clock and its limits."""
 
     def __init__(self, options: Any, history: list[dict[str, Any]], before: float) -> None:

@@ -1,4 +1,4 @@
-"""Policy: a function from states to inputs, compiled for one state and in NumPy for many."""
+"""LearnedPolicy: a function from states to inputs, compiled for one state and in NumPy for many."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from sim.mechanism import checks
 
 Floats = NDArray[np.float64]
 
-__all__ = ["Policy"]
+__all__ = ["LearnedPolicy"]
 
 _SPAN = 10.0  # standard deviations: scaled observations beyond are cut off, without a derivative
 
 
 @dataclass
-class Policy:
+class LearnedPolicy:
     """a = s(network((o - mean) / deviation)), where s is tanh, or a clamp to [-1, 1] of linear policies.
 
         u = policy(x)                                               an input (nu,) [N, N m] for a state
@@ -67,8 +67,8 @@ class Policy:
     def __call__(self, x: ArrayLike) -> Floats:
         """Input (nu,) for a state (nx,)."""
         if self.task is None:
-            raise ValueError("Policy(x): a loaded policy has no task; Policy.load(path, task)")
-        state = checks.array("Policy(x)", x, (self.task.sim.nx,))
+            raise ValueError("LearnedPolicy(x): a loaded policy has no task; LearnedPolicy.load(path, task)")
+        state = checks.array("LearnedPolicy(x)", x, (self.task.sim.nx,))
         return self.task.inputs(self.action(self.task.observe(state[None])[0][0]))
 
     def controller(self, time: float, x: Floats) -> Floats:
@@ -86,7 +86,7 @@ class Policy:
         np.savez(path, network=shape, weights=self.weights, mean=self.mean, deviation=self.deviation)
 
     @classmethod
-    def load(cls, path: str | Path, task: Task | None = None) -> Policy:
+    def load(cls, path: str | Path, task: Task | None = None) -> LearnedPolicy:
         """Read a file that `save` wrote."""
         with np.load(path, allow_pickle=False) as data:
             shape = json.loads(str(data["network"]))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.network import Network
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
 from solvers.status import Status
@@ -58,7 +58,7 @@ class PolicyRollout:
     cut          (T, n) the next step starts from another state: of both, and of episodes that were cut off
     """
 
-    def __init__(self, policy: Policy, steps: int, rows: int) -> None:
+    def __init__(self, policy: LearnedPolicy, steps: int, rows: int) -> None:
         assert policy.task is not None
         self.policy, self.task = policy, policy.task
         sim = self.task.sim
@@ -127,7 +127,7 @@ class PolicyRollout:
 
 
 def roll_policy_batch(
-    policy: Policy,
+    policy: LearnedPolicy,
     starts: Floats,
     steps: int,
     *,

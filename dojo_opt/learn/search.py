@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.evaluation import evaluate
-from dojo_opt.learn.learned import Learned, Progress
+from dojo_opt.learn.learned import Learned, LearningProgress
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import roll_policy_batch
 from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
 from dojo_opt.learn.task import Task
@@ -123,7 +123,7 @@ class GradientSearchOptions:
         checks.number("gradient_search(costate=...)", self.costate, above=0.0)
 
 
-class Search:
+class WeightSearch:
     """A policy that moves, its random numbers, and its record."""
 
     algorithm = ""
@@ -135,7 +135,7 @@ class Search:
         network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
         n = task.observations
         weights = network.start(np.random.default_rng((seed, 0)), 0.1) if options.hidden else np.zeros(network.count)
-        self.policy = Policy(network, weights, np.zeros(n), np.ones(n), task)
+        self.policy = LearnedPolicy(network, weights, np.zeros(n), np.ones(n), task)
         self.statistics = ObservationStatistics(n)
         self.horizon = task.steps if options.horizon is None else options.horizon
         self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
@@ -158,7 +158,7 @@ class Search:
     def assess(self) -> float:
         """Mean return of the present policy, which is kept if it is the best."""
         p = self.policy
-        policy = Policy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
+        policy = LearnedPolicy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
         found = float(evaluate(policy, self.options.episodes, self.seed).returns.mean())
         if found > self.best:
             self.best, self.chosen = found, policy
@@ -179,16 +179,16 @@ class Search:
         self.policy.weights[:], self.statistics.sums[:] = learned.state["weights"], learned.state["sums"]
         self.rng.bit_generator.state = learned.state["rng"]
         p = learned.policy
-        self.chosen = Policy(p.network, p.weights, p.mean, p.deviation, self.task)
+        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
 
 
-class RandomSearch(Search):
+class RandomSearch(WeightSearch):
     """ARS."""
 
     algorithm = "ars"
 
     def update(self) -> tuple[float, float, float]:
-        """As Search.update; a pair shares its first state and its model."""
+        """As WeightSearch.update; a pair shares its first state and its model."""
         o, policy = self.options, self.policy
         directions = self.rng.standard_normal((o.directions, policy.network.count))
         x = self.task.starts([self.rng] * o.directions)
@@ -236,13 +236,13 @@ class RandomSearch(Search):
         return out
 
 
-class GradientSearch(Search):
+class GradientSearch(WeightSearch):
     """Gradient search."""
 
     algorithm = "gradient_search"
 
     def update(self) -> tuple[float, float, float]:
-        """As Search.update; a row ends with its episode."""
+        """As WeightSearch.update; a row ends with its episode."""
         o, task, policy = self.options, self.task, self.policy
         x = task.starts([self.rng] * o.environments)
         drawn = self.models.draw(self.rng, o.environments)
@@ -262,7 +262,7 @@ class GradientSearch(Search):
         return float((weights * roll.rewards).sum() / o.environments), length, found.clipped / weights.size
 
 
-def run_search(search: Search, resume: Learned | None) -> Learned:
+def run_search(search: WeightSearch, resume: Learned | None) -> Learned:
     """All epochs of a search."""
     o, name = search.options, search.algorithm
     if resume is not None:
@@ -273,7 +273,7 @@ def run_search(search: Search, resume: Learned | None) -> Learned:
                 f"{name}(resume=...): expected a run with seed {search.seed} and this policy, got {resume!r}"
             )
         search.resume(resume)
-    progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
+    progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
     marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
     status, state = Status.SOLVED, search.state()
     try:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.learn.evaluation import evaluate
-from dojo_opt.learn.learned import Learned, Progress
+from dojo_opt.learn.learned import Learned, LearningProgress
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
-from dojo_opt.learn.policy import Policy
+from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batch, value_network
 from dojo_opt.learn.randomisation import Models, Randomisation
 from dojo_opt.learn.task import Task
@@ -110,7 +110,7 @@ class _Shac:
         self.models = Models(task, o.randomisation, np.random.default_rng((seed, 3)))
         network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
         self.critic = value_network(task, o.hidden, o.activation)
-        self.policy = Policy(network, network.start(rng, 0.1), *self._scale(None), task)
+        self.policy = LearnedPolicy(network, network.start(rng, 0.1), *self._scale(None), task)
         self.value = self.critic.start(rng)
         self.target = self.value.copy()
         self.actor_adam, self.critic_adam = Adam(network.count, o.betas), Adam(self.critic.count, o.betas)
@@ -237,10 +237,10 @@ class _Shac:
 
     # -- results -------------------------------------------------------------------------------------------------------
 
-    def snapshot(self) -> Policy:
+    def snapshot(self) -> LearnedPolicy:
         """A copy of the policy as it is now."""
         p = self.policy
-        return Policy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
+        return LearnedPolicy(p.network, p.weights.copy(), *self._scale(self.statistics), self.task)
 
     def assess(self) -> float:
         """Mean return of the present policy, which is kept if it is the best."""
@@ -273,7 +273,7 @@ class _Shac:
         self.actor_adam.moments[:], self.critic_adam.moments[:] = given["actor"], given["critic"]
         self.rng.bit_generator.state, self.restarts.bit_generator.state = given["rng"], given["restarts"]
         p = learned.policy
-        self.chosen = Policy(p.network, p.weights, p.mean, p.deviation, self.task)
+        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
 
 
 def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
@@ -307,7 +307,7 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
                 f"shac(resume=...): expected a run of shac with seed {seed} and this policy, got {resume!r}"
             )
         run.resume(resume)
-    progress = Progress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
+    progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
     marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
     status, state = Status.SOLVED, run.state()
     try:

@@ -44,7 +44,9 @@ def task():
 def _policy(task, hidden=(5, 4), activation="elu"):
     rng = np.random.default_rng(5)
     network = Network((task.observations, *hidden, task.sim.nu), activation)
-    return dojo.learn.Policy(network, network.start(rng), 0.1 * rng.standard_normal(3), rng.uniform(0.5, 2, 3), task)
+    return dojo.learn.LearnedPolicy(
+        network, network.start(rng), 0.1 * rng.standard_normal(3), rng.uniform(0.5, 2, 3), task
+    )
 
 
 @pytest.mark.parametrize(("hidden", "activation"), [((5, 4), "elu"), ((6,), "tanh"), ((), "tanh")])
@@ -158,7 +160,7 @@ def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_pa
     assert learned.best > 0.4 * before, (learned.best, before)  # returns are negative
     assert len(lines.getvalue().splitlines()) == 11 and "SOLVED" in learned.summary()
     learned.policy.save(tmp_path / "policy.npz")
-    again = dojo.learn.Policy.load(tmp_path / "policy.npz", task)
+    again = dojo.learn.LearnedPolicy.load(tmp_path / "policy.npz", task)
     loop = dojo.closed_loop(again.controller, dojo.Plant(task.sim, [0.6, 0.0]), 2.0, control_step=task.knot_time)
     assert loop.survived and abs(loop.x[-1, 0]) < 0.3
     assert len(learned.plot().lines) == 2
