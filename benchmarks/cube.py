@@ -1,6 +1,6 @@
 """The real cube: parameters identified from films of its tosses, and predictions of tosses that were not used.
 
-python benchmarks/cube.py FOLDER [--tosses 8 32 300] [--held-out 100] [--output cube.json]
+python benchmarks/cube.py FOLDER [--tosses 8 64 300] [--held-out 100] [--output cube.json]
 
 FOLDER holds tosses_train.npz: `states` (N, 13) of position, quaternion, velocity, angular velocity (body) at 148 Hz, in
 half widths of 52.4 mm, of all tosses stacked, and `lengths`: 400 of the 570 tosses of ContactNets (Pfrommer, Halm,
@@ -86,10 +86,10 @@ def main() -> None:
     """Print tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--tosses", nargs="+", type=int, default=[8, 32, 300])
+    parser.add_argument("--tosses", nargs="+", type=int, default=[8, 64, 300])
     parser.add_argument("--held-out", type=int, default=100)
-    parser.add_argument("--window", type=int, default=40)
-    parser.add_argument("--further", nargs="*", default=[], help="as inertia: and com:")
+    parser.add_argument("--window", type=int, default=80)
+    parser.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
     parser.add_argument("--output", type=Path, default=None)
     given = parser.parse_args()
     motions = tosses(given.folder)
@@ -107,6 +107,7 @@ def main() -> None:
             "seconds": time.process_time() - began,
             "friction": [float(found.values[0]), float(found.deviation[0])],
             "restitution": [float(found.values[1]), float(found.deviation[1])],
+            "further": dict(zip(found.labels[26:], found.values[26:].tolist(), strict=True)),
             "half widths": [float(w) for w in 1e3 * np.abs(corners).mean(axis=0)],
         }
     print(f"{'steps: position mean, median [mm]; rotation mean, median [rad]':>40}")
