@@ -31,6 +31,7 @@ __all__ = ["Identified", "IdentifyOptions", "identify"]
 
 _DAMPING, _LEAST, _LARGEST = 1e-3, 1e-9, 1e8  # share of the diagonal
 _UNSEEN = 1e-8  # of the largest eigenvalue: combinations that the data do not tell
+_EXACT = 1e-10  # square of the errors over their noise: data without noise
 COLUMNS = ("iteration", "kappa", "cost", "rms", "damping", "step", "outliers", "unsolved", "seconds")
 _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUMNS)
 
@@ -255,6 +256,8 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     cost, weights, far = fit.weigh(found, usable)
     damping = _DAMPING
     for _ in range(o.max_iterations):
+        if cost <= _EXACT * sum(w.errors.size for w in found):
+            return Status.SOLVED
         accepted, gain = False, 0.0
         while damping < _LARGEST and not accepted:
             theta, starts = fit.step(found, weights, damping)

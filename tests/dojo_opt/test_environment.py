@@ -70,5 +70,5 @@ def test_a_plant_that_does_not_fit_is_refused():
     problem = dojo.problems.hop()
     with pytest.raises(ValueError, match=r"Environment\(plant=\.\.\.\): expected a time step that divides a knot"):
         dojo.Environment(problem, dojo.Plant(problem.sim.replace(time_step=0.03)))
-    with pytest.raises(TypeError, match=r"Environment\(problem\): expected a Problem"):
+    with pytest.raises(TypeError, match=r"Environment\(source\): expected a Task or a Problem"):
         dojo.Environment(problem.sim)

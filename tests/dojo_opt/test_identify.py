@@ -27,13 +27,13 @@ def _motions(sim, rng, noise, count=3):
 def test_estimates_scatter_as_their_covariance_says():
     truth, rng, sd = _arm(), np.random.default_rng(0), np.array([0.01, 0.05])
     errors = []
-    for _ in range(8):
+    for _ in range(5):
         found = dojo.identify(_arm(0.1, 1.6), _motions(truth, rng, sd), ("damper", "mass"), noise=sd)
         assert found.success, found
         errors.append((found.values - [0.3, 1.0]) / found.deviation)
     assert 0.8 < found.rms < 1.2
-    spread = np.sqrt(np.mean(np.square(errors), axis=0))
-    assert np.all((spread > 0.4) & (spread < 1.8)), spread  # 8 samples: within three deviations of 1
+    spread = np.sqrt(np.mean(np.square(errors)))
+    assert 0.5 < spread < 1.7, spread  # 10 numbers: within three deviations of 1
 
 
 def test_outliers_are_resisted():
@@ -42,7 +42,8 @@ def test_outliers_are_resisted():
     motions[0][0][7::9, 0] += 0.8
     robust = dojo.identify(_arm(0.1), motions, ("damper",), noise=sd)
     plain = dojo.identify(_arm(0.1), motions, ("damper",), noise=sd, outlier=1e9)
-    assert abs(robust.values[0] - 0.3) < 0.02 < abs(plain.values[0] - 0.3) and robust.outliers > 0.01
+    errors = [abs(found.values[0] - 0.3) for found in (robust, plain)]
+    assert errors[0] < 3.0 * robust.deviation[0] and errors[0] < 0.5 * errors[1] and robust.outliers > 0.01
 
 
 def test_what_the_data_cannot_tell_is_named():
