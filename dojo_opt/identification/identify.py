@@ -38,23 +38,41 @@ _HEADER = "{:>9} {:>8} {:>12} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8}".format(*COLUM
 
 @dataclass(frozen=True, repr=False)
 class Identified:
-    """Parameters and how well the data determine them."""
+    """Parameters and how well the data determine them.
+
+    Attributes:
+        success: whether the last smoothing converged.
+        status: SOLVED, or why it ended before.
+        message: the same as a sentence.
+        labels: of the values.
+        values: (n,).
+        start: (n,) before.
+        covariance: (n, n); infinite on the diagonal where the data tell nothing.
+        simulator: with the values.
+        rms: root mean square of the errors over their noise: 1 where the noise is as stated.
+        unseen: combinations, by label, that change no prediction.
+        outliers: share of states that count less than fully.
+        unsolved: windows that could not be predicted at the end, and do not count.
+        starts: (nx,) of every window.
+        history: one record per iteration.
+        seconds: processor time.
+    """
 
     success: bool
     status: Status
     message: str
-    labels: tuple[str, ...]  # of the values
-    values: Floats  # (n,)
-    start: Floats  # (n,) before
-    covariance: Floats  # (n, n); infinite on the diagonal where the data tell nothing
-    simulator: Simulator  # with the values
-    rms: float  # root mean square of the errors over their noise: 1 where the noise is as stated
-    unseen: list[dict[str, float]]  # combinations, by label, that change no prediction
-    outliers: float  # share of states that count less than fully
-    unsolved: int  # windows that could not be predicted at the end, and do not count
-    starts: list[Floats] = field(default_factory=list)  # (nx,) of every window
+    labels: tuple[str, ...]
+    values: Floats
+    start: Floats
+    covariance: Floats
+    simulator: Simulator
+    rms: float
+    unseen: list[dict[str, float]]
+    outliers: float
+    unsolved: int
+    starts: list[Floats] = field(default_factory=list)
     history: list[dict[str, Any]] = field(default_factory=list)
-    seconds: float = 0.0  # processor time
+    seconds: float = 0.0
 
     @property
     def deviation(self) -> Floats:
@@ -78,14 +96,22 @@ class Identified:
         return list(zip(self.labels, self.values, self.deviation, self.start, strict=True))
 
     def closing_line(self) -> str:
-        """One line: how it ended."""
+        """One line: how it ended.
+
+        Returns:
+            The line.
+        """
         return (
             f"{self.status.name}: {self.message} rms {self.rms:.3f} of the noise, {100 * self.outliers:.1f} % "
             f"outliers, {self.unsolved} windows unsolved, {self.seconds:.1f} s"
         )
 
     def summary(self) -> str:
-        """The table of parameters and a closing line."""
+        """The table of parameters and a closing line.
+
+        Returns:
+            Lines of text.
+        """
         lines = [f"{'parameter':32} {'value':>12} {'deviation':>12} {'before':>12}"]
         lines += [f"{name:32} {value:12.6g} {sd:12.3g} {old:12.6g}" for name, value, sd, old in self._rows()]
         for combination in self.unseen:

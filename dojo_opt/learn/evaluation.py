@@ -19,12 +19,19 @@ __all__ = ["Evaluation", "evaluate"]
 
 
 class Evaluation(NamedTuple):
-    """Episodes under a policy."""
+    """Episodes under a policy.
 
-    returns: Floats  # (n,) sums of rewards
-    lengths: Integers  # (n,) actions until they ended
-    unsolved: int  # episodes that ended with a step that was not solved
-    states: Floats  # (steps + 1, nx) of the first episode
+    Attributes:
+        returns: (n,) sums of rewards.
+        lengths: (n,) actions until they ended.
+        unsolved: episodes that ended with a step that was not solved.
+        states: (steps + 1, nx) of the first episode.
+    """
+
+    returns: Floats
+    lengths: Integers
+    unsolved: int
+    states: Floats
 
 
 def evaluate(
@@ -46,6 +53,9 @@ def evaluate(
 
     Returns:
         Evaluation; the same for the same seed.
+
+    Raises:
+        ValueError: the policy has no task, or a number is out of range.
     """
     task = policy.task
     if task is None:

@@ -103,7 +103,11 @@ def _task(mech: MjcfMechanism, substeps: int, time_step: float, **fields: Any) -
 
 
 def half_cheetah() -> Task:
-    """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each."""
+    """HalfCheetah-v5: run forward; 17 observations, 6 actions, 0.05 s each.
+
+    Returns:
+        The task.
+    """
     mech = _model("half_cheetah.xml")
     return _task(
         mech, 5, 0.01, observation=_tailed(1, mech.nq, np.inf), observations=17, reward=_runs(0.05, 0.1),
@@ -112,7 +116,11 @@ def half_cheetah() -> Task:
 
 
 def hopper() -> Task:
-    """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each."""
+    """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each.
+
+    Returns:
+        The task.
+    """
     mech = _model("hopper.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
@@ -129,7 +137,11 @@ def hopper() -> Task:
 
 
 def walker2d() -> Task:
-    """Walker2d-v5: walk forward without falling; 17 observations, 6 actions, 0.008 s each."""
+    """Walker2d-v5: walk forward without falling; 17 observations, 6 actions, 0.008 s each.
+
+    Returns:
+        The task.
+    """
     mech = _model("walker2d_v5.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
@@ -143,7 +155,11 @@ def walker2d() -> Task:
 
 
 def ant() -> Task:
-    """Ant-v5 without forces of contacts: run along x; 27 observations, 8 actions, 0.05 s each."""
+    """Ant-v5 without forces of contacts: run along x; 27 observations, 8 actions, 0.05 s each.
+
+    Returns:
+        The task.
+    """
     mech = _model("ant.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
@@ -157,7 +173,11 @@ def ant() -> Task:
 
 
 def cartpole() -> Task:
-    """InvertedPendulum-v5: balance a pole on a cart; 4 observations, 1 action, 0.04 s each."""
+    """InvertedPendulum-v5: balance a pole on a cart; 4 observations, 1 action, 0.04 s each.
+
+    Returns:
+        The task.
+    """
     mech = _model("inverted_pendulum.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
@@ -174,7 +194,11 @@ def cartpole() -> Task:
 
 
 def pendulum() -> Task:
-    """Pendulum-v1: swing up with little torque; 3 observations, 1 action, 0.05 s each. Speed has no limit here."""
+    """Pendulum-v1: swing up with little torque; 3 observations, 1 action, 0.05 s each. Speed has no limit here.
+
+    Returns:
+        The task.
+    """
     rod = Body("rod", 1.0, (1.0 / 12.0, 1.0 / 12.0, 1e-3))
     pivot = Joint("revolute", None, "rod", child_point=(0.0, 0.0, -0.5), axis=(0.0, 1.0, 0.0), name="pivot")
     mech = Mechanism([rod], [pivot], [], [Input("pivot")], gravity=(0.0, 0.0, -10.0), name="pendulum")

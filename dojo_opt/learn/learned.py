@@ -78,18 +78,30 @@ class Learned:
         return brief_table(self.closing_line(), COLUMNS, [[r[name] for name in COLUMNS] for r in self.history])
 
     def closing_line(self) -> str:
-        """One line: how it ended."""
+        """One line: how it ended.
+
+        Returns:
+            The line.
+        """
         return (
             f"{self.algorithm}, {self.status.name}: {self.message} Return {self.best:.1f} after {self.steps} steps in "
             f"{self.seconds:.1f} s, {self.unsolved} unsolved, {self.infinite} gradients not finite"
         )
 
     def summary(self) -> str:
-        """The table of epochs and a closing line."""
+        """The table of epochs and a closing line.
+
+        Returns:
+            Lines of text.
+        """
         return "\n".join([HEADER, *(table_line(r) for r in self.history), self.closing_line()])
 
     def save(self, path: str | Path) -> None:
-        """Write everything but the task to an .npz file."""
+        """Write everything but the task to an .npz file.
+
+        Args:
+            path: of the file.
+        """
         names = (
             "success",
             "message",
@@ -112,7 +124,15 @@ class Learned:
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> Learned:
-        """Read a file that `save` wrote; with its task, the policy can be asked for inputs."""
+        """Read a file that `save` wrote; with its task, the policy can be asked for inputs.
+
+        Args:
+            path: of the file.
+            task: what was learnt (default None).
+
+        Returns:
+            The run.
+        """
         with np.load(path, allow_pickle=False) as data:
             meta = json.loads(str(data["meta"]))
             shape = meta.pop("network")
@@ -123,7 +143,14 @@ class Learned:
             return cls(policy=policy, state=state, **meta)
 
     def plot(self, axes: Any = None) -> Any:
-        """Returns over processor time; makes a figure unless axes are given, and returns the axes."""
+        """Returns over processor time; makes a figure unless axes are given, and returns the axes.
+
+        Args:
+            axes: of matplotlib (default None: those of a new figure).
+
+        Returns:
+            The axes.
+        """
         if axes is None:
             from matplotlib.figure import Figure
 

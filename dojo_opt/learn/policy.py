@@ -44,7 +44,14 @@ class LearnedPolicy:
     task: Task | None = field(default=None, repr=False)
 
     def scaled(self, observations: Floats) -> Floats:
-        """Scaled and limited to ten standard deviations."""
+        """Scaled and limited to ten standard deviations.
+
+        Args:
+            observations: (..., no).
+
+        Returns:
+            (..., no) numbers from -10 to 10.
+        """
         return np.clip((observations - self.mean) / self.deviation, -_SPAN, _SPAN)
 
     @property
@@ -53,12 +60,26 @@ class LearnedPolicy:
         return len(self.network.sizes) == 2
 
     def actions(self, observations: Floats) -> Floats:
-        """(n, nu) actions of rows of observations."""
+        """(n, nu) actions of rows of observations.
+
+        Args:
+            observations: (n, no).
+
+        Returns:
+            (n, nu) actions in [-1, 1].
+        """
         y = self.network.forward(self.weights, self.scaled(observations))[0]
         return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
 
     def action(self, observation: Floats) -> Floats:
-        """(nu,) action of one observation."""
+        """(nu,) action of one observation.
+
+        Args:
+            observation: (no,).
+
+        Returns:
+            (nu,) action in [-1, 1].
+        """
         sizes, work = self._buffers
         first = perceptron(sizes, self.weights, number_of(self.network.activation), self.scaled(observation), work)
         y = work[first : first + sizes[-1]]
@@ -72,7 +93,15 @@ class LearnedPolicy:
         return self.task.inputs(self.action(self.task.observe(state[None])[0][0]))
 
     def controller(self, time: float, x: Floats) -> Floats:
-        """As `dojo.closed_loop` takes a controller."""
+        """As `dojo.closed_loop` takes a controller.
+
+        Args:
+            time: not used [s].
+            x: (nx,) state.
+
+        Returns:
+            (nu,) input [N, N m].
+        """
         return self(x)
 
     @cached_property
@@ -81,13 +110,25 @@ class LearnedPolicy:
         return sizes, np.zeros(2 * max(self.network.sizes))
 
     def save(self, path: str | Path) -> None:
-        """Write the policy to an .npz file, which NumPy reads without this package."""
+        """Write the policy to an .npz file, which NumPy reads without this package.
+
+        Args:
+            path: of the file.
+        """
         shape = json.dumps({"sizes": self.network.sizes, "activation": self.network.activation})
         np.savez(path, network=shape, weights=self.weights, mean=self.mean, deviation=self.deviation)
 
     @classmethod
     def load(cls, path: str | Path, task: Task | None = None) -> LearnedPolicy:
-        """Read a file that `save` wrote."""
+        """Read a file that `save` wrote.
+
+        Args:
+            path: of the file.
+            task: what the policy is for (default None).
+
+        Returns:
+            The policy.
+        """
         with np.load(path, allow_pickle=False) as data:
             shape = json.loads(str(data["network"]))
             network = Network(tuple(shape["sizes"]), shape["activation"])

@@ -40,12 +40,19 @@ class Noise:
 
 @dataclass(frozen=True)
 class PolicyGradient:
-    """Gradient of sum_t,i w_ti r_ti + ... of a rollout."""
+    """Gradient of sum_t,i w_ti r_ti + ... of a rollout.
 
-    weights: Floats  # (count,) by the weights of the policy
-    states: Floats  # (n, ndx) by the first states
-    clipped: int  # costates of a row and step that were longer than the limit
-    largest: float  # costate before the limit
+    Attributes:
+        weights: (count,) by the weights of the policy.
+        states: (n, ndx) by the first states.
+        clipped: costates of a row and step that were longer than the limit.
+        largest: costate before the limit.
+    """
+
+    weights: Floats
+    states: Floats
+    clipped: int
+    largest: float
 
 
 class PolicyRollout:
@@ -56,6 +63,11 @@ class PolicyRollout:
     actions      (T, n, nu); rewards (T, n)
     terminated   (T, n) the episode has ended there; unsolved (T, n) the step was not solved, and has no reward
     cut          (T, n) the next step starts from another state: of both, and of episodes that were cut off
+
+    Args:
+        policy: a policy with a task.
+        steps: T.
+        rows: n.
     """
 
     def __init__(self, policy: LearnedPolicy, steps: int, rows: int) -> None:
@@ -72,7 +84,16 @@ class PolicyRollout:
         self._kept: list[list[Floats]] = []
 
     def act(self, t: int, noise: Noise | None, slopes: bool) -> Floats:
-        """The actions (n, nu) of step t; returns the derivatives of the observations."""
+        """The actions (n, nu) of step t; returns the derivatives of the observations.
+
+        Args:
+            t: number of the step.
+            noise: of the rollout, or None.
+            slopes: whether the derivatives are wanted.
+
+        Returns:
+            (n, no, ndx) derivatives of the observations by the states, or none.
+        """
         policy = self.policy
         self.observations[t], rates = self.task.observe(self.x[t], slopes)
         scaled = (self.observations[t] - policy.mean) / policy.deviation
@@ -88,7 +109,11 @@ class PolicyRollout:
         return rates
 
     def keep(self, *slopes: Floats) -> None:
-        """Keep the derivatives of a step: observation, A, B, reward."""
+        """Keep the derivatives of a step: observation, A, B, reward.
+
+        Args:
+            *slopes: of the observations, A, B, of the rewards.
+        """
         self._slopes.append(slopes)
 
     def gradient(self, weights: Floats, ends: Floats | None = None, limit: float = np.inf) -> PolicyGradient:
@@ -100,6 +125,9 @@ class PolicyRollout:
             weights: (T, n) of the rewards.
             ends: (T, n, ndx) derivatives e' of further terms by the states after the steps.
             limit: length of the costate l of a row, beyond which it is shortened.
+
+        Returns:
+            The gradient, by the weights and by the first states.
         """
         policy, ndx, nu = self.policy, self.task.sim.ndx, self.task.sim.nu
         rows = self.x.shape[1]
@@ -149,6 +177,12 @@ def roll_policy_batch(
         kappa_grad: smoothing of the derivatives [N s m]; that of the motion by default.
         restart: function of (step, terminated (n,), unsolved (n,), states (n, nx)) that replaces the states of rows
             that start anew, and returns which these are (n,); by default rows go on, unsolved ones stand still.
+
+    Returns:
+        The rollout.
+
+    Raises:
+        ValueError: the policy has no task.
     """
     task = policy.task
     if task is None:

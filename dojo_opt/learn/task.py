@@ -29,7 +29,14 @@ _KEPT = 64  # loops
 
 
 def never(x: Floats) -> bool:
-    """No state ends an episode."""
+    """No state ends an episode.
+
+    Args:
+        x: (nx,) state.
+
+    Returns:
+        False.
+    """
     return False
 
 
@@ -177,11 +184,26 @@ class Task:
         return np.zeros((3, max(self.sim.nx, self.sim.nu, self.observations)))
 
     def inputs(self, actions: Floats) -> Floats:
-        """(..., nu) inputs of actions in [-1, 1] [N, N m]."""
+        """(..., nu) inputs of actions in [-1, 1] [N, N m].
+
+        Args:
+            actions: (..., nu) in [-1, 1].
+
+        Returns:
+            (..., nu) inputs [N, N m].
+        """
         return 0.5 * (self.high + self.low) + 0.5 * (self.high - self.low) * actions
 
     def observe(self, xs: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
-        """(observations (n, no), their derivatives (n, no, ndx), or none)."""
+        """(observations (n, no), their derivatives (n, no, ndx), or none).
+
+        Args:
+            xs: (n, nx) states.
+            slopes: whether the derivatives are wanted (default False).
+
+        Returns:
+            (n, no) observations, and (n, no, ndx) derivatives, or (0, no, ndx).
+        """
         n = len(xs)
         values = np.zeros((n, self.observations))
         out = np.zeros((n if slopes else 0, self.observations, self.sim.ndx))
@@ -189,18 +211,42 @@ class Task:
         return values, out
 
     def rewards(self, xs: Floats, actions: Floats, nexts: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
-        """(rewards (n,) without those of survival, their derivatives (n, ndx + nu + ndx), or none)."""
+        """(rewards (n,) without those of survival, their derivatives (n, ndx + nu + ndx), or none).
+
+        Args:
+            xs: (n, nx) states.
+            actions: (n, nu) in [-1, 1].
+            nexts: (n, nx) states after the actions.
+            slopes: whether the derivatives are wanted (default False).
+
+        Returns:
+            (n,) rewards, and (n, ndx + nu + ndx) derivatives, or none.
+        """
         n, width = len(xs), 2 * self.sim.ndx + self.sim.nu
         values, out = np.zeros(n), np.zeros((n if slopes else 0, width))
         self._reward_loop(self._layout, xs, actions, nexts, self._work.copy(), values, out)
         return values, out
 
     def ends(self, xs: Floats) -> Flags:
-        """(n,) whether episodes end in these states."""
+        """(n,) whether episodes end in these states.
+
+        Args:
+            xs: (n, nx) states.
+
+        Returns:
+            (n,) flags.
+        """
         out = np.zeros(len(xs), dtype=np.bool_)
         self._end_loop(xs, out)
         return out
 
     def starts(self, rngs: Any) -> Floats:
-        """First states (n, nx), each from its own generator."""
+        """First states (n, nx), each from its own generator.
+
+        Args:
+            rngs: generators, one for each state.
+
+        Returns:
+            (n, nx) states.
+        """
         return np.array([checks.array("Task(start=...)", self.start(rng), (self.sim.nx,)) for rng in rngs])

@@ -224,6 +224,9 @@ class RowStepping(StateSpace):
 
         Returns:
             BatchStep with the states after the knot, and A (n, ndx, ndx), B (n, ndx, nu).
+
+        Raises:
+            ValueError: a value is out of range, or has the wrong shape.
         """
         call = "Simulator.step_batch"
         inputs = self._arguments.inputs("step_batch", "U", U, ("n", self.nu))
