@@ -12,7 +12,7 @@ from _common import finish
 import dojo_opt as dojo
 
 KNOT, HORIZON = 0.05, 20
-STEP = dojo.Terrain.steps([0.15], start=0.4, edge=0.06)
+STEP = dojo.Terrain.steps([0.15], start=0.4, edge=0.1)
 LINES = np.linspace(-1.0, 2.0, 121)
 HILL = dojo.Terrain.from_function(lambda x, y: 0.1 * np.exp(-((x - 0.35) ** 2) / 0.01) + 0.0 * y, LINES, [0.0])
 
@@ -40,7 +40,7 @@ def onto(terrain, distance):
 
 
 figure, axes = plt.subplots(2, 1, sharex=True, figsize=(7, 6), layout="constrained")
-for ax, name, terrain, distance in zip(axes, ("onto a step", "over a hill"), (STEP, HILL), (0.7, 0.6), strict=True):
+for ax, name, terrain, distance in zip(axes, ("onto a step", "over a hill"), (STEP, HILL), (0.65, 0.6), strict=True):
     plan = dojo.ilqr(onto(terrain, distance), verbose=True)
     foot = plan.problem.sim.maximal(plan.x)[:, 1, :3]
     x = np.linspace(-0.3, 1.0, 500)

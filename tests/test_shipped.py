@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import os
@@ -337,4 +338,5 @@ def test_an_example_compiles_nothing(tmp_path: Path, name: str) -> None:
     folder = Path(__file__).resolve().parent.parent / "examples"
     program = EXAMPLE.format(path=str(folder / name), folder=str(folder))
     out = python(program, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
-    assert out.splitlines()[-1] == "[]"
+    users = ("dojo_opt.planning.manifold.", "solvers.rotation.")  # compiled into the loops around users' functions
+    assert [one for one in ast.literal_eval(out.splitlines()[-1]) if not one.startswith(users)] == []

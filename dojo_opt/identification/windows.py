@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dojo_opt.identification.parameter_space import ParameterSpace
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 from sim.simulator.results import Trajectory, path_of
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
@@ -33,6 +34,8 @@ class Window:
     first: int  # step of the trajectory it begins at
     x: Floats  # (T + 1, nx) measured states
     u: Floats  # (T, nu)
+
+    __repr__ = brief_repr
 
 
 def cut_windows(sim: Simulator, trajectories: Sequence[Any], length: int | None) -> list[Window]:
@@ -84,6 +87,8 @@ class WindowErrors:
     by_start: Floats  # (m, d, ndx), or (0, ...)
     by_theta: Floats  # (m, d, n)
     solved: bool
+
+    __repr__ = brief_repr
 
 
 class Predictor:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.learn.network import Network, number_of, perceptron
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +43,8 @@ class LearnedPolicy:
     mean: Floats
     deviation: Floats
     task: Task | None = field(default=None, repr=False)
+
+    __repr__ = brief_repr
 
     def scaled(self, observations: Floats) -> Floats:
         """Scaled and limited to ten standard deviations.

@@ -12,6 +12,7 @@ from dojo_opt.learn.network import Network
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.randomisation import Drawn
 from dojo_opt.learn.task import Task
+from sim.mechanism.brief import brief_repr
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
@@ -28,6 +29,8 @@ class Noise:
 
     actions: Floats  # (T, n, nu)
     observations: Floats  # (T, n, no)
+
+    __repr__ = brief_repr
 
     @classmethod
     def draw(
@@ -53,6 +56,8 @@ class PolicyGradient:
     states: Floats
     clipped: int
     largest: float
+
+    __repr__ = brief_repr
 
 
 class PolicyRollout:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 from sim.simulator.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -91,6 +92,8 @@ class Drawn:
     kappa: Floats | None  # (n,)
     parameters: Mapping[str, Floats]  # each (n, components)
     noise: float
+
+    __repr__ = brief_repr
 
     def rows(self, chosen: NDArray[np.int64]) -> Drawn:
         """Those of some rows."""

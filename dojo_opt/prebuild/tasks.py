@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 import dojo_opt as dojo
+from dojo_opt.learn.network import Network
+from dojo_opt.learn.policy import LearnedPolicy
 from solvers.compiler.optional import OptionalKernel, optional_kernels
 
 __all__ = ["CONTENTS", "run", "tasks"]
@@ -101,6 +103,16 @@ def _pendulum(calls: Callable[[Any], None], order: int = 2) -> None:
     calls(dojo.Simulator(dojo.models.pendulum(), time_step=0.01, order=order))
 
 
+def _learning() -> None:
+    """Rows of a batch, with and without derivatives, and the action of a policy."""
+    sim = dojo.Simulator(dojo.models.pendulum(), time_step=0.01)
+    X, U = np.stack([sim.neutral()] * 4), np.zeros((4, sim.nu))
+    for derivatives in (False, True):
+        sim.step_batch(X, U, 2, derivatives=derivatives)
+    network = Network((3, 4, 1), "tanh")
+    LearnedPolicy(network, np.zeros(network.count), np.zeros(3), np.ones(3), None).action(np.zeros(3))
+
+
 def _models() -> None:
     for entry in dojo.models.catalogue():
         sim = dojo.Simulator(entry.build(), time_step=0.01)
@@ -184,6 +196,7 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
     "plan": lambda: _swingup(),
     "motions": lambda: _pendulum(motions),
     "states": lambda: _pendulum(states),
+    "learning": lambda: _learning(),
     "divisions": lambda: _pendulum(divisions),
     "flight": lambda: _flight(motions, 8),
     "states of higher order": lambda: _pendulum(states, 4),

@@ -303,9 +303,9 @@ class Input:
         name: name of the input (default that of the joint, with the number of one of several degrees of freedom, or of
             the body).
         limits: (lo, hi) of the force or torque, as a file gives them: default control limits of problems and plants;
-            a simulator does not clip [N, N m] (default infinite).
+            a simulator does not clip [N, N m] (default inf).
         speed: largest speed of the joint's coordinate, see `dojo.constraint.SpeedLimits`; nothing else holds it [m/s,
-            rad/s] (default infinite).
+            rad/s] (default inf).
 
     Raises:
         ValueError: for both a joint and a body or neither, or a value out of range.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 from sim.mechanism.shapes import Solid
 
 STEEL = (0.56, 0.64, 0.72)  # colour of what has none
@@ -38,6 +39,8 @@ class Visual:
     center: ArrayLike = (0.0, 0.0, 0.0)
     orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     color: ArrayLike | None = None
+
+    __repr__ = brief_repr
 
     def __post_init__(self) -> None:
         given: list[Any] = [self.shape is not None, bool(self.mesh), self.triangles is not None]

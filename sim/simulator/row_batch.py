@@ -95,11 +95,13 @@ class RowBatch:
     substeps: int
     kappas: Floats  # (n,), NaN for that of the engine
 
+    __repr__ = brief_repr
+
     def step(self, derivatives: bool) -> BatchStep:
         """One knot of every row."""
         first = self.engines[0]
         n = len(self.us)
-        A, B = (np.empty((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
+        A, B = (np.zeros((n if derivatives else 0, first.ndx, size)) for size in (first.ndx, first.nu))
         x_next, reports = np.array(self.xs), np.zeros((n, REPORT))
         if first.settings.order > 2:
             self._by_engine(derivatives, A, B, x_next, reports)

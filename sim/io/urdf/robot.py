@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sim.io.urdf.report import Notes
 from sim.io.urdf.xml import Element
 from sim.mechanism import parts
+from sim.mechanism.brief import brief_repr
 from sim.mechanism.pose import HERE, Pose, roll_pitch_yaw
 
 Floats = NDArray[np.float64]
@@ -64,6 +65,8 @@ class Geometry:
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
     color: tuple[float, ...] | None = None
     points: Floats | None = None
+
+    __repr__ = brief_repr
 
 
 @dataclass(frozen=True)
