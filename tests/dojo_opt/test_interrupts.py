@@ -66,7 +66,8 @@ def test_closed_loops_and_studies_keep_what_they_have() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
 def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
     program = (
-        "import dojo_opt as dojo\nproblem = dojo.problems.trot(cycles=30)\ndojo.ilqr(problem, max_iterations=1)\n"
+        "import dojo_opt as dojo\nproblem = dojo.problems.trot(cycles=30)\n"
+        "dojo.ilqr(problem, tolerance=1e-12, violation=1e-14, time_limit=3.0)\n"  # compiles what is needed below
         "print('start', flush=True)\n"
         "try:\n    dojo.ilqr(problem, tolerance=1e-12, violation=1e-14)\n"
         "except KeyboardInterrupt as stop:\n    print(type(stop).__name__, stop.result.status.name)\n"

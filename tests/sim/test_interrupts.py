@@ -120,7 +120,10 @@ def stopped(call: Callable[[int], Any], enough: int) -> Any:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROLLOUTS)
 def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
-    found = stopped(*ROLLOUTS[name])
+    call, enough = ROLLOUTS[name]
+    found = stopped(call, enough)
+    if found is None:  # on a busy machine the signal may come while the arguments are made
+        found = heard(lambda: call(4 * enough), 1.2)
     assert found.status == dojo.Status.INTERRUPTED
     assert found.knot > 0
     assert found.x.shape[0] == found.knot + 1 == len(found.u) + 1
