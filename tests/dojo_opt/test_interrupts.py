@@ -66,6 +66,7 @@ def test_closed_loops_and_studies_keep_what_they_have() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a single process")
 def test_ctrl_c_from_outside_never_crashes_a_plan() -> None:
     program = (
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored in a shell's background jobs
         "import dojo_opt as dojo\nproblem = dojo.problems.trot(cycles=30)\n"
         "dojo.ilqr(problem, tolerance=1e-12, violation=1e-14, time_limit=3.0)\n"  # compiles what is needed below
         "print('start', flush=True)\n"

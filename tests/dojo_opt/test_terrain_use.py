@@ -56,7 +56,7 @@ def test_a_plant_stands_on_terrain_and_refuses_a_slope_of_its_own():
     assert Perturbation(friction=0.1).mechanism(mech).contacts[0].terrain is WAVES
     with pytest.raises(ValueError, match="got contacts on terrain"):
         Perturbation(slope=0.1).mechanism(mech)
-    with pytest.raises(ValueError, match="either it or a slope"):
+    with pytest.raises(ValueError, match="give either a terrain, or a slope"):
         Perturbation(slope=0.1, terrain=WAVES)
     hill = dojo.Terrain.slope(0.2, height=1.0)
     plant = dojo.Plant(dojo.Simulator(ball(radius=0.1), time_step=0.02), terrain=hill)
