@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.epochs import run_epochs
 from dojo_opt.learn.evaluation import evaluate
-from dojo_opt.learn.learned import Learned, LearningProgress
+from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
@@ -262,39 +263,6 @@ class GradientSearch(WeightSearch):
         return float((weights * roll.rewards).sum() / o.environments), length, found.clipped / weights.size
 
 
-def run_search(search: WeightSearch, resume: Learned | None) -> Learned:
-    """All epochs of a search."""
-    o, name = search.options, search.algorithm
-    if resume is not None:
-        if resume.algorithm != name or resume.seed != search.seed or (
-            resume.state["weights"].shape != search.policy.weights.shape
-        ):  # fmt: skip
-            raise ValueError(
-                f"{name}(resume=...): expected a run with seed {search.seed} and this policy, got {resume!r}"
-            )
-        search.resume(resume)
-    progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
-    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
-    status, state = Status.SOLVED, search.state()
-    try:
-        while search.epoch < o.epochs and status == Status.SOLVED:
-            record = search.train()
-            if search.epoch in marks:
-                record["evaluated"] = search.assess()
-            state = search.state()
-            status = progress.add(**record)
-    except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
-        status = Status.INTERRUPTED
-    success = search.epoch == o.epochs
-    if not np.isfinite(search.best):
-        search.assess()
-    status = Status.SOLVED if success else status
-    return Learned(
-        search.chosen, success, status, progress.message(status), name, search.seed, search.best, search.steps,
-        search.unsolved, search.infinite, progress.seconds, progress.records, state,
-    )  # fmt: skip
-
-
 def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
     """Augmented random search, without derivatives: see the module, and `RandomSearchOptions` for the options.
 
@@ -315,7 +283,7 @@ def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: 
         raise TypeError(f"ars(task): expected a Task, got {task!r}")
     checks.keywords("ars(...)", options, [f.name for f in fields(RandomSearchOptions)])
     number = checks.whole_number("ars(seed=...)", seed, 0)
-    return run_search(RandomSearch(task, RandomSearchOptions(**options), number), resume)
+    return run_epochs(RandomSearch(task, RandomSearchOptions(**options), number), resume)
 
 
 def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
@@ -338,4 +306,4 @@ def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None,
         raise TypeError(f"gradient_search(task): expected a Task, got {task!r}")
     checks.keywords("gradient_search(...)", options, [f.name for f in fields(GradientSearchOptions)])
     number = checks.whole_number("gradient_search(seed=...)", seed, 0)
-    return run_search(GradientSearch(task, GradientSearchOptions(**options), number), resume)
+    return run_epochs(GradientSearch(task, GradientSearchOptions(**options), number), resume)

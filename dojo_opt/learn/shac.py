@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dojo_opt.learn.epochs import run_epochs
 from dojo_opt.learn.evaluation import evaluate
-from dojo_opt.learn.learned import Learned, LearningProgress
+from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
 from dojo_opt.learn.observation_statistics import ObservationStatistics
 from dojo_opt.learn.policy import LearnedPolicy
@@ -23,7 +24,6 @@ from dojo_opt.learn.policy_rollout import Noise, PolicyRollout, roll_policy_batc
 from dojo_opt.learn.randomisation import Models, Randomisation
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
-from solvers.status import Status
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -102,6 +102,8 @@ class ShacOptions:
 
 class _Shac:
     """Policy, critic, environments and random numbers of a run."""
+
+    algorithm = "shac"
 
     def __init__(self, task: Task, options: ShacOptions, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
@@ -295,35 +297,5 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
     if not isinstance(task, Task):
         raise TypeError(f"shac(task): expected a Task, got {task!r}")
     checks.keywords("shac(...)", options, [f.name for f in fields(ShacOptions)])
-    o = ShacOptions(**options)
-    run = _Shac(task, o, checks.whole_number("shac(seed=...)", seed, 0))
-    if resume is not None:
-        if (
-            resume.algorithm != "shac"
-            or resume.seed != seed
-            or resume.state["weights"].shape != run.policy.weights.shape
-        ):
-            raise ValueError(
-                f"shac(resume=...): expected a run of shac with seed {seed} and this policy, got {resume!r}"
-            )
-        run.resume(resume)
-    progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
-    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
-    status, state = Status.SOLVED, run.state()
-    try:
-        while run.epoch < o.epochs and status == Status.SOLVED:
-            record = run.train()
-            if run.epoch in marks:
-                record["evaluated"] = run.assess()
-            state = run.state()
-            status = progress.add(**record)
-    except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
-        status = Status.INTERRUPTED
-    success = run.epoch == o.epochs
-    if not np.isfinite(run.best):
-        run.assess()
-    status = Status.SOLVED if success else status
-    return Learned(
-        run.chosen, success, status, progress.message(status), "shac", seed, run.best, run.steps, run.unsolved,
-        run.infinite, progress.seconds, progress.records, state,
-    )  # fmt: skip
+    run = _Shac(task, ShacOptions(**options), checks.whole_number("shac(seed=...)", seed, 0))
+    return run_epochs(run, resume)

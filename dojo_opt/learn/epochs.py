@@ -1,0 +1,45 @@
+"""run_epochs: the loop that all algorithms of learning share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dojo_opt.learn.learned import Learned, LearningProgress
+from solvers.status import Status
+
+__all__ = ["run_epochs"]
+
+
+def run_epochs(search: Any, resume: Learned | None) -> Learned:
+    """All epochs of an algorithm, evaluated at its marks, from the start or from where `resume` ended."""
+    o, name = search.options, search.algorithm
+    if resume is not None:
+        if resume.algorithm != name or resume.seed != search.seed or (
+            resume.state["weights"].shape != search.policy.weights.shape
+        ):  # fmt: skip
+            raise ValueError(
+                f"{name}(resume=...): expected a run of {name} with seed {search.seed} and this policy, got {resume!r}"
+            )
+        search.resume(resume)
+    progress = LearningProgress(o, resume.history if resume else [], resume.seconds if resume else 0.0)
+    marks = {round((k + 1) * o.epochs / o.evaluations) for k in range(o.evaluations)} | {o.epochs}
+    status, state = Status.SOLVED, search.state()
+    try:
+        while search.epoch < o.epochs and status == Status.SOLVED:
+            record = search.train()
+            if search.epoch in marks:
+                record["evaluated"] = search.assess()
+            state = search.state()
+            status = progress.add(**record)
+    except KeyboardInterrupt:  # in the middle of an epoch: resume from its start
+        status = Status.INTERRUPTED
+    success = search.epoch == o.epochs
+    if not np.isfinite(search.best):
+        search.assess()
+    status = Status.SOLVED if success else status
+    return Learned(
+        search.chosen, success, status, progress.message(status), name, search.seed, search.best, search.steps,
+        search.unsolved, search.infinite, progress.seconds, progress.records, state,
+    )  # fmt: skip
