@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 import dojo_opt as dojo
 from dojo_opt import models
 from sim.simulator.dividing_engine import DividingEngine
+from support.scenes import KINDS, chain, random_state
 
 Floats = NDArray[np.float64]
 
@@ -125,6 +126,21 @@ def test_derivatives_of_a_divided_step(name: str, steps: int) -> None:
         du = 1e-3 * np.eye(sim.nu)[k]
         ahead, behind = (forced(sim, x, u + s * du, 4) for s in (1.0, -1.0))
         assert np.abs(sim.difference(ahead, behind) / 2e-3 - B[:, k]).max() < 1e-5 * np.abs(B).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_derivatives_of_the_conversions(kind: str) -> None:
+    """Of the state with the same momentum over another interval, with springs, against central differences."""
+    rng = np.random.default_rng(8)
+    sim = dojo.Simulator(chain(kind, 2, spring=3.0), time_step=0.03, tolerance=1e-12)
+    x, change = random_state(sim, rng, speed=2.0), engine(sim).intervals
+    part = change.to_part(x, 0.01)
+    assert part is not None and np.abs(part - x).max() > 1e-4
+    slopes, eps = change.slopes(x, 0.01, part), 1e-5
+    for k in range(sim.ndx):
+        ends = [change.to_part(sim.integrate(x, s * eps * np.eye(sim.ndx)[k]), 0.01) for s in (1.0, -1.0)]
+        assert ends[0] is not None and ends[1] is not None
+        assert np.abs(sim.difference(*ends) / (2 * eps) - slopes[:, k]).max() < 1e-6 * np.abs(slopes).max()
 
 
 @pytest.fixture(scope="module")
