@@ -115,7 +115,7 @@ def turns_below_half(model: Model, data: Data, h: float, v: Vector) -> bool:
 def ends_below_half(model: Model, data: Data, h: float) -> bool:
     """`turns_below_half` at configuration 3, for the velocity data.nu: whether another step may begin there.
 
-    Axes turn with the body behind their joint. Where no body or joint turned by a quarter of a turn, all is well.
+    Where no body or joint turned by a quarter of a turn, all is well.
     """
     c, most = 1.0, 0.0
     for i in range(data.turn.shape[0]):
@@ -125,17 +125,12 @@ def ends_below_half(model: Model, data: Data, h: float) -> bool:
     if c > _QUARTER and h * most < _QUARTER:
         return True
     for i in range(model.body_parent.shape[0]):
-        p, w, t = model.body_parent[i], data.twist[i], data.turn[i]
+        p, w = model.body_parent[i], data.twist[i]
         for k in range(3):
             w[3 + k] = data.twist[p, 3 + k] if p >= 0 else 0.0
-        for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
-            s, r = data.S2[d], h * data.nu[d]
-            x, y, z = cross(t[1], t[2], t[3], s[3], s[4], s[5])  # v + 2 c (s x v) + 2 s x (s x v)
-            e, f, g = cross(t[1], t[2], t[3], x, y, z)
-            w[3] += r * (s[3] + 2.0 * (t[0] * x + e))
-            w[4] += r * (s[4] + 2.0 * (t[0] * y + f))
-            w[5] += r * (s[5] + 2.0 * (t[0] * z + g))
-        if not w[3] * w[3] + w[4] * w[4] + w[5] * w[5] < _HALF_TURN:
+            for d in range(model.body_vadr[i], model.body_vadr[i + 1]):
+                w[3 + k] += h * data.nu[d] * data.S3[d, 3 + k]
+        if not w[3] * w[3] + w[4] * w[4] + w[5] * w[5] < _HALF_TURN or not data.turn[i, 0] > 1e-3:
             return False
     return True
 

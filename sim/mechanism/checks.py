@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+_MOST_LISTED = 20  # words in a message
+
 
 def floats(call: str, value: Any) -> Floats:
     """`value` as a C-contiguous float64 array; complex numbers, text and ragged lists are refused.
@@ -101,8 +103,15 @@ def one_of(call: str, value: Any, known: Iterable[str]) -> str:
     """`value` as one of the known words."""
     words = known if isinstance(known, Mapping | Sequence) and not isinstance(known, str) else list(known)
     if not isinstance(value, str) or value not in words:
-        raise ValueError(f"{call}: {value!r} is not one of: {', '.join(words) or '(none)'}{nearest(value, words)}")
+        raise ValueError(f"{call}: {value!r} is not one of: {listed(words)}{nearest(value, words)}")
     return value
+
+
+def listed(known: Iterable[str]) -> str:
+    """The known words for a message, the first of them where there are many."""
+    words = list(known)
+    rest = f", ... ({len(words)} in all)" if len(words) > _MOST_LISTED else ""
+    return ", ".join(words[:_MOST_LISTED]) + rest if words else "(none)"
 
 
 def nearest(value: Any, known: Iterable[str]) -> str:
@@ -117,7 +126,7 @@ def keywords(call: str, given: Iterable[str], known: Iterable[str]) -> None:
     words = list(known)
     for word in given:
         if word not in words:
-            raise TypeError(f"{call}: no keyword {word!r}; there are {', '.join(words)}{nearest(word, words)}")
+            raise TypeError(f"{call}: no keyword {word!r}; there are {listed(words)}{nearest(word, words)}")
 
 
 def distinct(call: str, names: Iterable[str]) -> None:

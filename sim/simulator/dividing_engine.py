@@ -35,8 +35,8 @@ __all__ = ["LARGEST_DIVISION", "DividingEngine"]
 
 LARGEST_DIVISION = 1024  # parts of a step
 
-_WHOLE = 0.1  # largest gain or loss of energy in a whole step, of the energies that change
-_PART = 1e-3  # in a part
+_LOSS = 0.1  # largest loss of energy in a whole step where nothing dissipates, of the energies that change
+_PART = 1e-3  # largest gain or loss in a part
 _PIECE, _LARGEST_PIECE = 16, 1024  # steps at once after a divided one: those after the next divided one are discarded
 
 
@@ -67,7 +67,7 @@ class DividingEngine(Engine):
     """The kernels of one packed mechanism, with steps of order 2 that are divided where that is necessary."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
-        super().__init__(model, settings._replace(gain=_WHOLE, loss=_WHOLE))
+        super().__init__(model, settings._replace(loss=_LOSS))
         self.intervals = Intervals(self)
         self._engines: dict[int, Engine] = {}  # by the number of parts of a step
         self._ended = threading.local()  # `parts`: the engine of the last step of this thread, if that was divided

@@ -77,15 +77,20 @@ class Divided(NamedTuple):
         return np.asarray(out)
 
     def contacts(self) -> Floats:
-        """(ncontact, 11) of the whole: impulses add up and act at their mean point; the rest is that of the end."""
+        """(ncontact, 11) of the whole: impulses add up and act at their mean point, along their mean normal.
+
+        Gap and slip are those of the end. A sum over cones that turned may lie outside that of the mean normal.
+        """
         parts = self.rolled.contacts
         out = parts[-1].copy()
         out[:, :3] = parts[..., :3].sum(axis=0)
         share = np.linalg.norm(parts[..., :3], axis=2)
         total = share.sum(axis=0)
         pressed = total > 0.0
-        mean = np.einsum("tc,tcj->cj", share[:, pressed], parts[:, pressed, 3:6])
-        out[pressed, 3:6] = mean / total[pressed, None]
+        points, normals = (np.einsum("tc,tcj->cj", share, parts[..., k : k + 3]) for k in (3, 8))
+        out[pressed, 3:6] = points[pressed] / total[pressed, None]
+        length = np.linalg.norm(normals, axis=1)
+        out[length > 0.0, 8:11] = normals[length > 0.0] / length[length > 0.0, None]
         return np.asarray(out)
 
 

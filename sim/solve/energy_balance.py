@@ -5,7 +5,7 @@ and constraints that do no work along the motion do work along arcs: joints and 
 up, to any energy. No solution is accepted that gains more than a tenth of the kinetic energy, or a thousandth as a part
 of a divided step.
 
-    K23 - K12 - W > 0.1 max(K12, |G|) + |D| + slack
+    K23 - K12 - W > 0.09 max(K12, |G|) + |D| + slack
 
 K12, K23: p.M^-1 p/2 of the momentum p with which the bodies arrive at configurations 2 and 3. W: work of gravity,
 springs and inputs at 2, at the mean of the velocities of both intervals. |G|: that of gravity, |D|: that of the drives,
@@ -20,7 +20,7 @@ losses in the same way: such a step does not follow the motion either.
 
 Each of these energies costs a factorisation of the mass matrix. They are computed if constraints did work,
 
-    work = sum over bodies of b.(V + V')/2  -  sum over dofs of S2^T (subtree sums of w) (v + v')/2  >  0.05 K12 + noise
+    work = sum over bodies of b.(V + V')/2 - sum over dofs of S2^T (subtree sums of w) (v + v')/2 > 0.045 K12 + noise
 
 b, w the wrenches that the momenta of a body leave over without and with those of contacts: the rest, without springs,
 dampers, inputs and limits, is the work of joints, loops and contacts, and none of third order in a motion
@@ -55,7 +55,8 @@ from solvers.dense import clear
 from solvers.rotation import cross, rotate
 from solvers.types import Vector
 
-LARGEST_GAIN = 0.1  # of the energies that change in a step: largest gain of an accepted step
+# largest gain of an accepted step, of the energies that change in it: with the slack of contacts less than a tenth
+LARGEST_GAIN = 0.09
 # cosines of half the turns below which there is no such work, without contacts and with them, and above which it tells
 # nothing
 _NEAR, _NEAR_GROUND, _FAR = 0.99719, 0.99969, 0.825

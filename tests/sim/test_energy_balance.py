@@ -179,6 +179,13 @@ def test_no_accepted_step_of_a_passive_fall_gains_energy(attacks, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [583, 663, 752])
+def test_a_step_ends_where_the_next_one_can_begin(attacks, seed):
+    """With joints of two rotations, whose columns change with their angles: momenta of such ends were those of others."""
+    assert attacks.step_case(seed) in ("SOLVED", "ANGULAR_STEP", "ENERGY_STEP")
+
+
+@pytest.mark.slow
 def test_a_rounding_of_the_state_does_not_flip_the_energy(attacks):
     """Passive trees at 50 ms, some with solutions a rounding apart: whichever is found first, none gains energy."""
     refused = 0

@@ -203,3 +203,14 @@ def test_derivatives_of_a_loaded_robot_are_differences(tmp_path: Path, rng: np.r
     A, B = sim.linearize(x, u, kappa=1e-3)
     check_jacobian(lambda state: sim.difference(sim.step(state, u).x, y), A, x, sim.integrate)
     check_jacobian(lambda control: sim.difference(sim.step(x, control).x, y), B, u, np.add)
+
+
+def test_messages_about_many_links_are_short(tmp_path: Path) -> None:
+    names = [f"l{k}" for k in range(60)]
+    joints = [joint(f"j{k}", names[0], name) for k, name in enumerate(names[1:])]
+    path = write(tmp_path, *(link(name, inertial()) for name in names), *joints)
+    with pytest.warns(dojo.UrdfWarning, match=r"Contact\('l6', radius=0\.02\), \.\.\. for all 59 of them\]") as told:
+        dojo.load_urdf(path)
+    assert len(str(told[0].message)) < 600
+    with pytest.raises(ValueError, match=r"not a link of the file: l0, .*, l19, \.\.\. \(60 in all\)"):
+        dojo.load_urdf(path, contacts=["foot"])

@@ -34,6 +34,7 @@ ROOT_JOINT = {
 DENSITY = 1000.0  # [kg/m^3] of repaired links without a mass
 _NOTHING = 1e-12  # [m^2] an inertia over a mass that is none
 _SUNK = 1e-3  # [m] how deep a contact may start in the ground without a warning
+_ENDS_SHOWN = 6  # last links named in the message about a robot without contacts
 
 
 @dataclass(frozen=True)
@@ -238,10 +239,12 @@ def _ground_notes(mech: UrdfMechanism, choices: Choices, floating: bool, notes: 
     wanted = choices.contacts is None or len(choices.contacts) > 0
     if floating and wanted and not mech.contacts:
         carrying = {j.parent for j in mech.joints}
-        ends = ", ".join(f"dojo.Contact({name!r}, radius=0.02)" for name in mech.body_names if name not in carrying)
+        ends = [name for name in mech.body_names if name not in carrying]
+        balls = ", ".join(f"dojo.Contact({name!r}, radius=0.02)" for name in ends[:_ENDS_SHOWN])
+        more = f", ... for all {len(ends)} of them" if len(ends) > _ENDS_SHOWN else ""
         notes.add(
-            f"nothing of the robot makes contact with the ground: it falls through; contacts=[{ends}] puts balls at "
-            "the origins of its last links",
+            f"nothing of the robot makes contact with the ground: it falls through; contacts=[{balls}{more}] puts "
+            "balls at the origins of its last links",
             warn=True,
         )
     if mech.contacts:

@@ -20,6 +20,7 @@ from sim.io.urdf.report import Notes
 from sim.io.urdf.robot import Geometry
 from sim.io.urdf.tree import MergedLinks, Place
 from sim.io.urdf.xml import UrdfError
+from sim.mechanism import checks
 from sim.mechanism.parts import Contact
 from sim.mechanism.pose import HERE, Pose
 
@@ -90,7 +91,8 @@ def _picked(places: dict[str, Place], chosen: Sequence[str | Contact] | None) ->
     for part in [chosen] if isinstance(chosen, str | Contact) else chosen:
         name = part.body if isinstance(part, Contact) else part
         if name not in places:
-            raise UrdfError(f"load_urdf(contacts=...): {name!r} is not a link of the file: {', '.join(places)}")
+            known = f"{checks.listed(places)}{checks.nearest(name, places)}"
+            raise UrdfError(f"load_urdf(contacts=...): {name!r} is not a link of the file: {known}")
         picked.setdefault(name, []).extend([part] if isinstance(part, Contact) else [])
     return picked
 
