@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
 import os
@@ -18,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from solvers.compiler import shipped, targets
+from solvers.compiler import targets
 from solvers.compiler.shipped import SUFFIX, Shipped, write_shipped
 from support.programs import HOME, PACKAGES, python
 
@@ -314,29 +313,3 @@ def test_targets_are_those_that_the_processor_can_run(monkeypatch: pytest.Monkey
     assert targets.best_target(("x86-64-v2", "x86-64-v3")) is None
     monkeypatch.setattr(targets.platform, "machine", lambda: "riscv64")
     assert targets.runnable() == ()
-
-
-# -- what an installation has -------------------------------------------------------------------------------------------
-
-EXAMPLES = sorted(path.name for path in (Path(__file__).resolve().parent.parent / "examples").glob("[a-z]*.py"))
-EXAMPLE = """
-import runpy, sys
-sys.argv = [{path!r}, "--quick"]
-sys.path.insert(0, {folder!r})
-runpy.run_path(sys.argv[0], run_name="__main__")
-from solvers.compiler import compiled
-print(compiled())
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not len(shipped()), reason=f"not an installation with code: {shipped().why_not}")
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_an_example_compiles_nothing(tmp_path: Path, name: str) -> None:
-    if name == "jax_policy.py":
-        pytest.importorskip("jax")
-    folder = Path(__file__).resolve().parent.parent / "examples"
-    program = EXAMPLE.format(path=str(folder / name), folder=str(folder))
-    out = python(program, cwd=tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
-    users = ("dojo_opt.planning.manifold.", "solvers.rotation.")  # compiled into the loops around users' functions
-    assert [one for one in ast.literal_eval(out.splitlines()[-1]) if not one.startswith(users)] == []

@@ -10,7 +10,6 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks.engines import Ours
-from benchmarks.studies.accuracy import AccuracyStudy
 from benchmarks.studies.accuracy import accuracy_scenes as scenes
 from dojo_opt.report import Progress, study
 from dojo_opt.report.accuracy import advice, smooth_scene
@@ -176,14 +175,3 @@ def test_advice_is_what_the_trials_say() -> None:
 def test_what_the_reference_does_not_know_is_named() -> None:
     assert smooth_scene.not_in_reference(dojo.models.fourbar()).startswith("loop (")
     assert smooth_scene.not_in_reference(dojo.models.quadruped()) == ""
-
-
-@pytest.mark.slow
-def test_the_study_runs_quickly() -> None:
-    report = AccuracyStudy(quick=True).run(Progress())
-    assert report.figure is not None and len(report.tables) >= 6
-    drift = {row.name: row.value for row in report.rows if "drift" in row.name}
-    assert all(value < 1e-12 for name, value in drift.items() if "order" in name)
-    assert set(report.details) >= {"free body", "tree of 13 bodies", "pendulum of 2"}
-    advice = report.tables[0]
-    assert advice.title.startswith("Recommended") and 0.1 < float(advice.rows[0][2]) < 100.0

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.engines import Ours
-from benchmarks.studies.contact import ContactStudy, simbenchmark
 from benchmarks.studies.contact import contact_measures as measure
 from benchmarks.studies.contact import contact_scenes as scenes
-from benchmarks.studies.contact import contact_study as study
-from dojo_opt.report import Progress
+from benchmarks.studies.contact import simbenchmark
 
 HARD = Ours(kappa=1e-10, rounds=1)
 
@@ -46,14 +44,6 @@ def test_hard_contact_at_100_metres_per_second(time_step: float, kappa: float) -
 
 def test_an_engine_that_stops_is_not_a_number() -> None:
     assert np.isnan(measure.creep(Ours(kappa=1e-10, tolerance=1e-30, rounds=1), 1e-2, 0.1)["drift"])
-
-
-@pytest.mark.slow
-def test_bars_of_the_quick_study_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "installed", list)
-    report = ContactStudy(quick=True).run(Progress())
-    assert report.met(), [row for row in report.rows if row.met is False]
-    assert report.figure is not None and len(report.tables) == 6
 
 
 def test_balls_that_give_everything_back_keep_their_energy() -> None:

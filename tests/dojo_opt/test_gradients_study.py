@@ -193,12 +193,3 @@ def test_a_users_mechanism_is_measured_in_one_step_and_told_its_kappa():
     assert report.met() and len(report.rows) == 2 and report.figure is not None
     assert any("are within 1 % of hard contact" in note for note in report.notes)
     json.loads(report.as_json())
-
-
-@pytest.mark.slow
-def test_the_quick_study_meets_its_bars():
-    report = GradientsStudy(quick=True).run(Progress())
-    assert [row.name for row in report.rows if row.met is False] == []
-    assert len(report.figure.axes) == 4
-    numbers = json.loads(report.as_json())
-    assert set(numbers["details"]) == {"one_step", "motions", "touchdown", "smoothing", "resting"}

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from benchmarks.studies.lean import lean_study as lean
 from benchmarks.studies.lean.lean_scenes import MANY, absent, features, pendulum_scene
 from benchmarks.studies.lean.new_process import new_process
-from dojo_opt.report import Progress
 from dojo_opt.report.costs import costs
 from dojo_opt.report.lean.variants import without
 
@@ -78,15 +76,6 @@ def test_the_report_of_a_robot():
     assert all(np.isfinite(value) and value < 100.0 for value in saved.values())
     assert any("inactive contacts" in note for note in report.notes)
     assert report.figure is not None and json.loads(report.as_json())["details"]["robot"]
-
-
-@pytest.mark.slow
-def test_the_report_of_the_pendulum():
-    report = lean.LeanStudy(quick=True).run(Progress())
-    rows = {row.name: row for row in report.rows}
-    assert rows["heavy libraries imported by a simulation"].met
-    assert len(report.tables) == 2 and len(report.figure.axes) == 2
-    assert json.loads(report.as_json())["details"]["features"][0]["name"] == "pendulum"
 
 
 def test_a_simulation_in_a_new_process_imports_no_heavy_library():

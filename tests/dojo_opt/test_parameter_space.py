@@ -80,7 +80,10 @@ def test_derivatives_by_coordinates() -> None:
     here = sim.step(x).x
     J = space.chain(theta, sim.linearize(x, wrt=space.wrt))
     assert J.shape == (sim.ndx, len(space.labels))
-    check_jacobian(lambda t: sim.difference(space.simulator(t).step(x).x, here), J, theta, np.add)
+    directions = np.random.default_rng(4).normal(size=(4, len(theta)))  # each coordinate is in all of them
+    along = lambda s: theta + s @ directions  # noqa: E731
+    stepped = lambda s: sim.difference(space.simulator(along(s)).step(x).x, here)  # noqa: E731
+    check_jacobian(stepped, J @ directions.T, np.zeros(4), np.add)
     xs, line = sim.linearize_rollout(x, np.zeros((3, sim.nu)), wrt=space.wrt)
     np.testing.assert_allclose(space.chain(theta, line.parameters)[0], J, atol=1e-9 * np.abs(J).max())
     loss = np.zeros((4, sim.ndx))

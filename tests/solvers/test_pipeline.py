@@ -16,8 +16,7 @@ import json, numpy as np, dojo_opt as dojo
 from solvers.compiler.pipeline import FAST
 sim = dojo.Simulator(dojo.models.pendulum(), 0.02)
 x = sim.neutral() + 0.3
-A, B = sim.linearize(x, np.ones(sim.nu))
-print(json.dumps([FAST, *sim.rollout(x, np.ones((20, sim.nu))).x.ravel(), *A.ravel(), *B.ravel()]))
+print(json.dumps([FAST, *sim.rollout(x, np.ones((20, sim.nu))).x.ravel()]))
 """
 
 
