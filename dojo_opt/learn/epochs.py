@@ -1,18 +1,30 @@
-"""run_epochs: the loop that all algorithms of learning share."""
+"""learn: the checks and the loop that all algorithms of learning share."""
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from dojo_opt.learn.learned import Learned, LearningProgress
+from dojo_opt.learn.task import Task
+from sim.mechanism import checks
 from solvers.status import Status
 
-__all__ = ["run_epochs"]
+__all__ = ["learn"]
 
 
-def run_epochs(search: Any, resume: Learned | None) -> Learned:
+def learn(search: Any, settings: Any, task: Task, seed: int, resume: Learned | None, given: dict[str, Any]) -> Learned:
+    """Run an algorithm, a class made of a task, its settings and a seed, with the given fields of these settings."""
+    name = search.algorithm
+    if not isinstance(task, Task):
+        raise TypeError(f"{name}(task): expected a Task, got {task!r}")
+    checks.keywords(f"{name}(...)", given, [f.name for f in fields(settings)])
+    return _run_epochs(search(task, settings(**given), checks.whole_number(f"{name}(seed=...)", seed, 0)), resume)
+
+
+def _run_epochs(search: Any, resume: Learned | None) -> Learned:
     """All epochs of an algorithm, evaluated at its marks, from the start or from where `resume` ended."""
     o, name = search.options, search.algorithm
     if resume is not None:

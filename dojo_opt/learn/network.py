@@ -67,22 +67,21 @@ class Network:
         return np.concatenate(out)
 
     def layers(self, weights: Floats) -> list[tuple[Floats, Floats]]:
-        """(W, b) of every layer, views."""
+        """(W (..., inputs, outputs), b (..., outputs)) of every layer, views of weights (..., count)."""
         out, first = [], 0
         for n, m in zip(self.sizes[:-1], self.sizes[1:], strict=True):
             mid, last = first + n * m, first + n * m + m
-            out.append((weights[first:mid].reshape(n, m), weights[mid:last]))
+            out.append((weights[..., first:mid].reshape(*weights.shape[:-1], n, m), weights[..., mid:last]))
             first = last
         return out
 
     def forward(self, weights: Floats, x: Floats) -> tuple[Floats, list[Floats]]:
-        """(outputs (n, m), inputs of all layers), for rows x (n, inputs)."""
+        """(outputs (n, m), inputs of all layers), for rows x (n, inputs); weights (count,), or (n, count) by row."""
         kept, layers = [x], self.layers(weights)
         for W, b in layers[:-1]:
-            y = kept[-1] @ W + b
+            y = _affine(W, b, kept[-1])
             kept.append(np.tanh(y) if self.activation == "tanh" else np.where(y > 0.0, y, np.expm1(np.minimum(y, 0.0))))
-        W, b = layers[-1]
-        return kept[-1] @ W + b, kept
+        return _affine(*layers[-1], kept[-1]), kept
 
     def backward(self, weights: Floats, kept: list[Floats], g: Floats, out: Floats | None = None) -> Floats:
         """Gradient by x (n, inputs) from that by the outputs, g (n, m); adds that by the weights to `out`."""
@@ -95,6 +94,11 @@ class Network:
             if k:
                 g = g * (1.0 - kept[k] ** 2 if self.activation == "tanh" else np.where(kept[k] > 0.0, 1.0, kept[k] + 1))
         return g
+
+
+def _affine(W: Floats, b: Floats, x: Floats) -> Floats:
+    """x W + b of rows x (n, inputs); W (inputs, outputs), or (n, inputs, outputs) by row."""
+    return x @ W + b if W.ndim == 2 else np.matmul(x[:, None], W)[:, 0] + b
 
 
 class Adam:

@@ -62,17 +62,29 @@ class LearnedPolicy:
         """Whether the network has no hidden layer."""
         return len(self.network.sizes) == 2
 
-    def actions(self, observations: Floats) -> Floats:
+    def squashed(self, outputs: Floats) -> Floats:
+        """Actions from outputs of the network.
+
+        Args:
+            outputs: (..., nu).
+
+        Returns:
+            (..., nu) in [-1, 1].
+        """
+        return np.clip(outputs, -1.0, 1.0) if self.linear else np.tanh(outputs)
+
+    def actions(self, observations: Floats, weights: Floats | None = None) -> Floats:
         """(n, nu) actions of rows of observations.
 
         Args:
             observations: (n, no).
+            weights: (n, network.count) of each row, or none: those of the policy.
 
         Returns:
             (n, nu) actions in [-1, 1].
         """
-        y = self.network.forward(self.weights, self.scaled(observations))[0]
-        return np.clip(y, -1.0, 1.0) if self.linear else np.tanh(y)
+        weights = self.weights if weights is None else weights
+        return self.squashed(self.network.forward(weights, self.scaled(observations))[0])
 
     def action(self, observation: Floats) -> Floats:
         """(nu,) action of one observation.

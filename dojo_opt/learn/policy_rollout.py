@@ -107,7 +107,7 @@ class PolicyRollout:
         y, kept = policy.network.forward(policy.weights, np.clip(scaled, -_SPAN, _SPAN))
         if noise is not None:
             y = y + noise.actions[t]
-        self.actions[t] = np.clip(y, -1.0, 1.0) if policy.linear else np.tanh(y)
+        self.actions[t] = policy.squashed(y)
         if slopes:
             self._inside.append(np.abs(scaled) < _SPAN)
             self._kept.append(kept)

@@ -10,13 +10,13 @@ the gradient search of Dojo (arXiv 2203.00806), here with the derivatives of the
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.epochs import run_epochs
+from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
@@ -211,20 +211,11 @@ class RandomSearch(WeightSearch):
         """(n,) returns of rows with their own weights; observations are counted."""
         task, policy, o = self.task, self.policy, self.options
         out, alive, x = np.zeros(len(xs)), np.arange(len(xs)), np.array(xs)
-        layers = [policy.network.layers(w) for w in weights]
-        stacked = [
-            (np.array([w[k][0] for w in layers]), np.array([w[k][1] for w in layers])) for k in range(len(layers[0]))
-        ]
         for _ in range(self.horizon):
             here, rows = x[alive], drawn.rows(alive)
             seen = task.observe(here)[0]
             self.statistics.add(seen)
-            y = policy.scaled(seen)
-            for k, (W, b) in enumerate(stacked):
-                y = np.matmul(y[:, None], W[alive])[:, 0] + b[alive]
-                if k < len(stacked) - 1:
-                    y = np.tanh(y) if o.activation == "tanh" else np.where(y > 0, y, np.expm1(np.minimum(y, 0.0)))
-            actions = np.clip(y, -1.0, 1.0) if policy.linear else np.tanh(y)
+            actions = policy.actions(seen, weights[alive])
             found = rows.sim.step_batch(here, task.inputs(actions), rows.substeps, False, rows.kappa, rows.parameters)
             bad, over = found.status != Status.SOLVED, task.ends(found.x)
             rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - o.shift
@@ -279,11 +270,7 @@ def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: 
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    if not isinstance(task, Task):
-        raise TypeError(f"ars(task): expected a Task, got {task!r}")
-    checks.keywords("ars(...)", options, [f.name for f in fields(RandomSearchOptions)])
-    number = checks.whole_number("ars(seed=...)", seed, 0)
-    return run_epochs(RandomSearch(task, RandomSearchOptions(**options), number), resume)
+    return learn(RandomSearch, RandomSearchOptions, task, seed, resume, options)
 
 
 def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
@@ -302,8 +289,4 @@ def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None,
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    if not isinstance(task, Task):
-        raise TypeError(f"gradient_search(task): expected a Task, got {task!r}")
-    checks.keywords("gradient_search(...)", options, [f.name for f in fields(GradientSearchOptions)])
-    number = checks.whole_number("gradient_search(seed=...)", seed, 0)
-    return run_epochs(GradientSearch(task, GradientSearchOptions(**options), number), resume)
+    return learn(GradientSearch, GradientSearchOptions, task, seed, resume, options)

@@ -8,13 +8,13 @@ A row of the batch goes on where the last epoch left it; the sums start anew whe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.learn.epochs import run_epochs
+from dojo_opt.learn.epochs import learn
 from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
@@ -294,8 +294,4 @@ def shac(task: Task, *, seed: int = 0, resume: Learned | None = None, **options:
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    if not isinstance(task, Task):
-        raise TypeError(f"shac(task): expected a Task, got {task!r}")
-    checks.keywords("shac(...)", options, [f.name for f in fields(ShacOptions)])
-    run = _Shac(task, ShacOptions(**options), checks.whole_number("shac(seed=...)", seed, 0))
-    return run_epochs(run, resume)
+    return learn(_Shac, ShacOptions, task, seed, resume, options)
