@@ -115,13 +115,22 @@ def half_cheetah() -> Task:
     )  # fmt: skip
 
 
+def _legged(name: str, file: str, observations: int, terminated: Callable[..., Any]) -> Task:
+    """A robot in a plane that moves forward on one leg or two, and ends where it falls."""
+    mech = _model(file)
+    return _task(
+        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=observations, reward=_runs(0.008, 1e-3),
+        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
+        name=name,
+    )  # fmt: skip
+
+
 def hopper() -> Task:
     """Hopper-v5: hop forward without falling; 11 observations, 3 actions, 0.008 s each.
 
     Returns:
         The task.
     """
-    mech = _model("hopper.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
         for i in range(2, x.shape[0]):
@@ -129,11 +138,7 @@ def hopper() -> Task:
                 return True
         return not (x[1] > 0.7 and abs(x[2]) < 0.2)
 
-    return _task(
-        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=11, reward=_runs(0.008, 1e-3),
-        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
-        name="Hopper",
-    )  # fmt: skip
+    return _legged("Hopper", "hopper.xml", 11, terminated)
 
 
 def walker2d() -> Task:
@@ -142,16 +147,11 @@ def walker2d() -> Task:
     Returns:
         The task.
     """
-    mech = _model("walker2d_v5.xml")
 
     def terminated(x):  # type: ignore[no-untyped-def]
         return not (0.8 < x[1] < 2.0 and abs(x[2]) < 1.0)
 
-    return _task(
-        mech, 4, 0.002, observation=_tailed(1, mech.nq, _FASTEST), observations=17, reward=_runs(0.008, 1e-3),
-        start=_starts(mech, 1, 5e-3, lambda rng, n: rng.uniform(-5e-3, 5e-3, n)), terminated=terminated, survival=1.0,
-        name="Walker2d",
-    )  # fmt: skip
+    return _legged("Walker2d", "walker2d_v5.xml", 17, terminated)
 
 
 def ant() -> Task:
