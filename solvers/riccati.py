@@ -130,10 +130,19 @@ def _gains(Z: Matrix, free: Integers, nfree: int, factor: Vector, K: Matrix) -> 
 
 
 @inlined
-def _value(K: Matrix, k: Vector, Q: Matrix, q: Vector, CD: Stack, Quu: Matrix, w: Vector, V: Matrix, v: Vector) -> None:
+def _value(
+    gains: tuple[Matrix, Vector],
+    Q: Matrix,
+    q: Vector,
+    scratch: tuple[Stack, Matrix, Vector],
+    V: Matrix,
+    v: Vector,
+) -> None:
     """V = Q_xx + K^T W + Q_xu K and v = q_x + K^T w + Q_xu k with W = Q_ux + Q_uu K, w = q_u + Q_uu k: exact for any
-    gains.   CD: (2, 2 m, n) scratch for (K, Q_ux) and (W, K), whose product is the change of Q_xx; Quu: (m, m) scratch.
+    gains (K, k).   scratch: CD (2, 2 m, n), for (K, Q_ux) and (W, K), whose product is the change of Q_xx; Quu (m, m);
+    w (m,).
     """
+    (K, k), (CD, Quu, w) = gains, scratch
     m, n = K.shape
     C, D = CD[0], CD[1]
     for r in range(m):
@@ -237,7 +246,7 @@ def backward_knots(
         for i in range(nfree):
             gradient = max(gradient, abs(q[n + free[i]]))
         _gains(Z, free, nfree, box, K[t])
-        _value(K[t], k[t], Q, q, CD, Huu, w, V, v)
+        _value((K[t], k[t]), Q, q, (CD, Huu, w), V, v)
         if t % _LOOK == _LOOK - 1 and seconds() > deadline:
             return _SOLVED, t, 0.0, 0.0, gradient
     d0, d1 = _predict(quad, K, k, z, y, dx)

@@ -153,6 +153,27 @@ def test_files_stay_readable() -> None:
     assert not long
 
 
+KERNEL_MARKS = ("kernel", "inner_kernel", "parallel_kernel", "local_kernel", "inlined", "optional")
+
+
+def test_kernels_are_short() -> None:
+    """At most 45 lines after the docstring, and 8 arguments."""
+    long, seen = [], 0
+    for path in (path for package in PACKAGES for path in (HOME / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            marks = {ast.unparse(mark).partition("(")[0] for mark in node.decorator_list}
+            if marks.isdisjoint(KERNEL_MARKS):
+                continue
+            body = node.body[1:] if isinstance(node.body[0], ast.Expr) else node.body
+            lines = (node.end_lineno or 0) - body[0].lineno + 1 if body else 0
+            seen += 1
+            if lines > 45 or len(node.args.args) > 8:
+                long.append(f"{path}:{node.name}: {lines} lines, {len(node.args.args)} arguments")
+    assert seen > 500 and not long, long
+
+
 def test_examples_are_short() -> None:
     for script in (ROOT / "examples").glob("*.py"):
         assert len(script.read_text().splitlines()) <= 60, script

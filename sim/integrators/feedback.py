@@ -41,6 +41,10 @@ class FeedbackLaw(NamedTuple):
     bounds: Cube  # (T, nlimit, 2)
 
 
+# with the share of its steps that is taken, and limits of u
+BoundedLaw = tuple[FeedbackLaw, float, tuple[Vector, Vector]]
+
+
 class Path(NamedTuple):
     """Buffers of a rollout."""
 
@@ -111,9 +115,7 @@ def closed_loop(
     model_at: Table,
     data_at: Table,
     settings: Vector,
-    policy: FeedbackLaw,
-    alpha: float,
-    limits: tuple[Vector, Vector],
+    law: BoundedLaw,
     substeps: int,
     path: Path,
     first: int,
@@ -126,6 +128,7 @@ def closed_loop(
     model = model_view(model_at)
     data = data_view(data_at)
     options = options_of(data, settings, first == 0)
+    policy, alpha, limits = law
     nq = data.theta1.shape[0]
     velocity = data.step_x[1, nq:]
     knots = path.us.shape[0]

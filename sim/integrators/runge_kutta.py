@@ -18,7 +18,7 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.kinematics import displace
 from sim.dynamics.momentum_balance import joints_below_turn
 from sim.dynamics.state import integrate_state, state_difference
-from sim.integrators.feedback import FeedbackLaw, Path
+from sim.integrators.feedback import BoundedLaw, Path
 from sim.integrators.hamilton import (
     coordinate_rates,
     momenta_of_velocity,
@@ -219,13 +219,19 @@ def linearize(
 
 @kernel
 def closed_loop(
-    model_at: Table, data_at: Table, settings: Vector, scheme: Scheme, policy: FeedbackLaw, alpha: float,
-    limits: tuple[Vector, Vector], substeps: int, path: Path, first: int,
-) -> int:  # fmt: skip
+    model_at: Table,
+    data_at: Table,
+    settings: Vector,
+    scheme: Scheme,
+    law: BoundedLaw,
+    substeps: int,
+    path: Path,
+    first: int,
+) -> int:
     """As feedback.py: u_t = clamp(us_t + alpha k_t + K_t (x_t (-) xs_t)), x_t+1 = f(x_t, u_t) (+) (alpha - 1) gap."""
     model = model_view(model_at)
     data = data_view(data_at)
-    low, high = limits
+    policy, alpha, (low, high) = law
     ndx = policy.gaps.shape[1]
     dx = data.chain[0][:ndx]
     start_pace(data, settings)

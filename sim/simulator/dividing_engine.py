@@ -16,12 +16,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.integrators.feedback import Path
+from sim.integrators.feedback import BoundedLaw, Path
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.layout import CARRY
 from sim.model.model import Model
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Law, Rolled
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Rolled
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted
@@ -193,7 +193,7 @@ class DividingEngine(Engine):
             motion.A[knot], motion.B[knot] = self.slopes(x, divided)
         return True
 
-    def _follow(self, law: Law, settings: Vector, substeps: int, path: Path, first: int) -> int:
+    def _follow(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, first: int) -> int:
         """As Engine._follow, with division."""
         steps = len(path.us) * substeps
         done = super()._follow(law, settings, substeps, path, first)
@@ -205,7 +205,7 @@ class DividingEngine(Engine):
                 done = super()._follow(law, settings, substeps, path, done)
         return done
 
-    def _divide_shot(self, law: Law, settings: Vector, substeps: int, path: Path, done: int) -> bool:
+    def _divide_shot(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, done: int) -> bool:
         """Divide the unsolved step of a closed loop after `done` solved ones; False where that does not solve it."""
         policy, alpha, _ = law
         t, s = divmod(done, substeps)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from sim.dynamics import coordinates, coordinates_jacobian, energy, state, velocity
 from sim.integrators import rollout
-from sim.integrators.feedback import FeedbackLaw, Path, closed_loop
+from sim.integrators.feedback import BoundedLaw, FeedbackLaw, Path, closed_loop
 from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.layout import data_view, sizes_of, table
@@ -116,9 +116,6 @@ class Rolled(NamedTuple):
     A: Floats  # (T, ndx, ndx) derivatives, or (0, ndx, ndx)
     B: Floats  # (T, ndx, nu)
     division: Division
-
-
-Law = tuple[FeedbackLaw, float, tuple[Floats, Floats]]  # with the share of its steps that is taken, and limits of u
 
 
 def finite_rows(array: Floats) -> NDArray[np.bool_]:
@@ -329,10 +326,10 @@ class Engine:
             np.nan_to_num(path.report, copy=False, nan=np.inf, posinf=np.inf)
         return knot, path
 
-    def _follow(self, law: Law, settings: Vector, substeps: int, path: Path, first: int) -> int:
+    def _follow(self, law: BoundedLaw, settings: Vector, substeps: int, path: Path, first: int) -> int:
         """The piece of a closed loop that begins at a step: the number of solved steps, those before included."""
         model, data = self.linked(link_step), self._scratch.table()
-        return int(closed_loop(model, data, settings, *law, substeps, path, first))
+        return int(closed_loop(model, data, settings, law, substeps, path, first))
 
     def linearize(
         self,

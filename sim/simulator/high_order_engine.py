@@ -205,9 +205,8 @@ class HighOrderEngine(Engine):
         model, data, settings, scheme = *self._tables(), self._scheme()
 
         def go_on(first: int) -> int:
-            return int(
-                runge_kutta.closed_loop(model, data, settings, scheme, policy, alpha, limits, substeps, path, first)
-            )
+            law = (policy, alpha, limits)
+            return int(runge_kutta.closed_loop(model, data, settings, scheme, law, substeps, path, first))
 
         return follow(go_on, settings, path, substeps), path
 

@@ -133,7 +133,7 @@ def solve_from(
         if not linearize_step(model, data, h, q, v, smoothing, is_near(merit, kappa), s.undamped):
             return Outcome(Status.SINGULAR.value, iterations, merit.residual, merit.violation)
         boundary = direction(model, data, h, kappa, merit.mean)
-        merit, halvings = search(model, data, options, inputs, scale, smoothing, boundary, merit, worse)
+        merit, halvings = search(model, data, options, inputs, (scale, smoothing), boundary, merit, worse)
     return Outcome(Status.NO_PROGRESS.value, iterations, merit.residual, merit.violation)
 
 

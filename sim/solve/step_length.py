@@ -32,8 +32,7 @@ def search(
     data: Data,
     options: StepOptions,
     inputs: tuple[Vector, Vector, Vector],
-    scale: float,
-    smoothing: float,
+    sizes: tuple[float, float],
     boundary: float,
     last: Merit,
     worse: float,
@@ -42,9 +41,10 @@ def search(
 
     A step that the boundary of the cones would cut short is not: its pairs that leave their cones return to the
     central path of the present mean. Better is a smaller residual, or one within the noise of the products that it
-    belongs to; or smaller violations at a residual that grew less than `worse` times.
+    belongs to; or smaller violations at a residual that grew less than `worse` times.   sizes: scale, smoothing.
     """
     q, v, u = inputs
+    scale, smoothing = sizes
     h = options.h
     whole = boundary < _WHOLE
     nearly = 0.99 if max(last.residual, last.violation) > 0.1 else 0.9999

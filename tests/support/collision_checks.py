@@ -42,7 +42,7 @@ def chosen(case: Case, R: Floats, r: Floats) -> list[tuple[int, int]]:
     number, out = features(case), np.empty(OUT)
     if case.kind in CYLINDERS:
         codes = np.zeros(number, dtype=np.int64)
-        choose_on_cylinder(int(case.kind), case.sizes, case.hull, *pose, np.empty(12), codes, 0, out)
+        choose_on_cylinder(int(case.kind), case.sizes, case.hull, pose, np.empty(12), codes, 0, out)
         return [(feature, int(code)) for feature, code in enumerate(codes) if code != 0]
     faces = arrange(int(case.kind), case.sizes, case.hull, *pose, OPEN)
     found = [choose(int(case.kind), k, faces, case.sizes, case.hull, *pose, out) for k in range(number)]
@@ -54,7 +54,7 @@ def contact(case: Case, feature: int, code: int, R: Floats, r: Floats) -> Floats
     pose = np.ascontiguousarray(R).ravel(), np.ascontiguousarray(r)
     out = np.empty(OUT)
     if case.kind in CYLINDERS:
-        collide_with_cylinder(int(case.kind), feature, code, case.sizes, case.hull, *pose, np.empty(12), out)
+        collide_with_cylinder(int(case.kind), feature, code, case.sizes, case.hull, pose, np.empty(12), out)
     else:
         collide_chosen(int(case.kind), feature, code, case.sizes, case.hull, *pose, out)
     return out

@@ -1,7 +1,7 @@
 """Cylinders against polytopes and cylinders: all contact points of a collision chosen at once, then one at a time.
 
 As collide.py, whose conventions hold; apart from it, so that scenes without such collisions do not compile them.
-`turned` (12,) is scratch.
+`turned` (12,) is scratch; a pose is (R, r).
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from sim.contact.collision.exchange import exchange
 from sim.model.shape_kinds import SWAPPED, Pair
 from solvers.compiler import kernel
 from solvers.types import Integers, Matrix, Vector
+
+Pose = tuple[Vector, Vector]
 
 
 @kernel
@@ -26,17 +28,10 @@ def separation_of_cylinder(
 
 @kernel
 def choose_on_cylinder(
-    kind: int,
-    sizes: Vector,
-    hull: Matrix,
-    R: Vector,
-    r: Vector,
-    turned: Vector,
-    codes: Integers,
-    first: int,
-    out: Vector,
+    kind: int, sizes: Vector, hull: Matrix, pose: Pose, turned: Vector, codes: Integers, first: int, out: Vector
 ) -> None:
     """codes[first:] = which elements of the shapes make all the contact points of the two; uses up `out`."""
+    R, r = pose
     if kind % SWAPPED == Pair.POLYTOPE_CYLINDER:
         polytope_cylinder.choose_elements(sizes, hull, R, r, codes, first, out)
     else:
@@ -45,9 +40,10 @@ def choose_on_cylinder(
 
 @kernel
 def collide_with_cylinder(
-    kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, R: Vector, r: Vector, turned: Vector, out: Vector
+    kind: int, feature: int, code: int, sizes: Vector, hull: Matrix, pose: Pose, turned: Vector, out: Vector
 ) -> None:
     """Contact of the elements `code` that were chosen for contact point `feature`: smooth in the pose."""
+    R, r = pose
     if kind % SWAPPED == Pair.POLYTOPE_CYLINDER:
         polytope_cylinder.put_elements(feature, code, sizes, hull, R, r, out)
     else:

@@ -49,7 +49,7 @@ def put_all(model: Model, data: Data, first: int) -> None:
     turned = data.pair_scratch[:12]
     for j in range(first, last_point(model, first)):
         code = data.pair_code[j]
-        collide_with_cylinder(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], turned, data.pair_out[j])
+        collide_with_cylinder(kind, j - first, code, sizes, model.hull, (pose[:9], pose[9:]), turned, data.pair_out[j])
 
 
 @optional(Slot.COLLIDE_CYLINDERS)
@@ -67,23 +67,23 @@ def choose_cylinders(model: Model, data: Data, first: int) -> None:
     before, turned, g = data.pair_before[first], data.pair_scratch[:12], data.pair_trial[0]
     R, r = before[:9], before[9 : RelativePose.GAP]
     missing = False
-    choose_on_cylinder(kind, sizes, model.hull, pose[:9], pose[9:], turned, data.pair_code, first, g)
+    choose_on_cylinder(kind, sizes, model.hull, (pose[:9], pose[9:]), turned, data.pair_code, first, g)
     for j in range(first, last_point(model, first)):
         k = j - first
         code = data.pair_code[j]
-        collide_with_cylinder(kind, k, code, sizes, model.hull, R, r, turned, g)
+        collide_with_cylinder(kind, k, code, sizes, model.hull, (R, r), turned, g)
         lost = g[Witness.GAP] < before[RelativePose.GAP]
         if lost:
-            collide_with_cylinder(kind, k, code, sizes, model.hull, pose[:9], pose[9:], turned, g)
+            collide_with_cylinder(kind, k, code, sizes, model.hull, (pose[:9], pose[9:]), turned, g)
             lost = left_behind(data, kind, g, pose, before, before[RelativePose.GAP])
         if lost:
             data.pair_code[j] = instead_on_cylinder(kind, k, sizes, model.hull, R, r)
-            collide_with_cylinder(kind, k, data.pair_code[j], sizes, model.hull, R, r, turned, g)
+            collide_with_cylinder(kind, k, data.pair_code[j], sizes, model.hull, (R, r), turned, g)
             if g[Witness.GAP] < before[RelativePose.GAP]:
                 data.pair_code[j] = 0
             missing = missing or data.pair_code[j] == 0
     if missing:
-        choose_on_cylinder(kind, sizes, model.hull, R, r, turned, data.pair_code, first, g)
+        choose_on_cylinder(kind, sizes, model.hull, (R, r), turned, data.pair_code, first, g)
     if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, data, first)
     put_all(model, data, first)
@@ -99,8 +99,7 @@ def cylinder_before(model: Model, data: Data, first: int, j: int) -> None:
         data.pair_code[j],
         model.pair_sizes[first],
         model.hull,
-        before[:9],
-        before[9 : RelativePose.GAP],
+        (before[:9], before[9 : RelativePose.GAP]),
         data.pair_scratch[:12],
         data.pair_trial[0],
     )

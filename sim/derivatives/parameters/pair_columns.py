@@ -69,12 +69,13 @@ def _moved_frame(model: Model, data: Data, j: int, side: int, e: Vec3, turn: Vec
 
 @kernel
 def add_moved_shape(
-    model: Model, data: Data, h: float, j: int, side: int, moved: Moved, floor: float, w: float, col: int
+    model: Model, data: Data, h: float, end: tuple[int, int], moved: Moved, floor: float, w: float, col: int
 ) -> None:
-    """The shape of a (side 0) or b (1) of pair j moves, the floor of an impact rises by `floor`.
+    """The shape of a (side 0) or b (1) of pair j moves, the floor of an impact rises by `floor`.   end: (j, side).
 
     gap n.e, of a relative to b       frame and point as in _moved_frame, slip as in pair_jacobian
     """
+    j, side = end
     a = model.coupling_body[model.pair_coupling[j], 0]
     b = model.coupling_body[model.pair_coupling[j], 1]
     c = model.contact_height.shape[0] + j
@@ -155,7 +156,7 @@ def add_shapes_shift(model: Model, data: Data, h: float, first: int, k: int, w: 
         if is_felt(model, data, j):
             floor = pair_floor(data, model.contact_height.shape[0] + j, side, e1, e2)
             if is_taut(model, data, j):
-                add_moved_end(model, data, j, side, e2, e3, floor, w, col)
+                add_moved_end(model, data, (j, side), e2, e3, floor, w, col)
             else:
-                add_moved_shape(model, data, h, j, side, (e3, NOWHERE, NOWHERE), floor, w, col)
+                add_moved_shape(model, data, h, (j, side), (e3, NOWHERE, NOWHERE), floor, w, col)
         j += 1

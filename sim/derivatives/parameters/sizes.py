@@ -129,11 +129,11 @@ def add_shapes_size(model: Model, data: Data, h: float, first: int, which: int, 
             p = row(data.pair_frame[j], 9)
             e = element_shift(model, data, j, which, data.pair_out[j, Witness.GAP], gap_normal(model, data, j), p, 3)
             if is_taut(model, data, j):  # where it pulls along stays
-                add_moved_end(model, data, j, which // SIDE, (0.0, 0.0, 0.0), e, floor, w, col)
+                add_moved_end(model, data, (j, which // SIDE), (0.0, 0.0, 0.0), e, floor, w, col)
             else:
                 n, r = gap_normal(model, data, j), 0.5 * data.pair_out[j, Witness.GAP]
                 r = r if which < SIDE else -r  # from the middle to the surface
                 x = (p[0] + r * n[0] - o[0], p[1] + r * n[1] - o[1], p[2] + r * n[2] - o[2])
                 moved = (e, element_turn(model, data, j, which, n), x)
-                add_moved_shape(model, data, h, j, which // SIDE, moved, floor, w, col)
+                add_moved_shape(model, data, h, (j, which // SIDE), moved, floor, w, col)
         j += 1

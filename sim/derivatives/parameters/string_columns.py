@@ -15,9 +15,13 @@ from solvers.rotation import Vec3
 
 @optional(Slot.ADD_MOVED_END)
 def add_moved_end(
-    model: Model, data: Data, j: int, side: int, e2: Vec3, e3: Vec3, floor: float, w: float, col: int
+    model: Model, data: Data, end: tuple[int, int], e2: Vec3, e3: Vec3, floor: float, w: float, col: int
 ) -> None:
-    """The end of taut string j on a (side 0) or b moves by e2 at configuration 2, by e3 at 3: dn2, de_a, gap n3.e3."""
+    """The end (j, side) of taut string j on a (side 0) or b moves by e2 at configuration 2, by e3 at 3.
+
+    dn2, de_a, gap n3.e3
+    """
+    j, side = end
     c = model.contact_height.shape[0] + j
     F = data.pair_frame[j]
     sign = 1.0 if side == 0 else -1.0
