@@ -28,6 +28,7 @@ class Status(IntEnum):
     INFEASIBLE = 14
     STOPPED = 15
     INTERRUPTED = 16
+    TOLERANCE_STEP = 17
 
     def __str__(self) -> str:
         """The name, where an IntEnum prints its number."""
@@ -51,5 +52,6 @@ MESSAGES: dict[Status, str] = {
     Status.SIMULATION_FAILED: "The simulator could not solve the steps of the trajectory.",
     Status.INFEASIBLE: "The constraints are still violated after the last penalty increase.",
     Status.STOPPED: "The callback stopped the solver.",
+    Status.TOLERANCE_STEP: "The shortest step is too long for the requested accuracy; ask for less of it.",
     Status.INTERRUPTED: "Ctrl-C interrupted the computation.",
 }

@@ -121,6 +121,22 @@ def _models() -> None:
             calls(sim)
 
 
+def _accurate(ground: bool) -> None:
+    """Calls on a ball, or a pendulum, with steps of an accuracy."""
+    mech = dojo.models.sphere() if ground else dojo.models.pendulum()
+    sim = dojo.Simulator(mech, time_step=0.01, accuracy=1e-3)
+    motions(sim)
+    derivatives_of_order(sim)
+    sim.rollout(sim.neutral(), steps=2).at([0.005])
+
+
+def derivatives_of_order(sim: Any) -> None:
+    """Of steps and sweeps at the kappa of the simulator."""
+    x, us = sim.neutral(), np.zeros((2, sim.nu))
+    sim.linearize(x, us[0])
+    sim.vjp((np.stack([x] * 3), us), np.zeros((3, sim.ndx)))
+
+
 def _flight(calls: Callable[[Any], None], order: int) -> None:
     """Calls on a body above the ground, with steps of higher order."""
     foot = dojo.Contact("b", point=(0.0, 0.0, -0.1))
@@ -205,6 +221,8 @@ _CALLS: dict[str, Callable[[], None]] = {  # the first one to reach an entry com
 _BEYOND = {  # needed neither by README's examples nor by the models
     "derivatives of higher order": lambda: _pendulum(derivatives, 4),
     "derivatives of a flight": lambda: _flight(derivatives, 8),
+    "accuracy": lambda: _accurate(False),
+    "accuracy on the ground": lambda: _accurate(True),
 }
 _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to compile for
     "hop": _hop,

@@ -115,7 +115,7 @@ def first_far(model_at: Table, data_at: Table, settings: Vector, scheme: Scheme,
 
 
 @kernel
-def _leave(data: Data) -> None:
+def leave(data: Data) -> None:
     """Configuration 2 becomes configuration 1."""
     copy(data.pos2, data.pos1)
     copy(data.quat2, data.quat1)
@@ -123,7 +123,7 @@ def _leave(data: Data) -> None:
 
 
 @kernel
-def _report(model: Model, data: Data, h: float, out: Matrix) -> None:
+def report_apart(model: Model, data: Data, h: float, out: Matrix) -> None:
     """Contacts that carry nothing, with their gaps and mean slips, of the step from configuration 1 to 2."""
     copy(data.pos2, data.pos3)
     copy(data.quat2, data.quat3)
@@ -181,7 +181,7 @@ def roll_far(
         allowed = _allowed(scheme, settings[2])
         if left_out(model, data, kappa, x[nq:], -1.0) > allowed:
             return t, NEAR
-        _leave(data)
+        leave(data)
         set_external(data, flight.wrenches, t)
         status = advance(model, data, scheme, h, us[t], x, None)
         reports[t, 0], reports[t, 1], reports[t, 4] = status, scheme.b.shape[0], -1.0
@@ -189,7 +189,7 @@ def roll_far(
             return t, status
         if left_out(model, data, kappa, x[nq:], h) > allowed:
             return t, NEAR
-        _report(model, data, h, flight.contacts[t])
+        report_apart(model, data, h, flight.contacts[t])
         if is_due(data, reports[t, 1]):
             return t + 1, _SOLVED
     return us.shape[0], _SOLVED

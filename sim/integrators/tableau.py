@@ -39,6 +39,14 @@ def tableau(order: int) -> tuple[Floats, Floats]:
     return a, np.array([3 / 40, 0.0, 875 / 2244, 23 / 72, 264 / 1955, 125 / 11592, 43 / 616])
 
 
+@cache
+def embedded() -> tuple[Floats, Floats]:
+    """Weights (s + 1,) of the rates of the stages of order 8 and of its end: less orders 5 and 3, from SciPy."""
+    from scipy.integrate import DOP853
+
+    return np.array(DOP853.E5), np.array(DOP853.E3)
+
+
 def _filled(*rows: tuple[float, ...]) -> Floats:
     """The square matrix with these beginnings of its rows."""
     return np.array([[*row, *[0.0] * (len(rows) - len(row))] for row in rows])

@@ -99,11 +99,12 @@ class Division(NamedTuple):
 
     substeps: Integers  # (T,) steps that each was divided into, 1 for whole ones
     shares: Floats  # (T,) of the momentum of bodies against each other, 1 where all was handed on
+    errors: Floats  # (T,) estimated, over those that an accuracy allows; 0 without one
 
     @classmethod
     def none(cls, steps: int) -> Division:
         """That of so many whole steps."""
-        return cls(np.ones(steps, dtype=np.int64), np.ones(steps))
+        return cls(np.ones(steps, dtype=np.int64), np.ones(steps), np.zeros(steps))
 
 
 class Rolled(NamedTuple):

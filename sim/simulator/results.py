@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators.feedback import Path
+from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.mechanism import Mechanism
 from solvers.status import MESSAGES, Status
@@ -161,6 +162,7 @@ class StepResult(Result):
         scene: mechanism, time step, and rows of the contacts, for `contacts`.
         substeps: number of steps that it was divided into.
         share: share of the momentum of bodies against each other that a divided step handed on.
+        error: estimated error over the one that the accuracy of the simulator allows; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
     """
 
@@ -172,6 +174,7 @@ class StepResult(Result):
     scene: tuple[Mechanism, float, Floats] = field(repr=False)
     substeps: int = 1
     share: float = 1.0
+    error: float = 0.0
     detail: str = ""
 
     @cached_property
@@ -198,6 +201,8 @@ class Trajectory(Result):
         contacts: contacts of each step, (T, ncontact, ...).
         substeps: (T,) number of steps that each step was divided into.
         shares: (T,) share of the momentum of bodies against each other that each step handed on: 1, but in whips.
+        errors: (T,) estimated error of each step over the one that the accuracy of the simulator allows: above 1 where
+            contacts forced it to go on; 0 without an accuracy.
         detail: sentence about an unsolved step, with its numbers.
         wrenches: (T, nbody, 6) external wrenches [N, N m]; None without any.
     """
@@ -213,6 +218,7 @@ class Trajectory(Result):
     contacts: Contacts
     substeps: Integers
     shares: Floats
+    errors: Floats
     detail: str = ""
     wrenches: Floats | None = None
 
@@ -220,6 +226,25 @@ class Trajectory(Result):
         sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
         steps = f"{self.knot} steps of {sim.time_step:g} s"
         return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
+
+    def at(self, times: Any) -> Floats:
+        """States at any times of a motion of a simulator with an accuracy, as exact as the motion is.
+
+        Args:
+            times: (n,) since its beginning [s].
+
+        Returns:
+            States (n, nx).
+
+        Raises:
+            ValueError: the simulator has no accuracy, or a time lies outside.
+        """
+        if self.simulator.accuracy is None:
+            raise ValueError("Trajectory.at: steps of a fixed length have states at their ends only")
+        asked = checks.array("Trajectory.at(times)", times, ("n",))
+        if np.any(asked < 0.0) or np.any(asked > self.time[-1] * (1.0 + 1e-12)):
+            raise ValueError(f"Trajectory.at(times): expected times from 0 to {self.time[-1]:g} s, got {times!r}")
+        return np.asarray(self.simulator._engine.nodes_at((self.x, self.u, self.wrenches), asked))
 
 
 @dataclass(frozen=True)
@@ -476,6 +501,17 @@ def sentence(
         if loop is not None and not loop[0] < tolerance:
             text += f" {loop[1]} is open by {loop[0]:.1e}."
     return text
+
+
+def missed(errors: Floats) -> str:
+    """A sentence about the largest estimated error (T,) of solved steps beyond the accuracy; empty without one."""
+    worst = int(np.argmax(errors)) if len(errors) else 0
+    if not len(errors) or errors[worst] <= 1.0:
+        return ""
+    return (
+        f"Solved, but the estimated error of step {worst} is {errors[worst]:.2g} times the one that the accuracy "
+        "allows: sub-steps in contact have a shortest length. A smaller kappa shortens it."
+    )
 
 
 def fastest(mech: Mechanism, z: Floats) -> str:

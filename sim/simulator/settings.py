@@ -7,13 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import WORLD
 from sim.solve.energy_balance import LARGEST_GAIN
 from solvers.types import Vector
 
-__all__ = ["Settings", "default_kappa", "free_parts"]
+__all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "with_accuracy"]
 
+LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _CREEP = 1e-9  # [m/s]
 _EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
@@ -30,6 +32,7 @@ class Settings(NamedTuple):
     divide: bool = True  # whether steps that cannot be solved are divided
     gain: float = LARGEST_GAIN  # largest gain of energy of a solved step, of the energies that change in it
     loss: float = inf  # largest loss where nothing dissipates, likewise
+    accuracy: float = 0.0  # error of coordinates that steps may make [m/s, rad/s]; 0: steps are not divided for it
 
     def array(self, kappa: float | None = None) -> Vector:
         """As kernels read it, at another kappa when given, with room for a deadline (pace.py); without those
@@ -38,6 +41,16 @@ class Settings(NamedTuple):
         level = self.kappa if kappa is None else kappa
         limits = self.max_iterations, inf, self.gain, self.loss
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
+
+
+def with_accuracy(settings: Settings, accuracy: float) -> Settings:
+    """Settings of steps of an accuracy [m/s, rad/s], at least LEAST_ACCURACY, which choose their orders themselves."""
+    number = checks.number("Simulator(accuracy=...)", accuracy, above=0.0)
+    if number < LEAST_ACCURACY:
+        raise ValueError(f"Simulator(accuracy=...): expected at least {LEAST_ACCURACY:g}, got {accuracy!r}")
+    if settings.order != 2:
+        raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
+    return settings._replace(accuracy=number, order=8)
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

@@ -18,6 +18,7 @@ from sim.simulator.contact_settings import with_contacts
 from sim.simulator.engine import REPORT, Rolled
 from sim.simulator.feedback_rollout import Feedback, roll_policy
 from sim.simulator.horizon import Horizon
+from sim.simulator.lasting import lasting
 from sim.simulator.reactions import Reactions, reactions
 from sim.simulator.results import (
     STATUSES,
@@ -31,18 +32,18 @@ from sim.simulator.results import (
     carried,
     contacts_of,
     ended,
-    fastest,
+    missed,
     path_of,
     sentence,
 )
 from sim.simulator.row_batch import RowStepping
-from sim.simulator.settings import Settings, default_kappa
+from sim.simulator.settings import Settings, default_kappa, with_accuracy
 from solvers.status import Status
 
 Floats = NDArray[np.float64]
 Wrenches = ArrayLike | Mapping[str, ArrayLike]
 
-_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide")
+_SETTINGS = ("time_step", "kappa", "tolerance", "max_iterations", "order", "divide", "accuracy")
 _ORDERS = (2, 4, 6, 8)
 
 
@@ -50,8 +51,8 @@ class Simulator(RowStepping):
     """A mechanism, a time step, and the accuracy of its steps.
 
     A state is x = [q; v] (nx,), an input u (nu,) in N and N m, a perturbation dx (ndx,) = [dq; dv]; see `describe()`.
-    With order 2, v is the mean velocity over the interval that led to q. With higher orders it is that of the node,
-    M(q)^-1 p before the ground acts in the next step: standing still, g h/2.
+    With order 2, v is the mean velocity over the interval that led to q. Otherwise it is that of the node, M(q)^-1 p
+    before the ground acts in the next step: standing still, g h/2.
 
     Every method that steps returns a result with `success`, `status` and `message`, and raises SimulationError for an
     unsolved step only with throw=True. External wrenches are (nbody, 6), with steps in front (T, nbody, 6), or
@@ -70,6 +71,9 @@ class Simulator(RowStepping):
         divide: whether a step that cannot be solved, or turns a body too far, becomes 2, 4, ... up to 1024 steps, as
             few as it needs: see `substeps` of results. Momentum is handed on exactly, unless no poses a step apart have
             it. Then bodies lose momentum against each other: see `shares`.
+        accuracy: error of the joint coordinates that a motion may make per second [m, rad], of a tree. Each step is
+            divided into sub-steps of order 8 or 2 as that allows, and impacts happen at their times. `errors` of
+            results says where the estimated error is larger; see sim/integrators/adaptive.py.
 
     Raises:
         TypeError: for a mechanism or a `divide` of the wrong kind.
@@ -85,11 +89,11 @@ class Simulator(RowStepping):
         max_iterations: int = 500,
         order: int = 2,
         divide: bool = True,
+        accuracy: float | None = None,
     ) -> None:
         if not isinstance(mechanism, Mechanism):
             raise TypeError(f"Simulator(mechanism): expected a Mechanism, got {mechanism!r}")
-        if not isinstance(max_iterations, int | np.integer) or max_iterations < 1:
-            raise ValueError(f"Simulator(max_iterations=...): expected a whole number >= 1, got {max_iterations!r}")
+        whole_number("Simulator(max_iterations=...)", max_iterations)
         if not isinstance(divide, bool | np.bool_):
             raise TypeError(f"Simulator(divide=...): expected True or False, got {divide!r}")
         if order not in _ORDERS:
@@ -97,8 +101,9 @@ class Simulator(RowStepping):
         h = checks.number("Simulator(time_step=...)", time_step, above=0.0)
         self._kappa = None if kappa is None else checks.number("Simulator(kappa=...)", kappa, above=0.0)
         level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
-        accuracy = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
-        super().__init__(mechanism, Settings(h, level, accuracy, int(max_iterations), int(order), bool(divide)))
+        residual = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
+        settings = Settings(h, level, residual, int(max_iterations), int(order), bool(divide))
+        super().__init__(mechanism, settings if accuracy is None else with_accuracy(settings, accuracy))
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._given().values())
@@ -106,11 +111,11 @@ class Simulator(RowStepping):
     def _given(self) -> dict[str, Any]:
         """The settings as given: kappa None for the default."""
         given = {name: getattr(self._engine.settings, name) for name in _SETTINGS}
-        return {**given, "kappa": self._kappa}
+        return {**given, "order": 2 if self.accuracy else self.order, "kappa": self._kappa, "accuracy": self.accuracy}
 
     def __repr__(self) -> str:
-        numbers = ", ".join(f"{name}={value:g}" for name, value in zip(_SETTINGS, self._engine.settings, strict=False))
-        return f"Simulator({self.mechanism.name}, {numbers})"
+        shown = zip(_SETTINGS[: None if self.accuracy else -1], self._engine.settings, strict=False)
+        return f"Simulator({self.mechanism.name}, {', '.join(f'{name}={value:g}' for name, value in shown)})"
 
     def replace(self, **settings: Any) -> Simulator:
         """The same simulator with other settings. Compiled code is shared, and a default kappa stays one.
@@ -163,12 +168,11 @@ class Simulator(RowStepping):
         if status == REFUSED:
             check.state("step", x)
             check.inputs("step", "u", control, (self.nu,))
-        detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], rolled.xs[0])
-        scene = (self.mechanism, self.time_step, rolled.contacts[0])
-        end = rolled.xs[1 if rolled.knot else 0]
-        parts, share = (float(column[0]) for column in rolled.division)
-        end_status = STATUSES[int(status)]
-        found = StepResult(end, end_status, int(iterations), residual, violation, scene, int(parts), share, detail)
+        scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.knot else 0]
+        parts, share, error = rolled.division
+        detail = missed(error) if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], end)
+        solved = STATUSES[int(status)], int(iterations), residual, violation
+        found = StepResult(end, *solved, scene, int(parts[0]), float(share[0]), float(error[0]), detail)
         return ended(found, throw) if throw else found
 
     def rollout(
@@ -177,6 +181,7 @@ class Simulator(RowStepping):
         us: ArrayLike | Feedback | None = None,
         *,
         steps: int | None = None,
+        duration: float | None = None,
         throw: bool = False,
         wrenches: Wrenches | None = None,
     ) -> Trajectory:
@@ -186,12 +191,16 @@ class Simulator(RowStepping):
             x: (nx,) state.
             us: (T, nu) inputs [N, N m], or a function u = us(time, x), called before each step; zero by default.
             steps: number of steps, if `us` does not determine it.
+            duration: of all steps [s], of a simulator with an accuracy; its time step of each by default.
             throw: raise SimulationError where a step is not solved.
             wrenches: external wrenches, (T, nbody, 6) or by body.
 
         Returns:
             Trajectory of the solved steps.
         """
+        if duration is not None:
+            sim, steps = lasting(self, us, steps, duration)
+            return sim.rollout(x, us, steps=steps, throw=throw, wrenches=wrenches)
         state = self._arguments.state("rollout", x)
         if callable(us):
             count = whole_number("Simulator.rollout(steps=...)", steps)
@@ -217,7 +226,8 @@ class Simulator(RowStepping):
         """A rollout under the inputs (T, nu)."""
         knot, xs, reports = rolled.knot, rolled.xs, rolled.reports
         last = reports[min(knot, len(reports) - 1)] if len(reports) else np.zeros(REPORT)
-        status = Status(int(last[0]))
+        status, where = Status(int(last[0])), f"Simulator.rollout: step {knot}"
+        errors = rolled.division.errors[:knot]
         return Trajectory(
             simulator=self,
             x=xs[: knot + 1],
@@ -230,19 +240,10 @@ class Simulator(RowStepping):
             contacts=contacts_of(self.mechanism, self.time_step, rolled.contacts[:knot]),
             substeps=rolled.division.substeps[:knot],
             shares=rolled.division.shares[:knot],
-            detail="" if status == Status.SOLVED else self._sentence(f"Simulator.rollout: step {knot}", last, xs[knot]),
+            errors=errors,
+            detail=missed(errors) if status == Status.SOLVED else self._sentence(where, last, xs[knot]),
             wrenches=None if wrenches is None else wrenches[:knot],
         )
-
-    def _sentence(self, where: str, report: Floats, x: Floats | None = None) -> str:
-        """Why the last step of this thread was not solved; x (nx,): the state it began from."""
-        mech = self.mechanism
-        names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
-        gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
-        text = sentence(mech, where, report, self.tolerance, max(gaps, default=None))
-        if report[0] == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
-            text += f" {fastest(mech, self.replace(time_step=1e-6).maximal(x))}"
-        return text
 
     def rollout_batch(self, x0s: ArrayLike, us: ArrayLike, *, throw: bool = False) -> Batch:
         """Rollouts over all cores.
@@ -578,9 +579,8 @@ class Simulator(RowStepping):
         blocks = {"state": line.costate[0], "input": line.inputs}
         blocks = {name: blocks[name] if name in blocks else line.parameters[found.rows[name]] for name in asked}
         if knot >= 0:
-            report = line.report[0]
-            detail = sentence(self.mechanism, f"{call}: step {knot}", report, self.tolerance)
-            return ended(Gradient(blocks, Status(int(report[0])), detail), throw)
+            detail = sentence(self.mechanism, f"{call}: step {knot}", line.report[0], self.tolerance)
+            return ended(Gradient(blocks, Status(int(line.report[0, 0])), detail), throw)
         finite = all(np.isfinite(block).all() for block in blocks.values())
         return ended(Gradient(blocks, Status.SOLVED if finite else Status.NOT_FINITE), throw)
 

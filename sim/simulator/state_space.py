@@ -19,7 +19,9 @@ from sim.simulator.describe import describe
 from sim.simulator.dividing_engine import DividingEngine
 from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
+from sim.simulator.results import fastest, sentence
 from sim.simulator.settings import Settings
+from solvers.status import Status
 
 if TYPE_CHECKING:
     from sim.derivatives.parameters.parameters import Parameters
@@ -30,6 +32,11 @@ Floats = NDArray[np.float64]
 
 def _engine_of(model: Model, mechanism: Mechanism, settings: Settings) -> Engine:
     """The engine of an order; the modules of higher orders are imported by simulators that have one."""
+    if settings.accuracy > 0.0:
+        from sim.simulator.adaptive_engine import AdaptiveEngine, check_adaptive
+
+        check_adaptive(mechanism, settings.accuracy)
+        return AdaptiveEngine(model, settings)
     if settings.order == 2:
         return DividingEngine(model, settings) if settings.divide else Engine(model, settings)
     from sim.simulator.high_order_engine import HighOrderEngine, check
@@ -50,6 +57,7 @@ class StateSpace:
     def __init__(self, mechanism: Mechanism, settings: Settings) -> None:
         self.mechanism = mechanism
         self.time_step, self.kappa, self.tolerance, self.max_iterations, self.order, self.divide = settings[:6]
+        self.accuracy = settings.accuracy or None
         self.model = pack(mechanism)
         sizes = mechanism_sizes(mechanism)
         self.nbody, self.nq, self.nv, self.ncontact, self.nu = sizes[:4] + (sizes.nu,)
@@ -86,6 +94,17 @@ class StateSpace:
         """
         call = "Simulator.parameters(wrt)"
         return self._by_parameters.values(call, self._by_parameters.names if wrt is None else wrt)
+
+    def _sentence(self, where: str, report: Floats, x: Floats | None = None) -> str:
+        """Why the last step of this thread was not solved; x (nx,): the state it began from."""
+        mech = self.mechanism
+        names = [f"Loop joint {j.name!r}" for j in mech.loops] + [f"Gear {g.name!r}" for g in mech.gears]
+        gaps = zip(self._engine.open_loops(), names, strict=True) if names else ()
+        text = sentence(mech, where, report, self.tolerance, max(gaps, default=None))
+        if report[0] == Status.ANGULAR_STEP and x is not None:  # over a step that short no turn is one too far
+            short = StateSpace(mech, self._engine.settings._replace(time_step=1e-6, order=2, accuracy=0.0))
+            text += f" {fastest(mech, short.maximal(x))}"
+        return text
 
     @cached_property
     def _by_parameters(self) -> ParameterEngine:

@@ -1,0 +1,279 @@
+"""Steps whose lengths follow from an error estimate: long ones of order 8 in flight, short ones of order 2 in contact.
+
+A sub-step of length h from a node is accepted where its estimate e of the error of the joint coordinates has
+
+    e <= accuracy h/(1 s)        [m, rad],  accuracy in m and rad per second of motion
+
+order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
+order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py
+
+and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
+
+Where a contact or limit is reached, the length is cut: the step that begins after that has a gap of at most accuracy/8,
+so impacts happen at nodes, at their times. Error that a kink in the forces forces on a step at once, as where a block
+comes to rest, is allowed once for all: a twentieth of the accuracy.
+
+No step of order 2 is shorter than the shortest length, whatever its error (`errors` of results sums up the estimates):
+on the central path a contact is a force kappa/(h gap), a spring without damping to steps that are short enough to
+follow it.
+
+    goal    (6,) accuracy [m/s, rad/s], time step of kappa [s], end of the stretch [s], shortest length [s],
+            least kappa, and whether order 8 can be: 1 or 0
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.contact.contact_report import report_contacts
+from sim.dynamics.external_forces import set_external
+from sim.dynamics.state import configuration_difference
+from sim.integrators.hamilton import coordinate_rates
+from sim.integrators.landing import landing
+from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
+from sim.integrators.phases import leave, left_out, report_apart
+from sim.integrators.runge_kutta import Scheme, advance
+from sim.integrators.runge_kutta import begin as begin_node
+from sim.integrators.slip_stop import stopping_error
+from sim.integrators.stretch import Clock, Embedded, Stretch, keep, rest_contacts
+from sim.model.columns import Apart
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
+from sim.model.model import Model
+from sim.model.pace import is_due, start_pace
+from solvers.compiler import Table, kernel
+from solvers.dense import copy_vector
+from solvers.status import Status
+from solvers.types import Vector
+
+LANDS, NEAR = -2, -1  # in place of a Status: a contact or limit is reached within the step
+
+_SOLVED = int(Status.SOLVED)
+_TOLERANCE_STEP = int(Status.TOLERANCE_STEP)
+_NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
+_TOUCHING = 0.125  # gap of a contact that closes, in accuracies
+_KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a stretch, in accuracies
+_NOISE = 1e-10  # [m, rad] error that is not seen: the gap of a contact on the central path is as exact
+_OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes what is deeper, whatever its length
+_INSTANT = 1e-13  # [s] between a landing and the node before it
+_SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
+_FAILED = 1e300
+
+
+@kernel
+def try_short(
+    models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
+) -> tuple[int, float]:  # fmt: skip
+    """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
+    model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h)
+    begin_part(data, line.wrench)
+    status = mean_of_node(models[1], works[0], h, line.u, line.x, line.mean)
+    if status == _SOLVED:
+        begin_part(data, line.wrench)
+        status = step_mean(model, data, options, line.u, line.mean, line.whole, line.report)
+    if status != _SOLVED:
+        return status, _FAILED
+    found = landing(model, data, options, goal[0], line.mean, line.slips)
+    if found.longest < h:
+        line.clock[Clock.CUT], line.clock[Clock.LEAST] = found.longest, 0.0
+        return LANDS, _FAILED
+    if found.error > 2.0 * _TOUCHING * goal[0]:
+        line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
+        return LANDS, _FAILED
+    begin_part(data, line.wrench)
+    status = mean_of_node(models[1], works[0], 0.5 * h, line.u, line.x, line.mean)
+    begin_part(data, line.wrench)
+    for part in range(2):
+        if status == _SOLVED:
+            one, other = (line.mean, line.half) if part == 0 else (line.half, line.mean)
+            status = step_mean(model, data, part_of(goal, settings, 0.5 * h), line.u, one, other, line.report)
+            report_contacts(model, data, 0.5 * h, line.parts[part])
+    if status == _SOLVED:
+        status = node_of_mean(model, data, 0.5 * h, line.u, line.mean, line.trial)
+    if status != _SOLVED:
+        return status, _FAILED
+    nq = data.theta1.shape[0]
+    configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
+    if found.depth > _OVERLAP:
+        return _SOLVED, 0.0
+    error = stopping_error(model, line.parts, line.slips, h)
+    for d in range(embedded.distance.shape[0]):
+        error = max(error, 0.5 * abs(embedded.distance[d]))
+    noise = _NOISE if line.clock[Clock.LEAST] > 0.0 else 0.0  # a rebound leaves the ground behind
+    return _SOLVED, max(error - noise, 0.0) / (goal[0] * h)
+
+
+@kernel
+def _embedded_error(model: Model, data: Data, scheme: Scheme, embedded: Embedded, h: float) -> float:
+    """h e5^2/sqrt(e5^2 + e3^2/100) of the coordinate where that is largest, after a step [m, rad]."""
+    coordinate_rates(model, scheme.shift, data.nu, embedded.rate)
+    s, fifth, third = scheme.b.shape[0], 0.0, 0.0
+    for d in range(embedded.rate.shape[0]):
+        a, b = embedded.fifth[s] * embedded.rate[d], embedded.third[s] * embedded.rate[d]
+        for j in range(s):
+            a += embedded.fifth[j] * scheme.rates_r[j, d]
+            b += embedded.third[j] * scheme.rates_r[j, d]
+        fifth, third = max(fifth, abs(a)), max(third, abs(b))
+    return h * fifth * fifth / sqrt(fifth * fifth + 0.01 * third * third) if fifth > 0.0 else 0.0
+
+
+@kernel
+def stand(models: Table, works: Table, scheme: Scheme, line: Stretch, goal: Vector) -> float:
+    """Time for which a flight from the node may go on before something could touch, 0 where it is near [s]."""
+    model, data = model_view(models[0]), data_view(works[1])
+    nq = data.theta1.shape[0]
+    if line.clock[Clock.READY] == 0.0:
+        begin_node(model, data, scheme, line.x)
+        set_external(data, line.wrench, 0)
+        line.clock[Clock.READY] = 1.0
+    if left_out(model, data, 1.0, line.x[nq:], -1.0) > 10.0 / goal[0]:
+        return 0.0
+    time = _FAILED
+    for c in range(model.contact_height.shape[0]):
+        if model.cluster_end[c] > 0 and data.inactive[c, Apart.SPEED] > 0.0:
+            time = min(time, data.inactive[c, Apart.GAP] / data.inactive[c, Apart.SPEED])
+    for k in range(model.limit_dof.shape[0]):
+        if data.bound_w[k] > 0.0:
+            time = min(time, data.bound_gap[k] / data.bound_w[k])
+    return time
+
+
+@kernel
+def try_long(
+    models: Table, works: Table, goal: Vector, scheme: Scheme, line: Stretch, embedded: Embedded, h: float
+) -> tuple[int, float]:  # fmt: skip
+    """line.trial = the node a step of order 8 after line.x, at which `stand` stands; (Status or NEAR, error ratio)."""
+    model, data = model_view(models[0]), data_view(works[1])
+    nq = data.theta1.shape[0]
+    copy_vector(line.x, line.trial)
+    line.clock[Clock.READY] = 0.0
+    leave(data)
+    status = advance(model, data, scheme, h, line.u, line.trial, None)
+    line.report[1] += scheme.b.shape[0]
+    if status != _SOLVED:
+        return status, _FAILED
+    if left_out(model, data, 1.0, line.trial[nq:], h) > 10.0 / goal[0]:
+        return NEAR, _FAILED
+    return _SOLVED, _embedded_error(model, data, scheme, embedded, h) / (goal[0] * h)
+
+
+@kernel
+def next_length(h: float, ratio: float, before: float, order: float) -> float:
+    """h times .9 r^-.7/k r0^.4/k, between 1/5 and 5: Gustafsson's controller for errors per length of order k."""
+    r = max(ratio, 1e-12)
+    return h * min(5.0, max(0.2, 0.9 * r ** (-0.7 / order) * max(before, 1e-4) ** (0.4 / order)))
+
+
+@kernel
+def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
+    """Whether a solved step of order 2 is kept. Steps on kinks, and those beyond what cannot be solved, count as such:
+    after a rebound there is no kink, for the velocity stays wrong.
+    """
+    error = ratio * h  # in accuracies
+    sudden = _SUDDEN * h < clock[Clock.RECENT] and clock[Clock.LEAST] > 0.0
+    kink = sudden and error < _KINK and error + clock[Clock.KINKS] < _KINKS
+    return ratio <= 1.0 or kink or h <= shortest or (clock[Clock.BEYOND] > 0.0 and error < 1.0)
+
+
+@kernel
+def take_short(
+    models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
+) -> int:  # fmt: skip
+    """One attempt of order 2, kept where its error is allowed; the Status.
+
+    Where the shortest step cannot be solved, ever longer ones are tried, with errors up to the accuracy times 1 s.
+    """
+    clock, rest = line.clock, goal[2] - line.clock[Clock.TIME]
+    status, ratio = try_short(models, works, settings, goal, line, embedded, h)
+    shortest = min(goal[3], clock[Clock.LEAST])
+    if status == _SOLVED and _allows(clock, h, shortest, ratio):
+        beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
+        keep(line, h, 2)
+        clock[Clock.ERROR] += ratio * h
+        if kink:
+            clock[Clock.KINKS] += ratio * h
+            clock[Clock.SHORT] = 5.0 * h if beyond else max(clock[Clock.RECENT], 5.0 * h)
+            return _SOLVED
+        length = next_length(h, ratio, clock[Clock.SHORT_RATIO], 2.0)
+        clock[Clock.RECENT], clock[Clock.SHORT_RATIO] = h, max(ratio, 1e-4)
+        clock[Clock.SHORT] = max(length, clock[Clock.SHORT] if h < 0.99 * clock[Clock.SHORT] else shortest)
+        return _SOLVED
+    if status == _NOT_FINITE or status == _CONTACT_SUNK:
+        return status
+    if clock[Clock.BEYOND] > 0.0:
+        clock[Clock.BEYOND] = 1.7 * h
+        failed = _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
+        return _SOLVED if h < rest else failed
+    if status == _SOLVED:
+        clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, 2.0), 0.9 * h), shortest)
+    elif status == LANDS:
+        return _SOLVED if h > _INSTANT else _TOLERANCE_STEP
+    elif h <= shortest:
+        clock[Clock.BEYOND] = 1.7 * h
+    else:
+        clock[Clock.SHORT] = max(0.25 * h, shortest)
+    return _SOLVED
+
+
+@kernel
+def take_long(
+    models: Table, works: Table, goal: Vector, scheme: Scheme, line: Stretch, embedded: Embedded, h: float
+) -> int:  # fmt: skip
+    """One attempt of order 8, kept where its error is allowed; the Status."""
+    clock = line.clock
+    status, ratio = try_long(models, works, goal, scheme, line, embedded, h)
+    if status == _SOLVED:
+        length = next_length(h, ratio, clock[Clock.LONG_RATIO], 7.0)
+        if ratio <= 1.0:
+            if line.contacts.shape[0] > 0:
+                report_apart(model_view(models[0]), data_view(works[1]), h, line.parts[0])
+                rest_contacts(line)
+            clock[Clock.LONG_RATIO] = max(ratio, 1e-4)
+            clock[Clock.LONG] = max(length, clock[Clock.LONG] if h < 0.99 * clock[Clock.LONG] else 0.0)
+            keep(line, h, 8)
+            clock[Clock.ERROR] += ratio * h
+            clock[Clock.READY] = 1.0
+            return _SOLVED
+        clock[Clock.LONG] = min(length, 0.9 * h)
+    elif status == _NOT_FINITE and h <= goal[3]:
+        return status
+    else:
+        clock[Clock.LONG] = 0.25 * h if status != NEAR else 0.5 * h
+    return _SOLVED
+
+
+@kernel
+def go_on(
+    models: Table, works: Table, settings: Vector, goal: Vector, scheme: Scheme, embedded: Embedded, line: Stretch
+) -> int:  # fmt: skip
+    """Sub-steps until the end of the stretch, a full list of them or the deadline; the Status.
+
+    models: tables of the Model and of that with half the dampers; works: of two Data.
+    """
+    data, clock = data_view(works[0]), line.clock
+    start_pace(data, settings)
+    trees = goal[5] > 0.0
+    line.taken[0] = 0
+    while clock[Clock.TIME] < goal[2] and line.taken[0] < line.lengths.shape[0]:
+        rest = goal[2] - clock[Clock.TIME]
+        reach = 0.9 * stand(models, works, scheme, line, goal) if trees else 0.0
+        long = min(clock[Clock.LONG], rest, reach)
+        if long < rest < 2.0 * long:
+            long = 0.5 * rest
+        short = min(clock[Clock.SHORT], clock[Clock.CUT], rest)
+        if clock[Clock.BEYOND] > 0.0:
+            short, long = min(clock[Clock.BEYOND], rest), 0.0
+        if short < rest < 2.0 * short and clock[Clock.BEYOND] == 0.0:
+            short = 0.5 * rest
+        effort = line.report[1]
+        if long >= min(0.5 * short, rest) and long > goal[3]:
+            status = take_long(models, works, goal, scheme, line, embedded, long)
+        else:
+            status = take_short(models, works, settings, goal, line, embedded, short)
+        if goal[2] - clock[Clock.TIME] < 1e-12 * goal[2]:
+            clock[Clock.TIME] = goal[2]
+        if status != _SOLVED:
+            return status
+        if is_due(data, line.report[1] - effort):
+            break
+    return _SOLVED

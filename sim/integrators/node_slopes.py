@@ -1,0 +1,64 @@
+"""Derivatives of the conversions at both ends of a step from node to node (node_step.py).
+
+    M(q) v = p(q, v'; h) + s h/2 (f(q, u) - D v')       s = -1 where a step begins, without D; s = 1 where it ends
+
+v': mean velocity of the state, f: generalized forces of inputs and external wrenches. Derivatives of p:
+sim/derivatives/momentum_gradient.py.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.external_forces import outer_wrenches, set_external
+from sim.integrators.hamilton import momenta_of_velocity, place
+from sim.integrators.hamilton_gradient import Slopes, slopes_at
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
+from sim.model.model import Model
+from solvers.compiler import Table, kernel
+from solvers.dense import clear
+from solvers.types import Cube, Integers, Matrix, Vector
+
+
+@kernel
+def _evaluate(model: Model, data: Data, none: Integers, x: Vector, moving: bool) -> None:
+    """Configuration 2 and momenta of the node x = (q, v), or at rest there; wrenches from outside are cleared."""
+    nq = data.theta1.shape[0]
+    for k in range(nq):
+        data.theta1[k] = x[k]
+    place(model, data)
+    for d in range(data.nu.shape[0]):
+        data.nu_trial[d] = data.nu[d] = x[nq + d] if moving else 0.0
+    momenta_of_velocity(model, data, none, data.nu_trial, data.rhs)
+    clear(data.balance)
+    clear(data.external)
+
+
+@kernel
+def node_slopes(
+    model_at: Table, data_at: Table, none: Integers, u: Vector, wrench: Cube, x: Vector, out: Slopes, f_q: Matrix
+) -> bool:  # fmt: skip
+    """Of the node x = (q, v): out.p_q, out.p_v of M(q) v; f_q, and out.f_u, of the forces of inputs and wrenches.
+
+    f_q: (nv, nv), those with the forces less those without, both at rest; False where M is singular.
+    """
+    model = model_view(model_at)
+    data = data_view(data_at)
+    for k in range(3):
+        data.origin[k] = 0.0
+    _evaluate(model, data, none, x, False)
+    outer_wrenches(model, data, u[:0], data.balance)
+    if not slopes_at(model, data, none, u[:0], out):
+        return False
+    for d in range(f_q.shape[0]):
+        for k in range(f_q.shape[1]):
+            f_q[d, k] = -out.f_q[d, k]
+    _evaluate(model, data, none, x, False)
+    set_external(data, wrench, 0)
+    outer_wrenches(model, data, u, data.balance)
+    if not slopes_at(model, data, none, u, out):
+        return False
+    for d in range(f_q.shape[0]):
+        for k in range(f_q.shape[1]):
+            f_q[d, k] += out.f_q[d, k]
+    _evaluate(model, data, none, x, True)
+    return slopes_at(model, data, none, u, out)

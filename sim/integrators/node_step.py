@@ -1,0 +1,137 @@
+"""Steps of order 2 from node to node: states x = [q; v] with v = M(q)^-1 p of the node, for steps of any length.
+
+    p(q2, v15; h) = M(q2) v2 - h/2 f(q2)                  p: momentum of a state with its mean velocity v15
+    v25           = that of a step (step.py) from (q2, v15), with half the dampers
+    M(q3) v3      = p(q3, v25; h) + h/2 (f(q3) - D v25)
+
+f: generalized forces of inputs and external wrenches. The step lets all their impulse h f act at its first node; half
+of it belongs to its last. Half the damping implicit in v25, the other half explicit, is the trapezoidal rule. So steps
+of different lengths follow one another at second order, and without these forces momentum is handed on as it is.
+
+Impulses of contacts are not shared: p(q3, v25; h) is the momentum before the ground acts at the node. The step that
+begins there makes up for the gravity of both its halves, whatever their lengths.
+"""
+
+from __future__ import annotations
+
+from sim.dynamics.elimination import add_children, dot_six
+from sim.dynamics.energy import solve_mass_matrix
+from sim.dynamics.external_forces import input_wrench, set_external
+from sim.integrators.rollout import begin
+from sim.model.data import Data
+from sim.model.layout import data_view, model_view
+from sim.model.model import InputKind, Model
+from sim.model.options import Guess, StepOptions
+from sim.solve.start_velocity import momentum_error, momentum_of_velocity, state_of_momentum
+from sim.step import step
+from solvers.compiler import Table, kernel
+from solvers.dense import copy_vector
+from solvers.status import Status
+from solvers.types import Cube, Vector
+
+_SOLVED = int(Status.SOLVED)
+_SINGULAR = int(Status.SINGULAR)
+
+
+@kernel
+def begin_part(data: Data, wrench: Cube) -> None:
+    """Forget the step before, but for the external wrenches (1 or 0, nbody, 6)."""
+    begin(data)
+    set_external(data, wrench, 0)
+
+
+@kernel
+def add_forces(model: Model, data: Data, h: float, u: Vector, out: Vector) -> None:
+    """out += h f: generalized forces of inputs and external wrenches at configuration 2 in `data`.   out: (nv,)."""
+    F = data.balance
+    for i in range(model.body_parent.shape[0]):
+        e, o = data.external[i], data.origin
+        x, y, z = data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2]
+        for k in range(6):
+            F[i, k] = e[k]
+        F[i, 3] += y * e[2] - z * e[1]
+        F[i, 4] += z * e[0] - x * e[2]
+        F[i, 5] += x * e[1] - y * e[0]
+    for j in range(u.shape[0]):
+        i = model.input_index[j]
+        if model.input_kind[j] == InputKind.JOINT:
+            out[i] += h * u[j]
+            continue
+        w = data.wrench[0]
+        input_wrench(model, data, j, w)
+        for k in range(6):
+            F[i, k] += u[j] * w[k]
+    add_children(model, F)
+    for d in range(out.shape[0]):
+        out[d] += h * dot_six(data.S2[d], F[model.dof_body[d]])
+
+
+@kernel
+def mean_of_node(model_at: Table, data_at: Table, h: float, u: Vector, x: Vector, mean: Vector) -> int:
+    """mean = (q, v15) of the node x = (q, v), for a step of length h from there; returns the Status.
+
+    data.external: external wrenches.
+    """
+    model = model_view(model_at)
+    data = data_view(data_at)
+    nq = data.theta1.shape[0]
+    copy_vector(x, mean)
+    momentum_error(model, data, h, x, x[nq:], data.residual)  # for the poses
+    momentum_of_velocity(model, data, x[nq:], data.nu)
+    add_forces(model, data, -0.5 * h, u, data.nu)
+    return state_of_momentum(model_at, data_at, h, data.nu, mean)
+
+
+@kernel
+def node_of_mean(model: Model, data: Data, h: float, u: Vector, mean: Vector, x: Vector) -> int:
+    """x = (q, v) of the node at the end of a step of length h to mean = (q, v25); returns the Status."""
+    nq = data.theta1.shape[0]
+    for d in range(data.rhs.shape[0]):
+        data.rhs[d] = 0.0
+    momentum_error(model, data, h, mean, data.rhs, data.residual)
+    add_forces(model, data, 0.5 * h, u, data.residual)
+    for d in range(data.dnu.shape[0]):
+        data.residual[d] -= h * model.dof_damper[d] * mean[nq + d]  # half the dampers are in the model
+    if not solve_mass_matrix(model, data, data.residual, data.dnu):
+        return _SINGULAR
+    for k in range(nq):
+        x[k] = mean[k]
+    for d in range(data.dnu.shape[0]):
+        x[nq + d] = data.dnu[d]
+    return _SOLVED
+
+
+@kernel
+def part_of(goal: Vector, settings: Vector, h: float) -> StepOptions:
+    """Options of a step of length h: kappa in proportion to it, so that contacts press with the same force.
+
+    goal: as in adaptive.py.
+    """
+    kappa = max(settings[1] * h / goal[1], goal[4])
+    return StepOptions(h, kappa, settings[2], int(settings[3]), settings[5], settings[6])
+
+
+@kernel
+def step_mean(
+    model: Model, data: Data, options: StepOptions, u: Vector, mean: Vector, out: Vector, report: Vector
+) -> int:
+    """out = (q, v25) one step after mean = (q, v15); the Status. Iterations are added up, the rest is the largest."""
+    nq = data.theta1.shape[0]
+    iterations, residual, violation = report[1], report[2], report[3]
+    follows = data.carried_steps[0] > 0
+    status = step(model, data, options, mean, u, Guess(mean[nq:], follows), out, report)
+    report[1] += iterations
+    report[2], report[3] = max(report[2], residual), max(report[3], violation)
+    return status
+
+
+@kernel
+def begin_work(data_at: Table, wrench: Cube) -> None:
+    """`begin_part` from a table."""
+    begin_part(data_view(data_at), wrench)
+
+
+@kernel
+def node_at(model_at: Table, data_at: Table, h: float, u: Vector, mean: Vector, x: Vector) -> int:
+    """`node_of_mean` from tables."""
+    return node_of_mean(model_view(model_at), data_view(data_at), h, u, mean, x)

@@ -1,0 +1,52 @@
+"""Errors where contacts stop sliding, which a step and its two halves, all of them alike, do not see.
+
+parts    (2, ncontact, 11) contacts of both halves, as in rollout.py
+slips    (ncontact,) at the node where the step begins; UNKNOWN, or BEGINS where nothing went before
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from sim.integrators.landing import BEGINS
+from sim.model.model import Model
+from solvers.compiler import kernel
+from solvers.types import Cube, Vector
+
+
+@kernel
+def _first_stop(model: Model, parts: Cube, c: int, h: float) -> float:
+    """Error where contact c stops sliding at once [m]: s^2/(2 a) of the slip s that its friction f took away beyond
+    what holds it in the second half, in the ratio of the normal impulses n, at the deceleration a = mu n'/(m h/2).
+    """
+    f, n = (0.0, 0.0), (0.0, 0.0)
+    for half in range(2):
+        row = parts[half, c]
+        normal = row[0] * row[8] + row[1] * row[9] + row[2] * row[10]
+        size = row[0] * row[0] + row[1] * row[1] + row[2] * row[2] - normal * normal
+        f, n = (f[1], sqrt(max(size, 0.0))), (n[1], normal)
+    mass, mu = model.body_mass[model.contact_body[c]], model.contact_friction[c]
+    if not (0.0 < n[0] < 10.0 * n[1]) or mass == 0.0 or mu == 0.0:
+        return 0.0
+    stop = f[0] - f[1] * n[0] / n[1]
+    return 0.25 * h * stop * stop / (mu * n[1] * mass)
+
+
+@kernel
+def stopping_error(model: Model, parts: Cube, slips: Vector, h: float) -> float:
+    """Error where contacts stop sliding in a step, or between two steps, which neither of its halves sees [m].
+
+    s, s': mean slips of both halves; 1.5 s - .5 s' and 1.5 s' - .5 s are those at the beginning and in the end.
+    In the end, s < 0 at the deceleration a: s^2/(2 a); in the beginning, another than in the end of the step before.
+    """
+    error = 0.0
+    for c in range(slips.shape[0]):
+        one, other, before = parts[0, c, 7], parts[1, c, 7], slips[c]
+        slip = 1.5 * other - 0.5 * one
+        if slip < 0.0:
+            error = max(error, 0.25 * h * slip * slip / (one - other))
+        if before >= 0.0:
+            error = max(error, 0.125 * h * abs(before - max(0.0, 1.5 * one - 0.5 * other)))
+        elif before == BEGINS:
+            error = max(error, _first_stop(model, parts, c, h))
+    return error

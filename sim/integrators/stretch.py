@@ -1,0 +1,105 @@
+"""Stretch: a motion under one input, divided into sub-steps, and what it knows of those to come."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from math import sqrt
+from typing import NamedTuple
+
+from sim.integrators.landing import NEVER, UNKNOWN
+from solvers.compiler import kernel
+from solvers.dense import copy_vector
+from solvers.types import Cube, Integers, Matrix, Vector
+
+
+class Clock(IntEnum):
+    """clock of a Stretch."""
+
+    TIME = 0  # [s] since its beginning
+    SHORT = 1  # next length of order 2 [s]
+    LONG = 2  # next length of order 8
+    SHORT_RATIO = 3  # error over allowed of the last accepted step of order 2
+    LONG_RATIO = 4
+    READY = 5  # 1 where the Data of order 8 stand at the node
+    RECENT = 6  # length of the last accepted step of order 2
+    KINKS = 7  # error of the steps with kinks so far, in accuracies
+    LEAST = 8  # shortest length of an impact with restitution at the node
+    BEYOND = 10  # length tried where the shortest step is not solved, 0 elsewhere
+    ERROR = 11  # estimated, of the sub-steps so far, in accuracies times 1 s
+    CUT = 9  # longest length before a contact or limit is reached, of this node
+
+
+class Stretch(NamedTuple):
+    """Motion under one input, and its sub-steps."""
+
+    u: Vector  # (nu,) in
+    wrench: Cube  # (1, nbody, 6) in, or (0, nbody, 6)
+    x: Vector  # (nx,) the node, in place
+    trial: Vector  # (nx,) scratch, as the next three
+    mean: Vector
+    whole: Vector
+    half: Vector
+    clock: Vector  # (12,) in place
+    report: Vector  # (6,)
+    parts: Cube  # (2, ncontact, 11) scratch
+    slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the stretch
+    contacts: Matrix  # (ncontact, 11) in place: impulses so far, the rest of the last step
+    starts: Matrix  # (n, nx) nodes where the sub-steps begin, of those since the last pause
+    lengths: Vector  # (n,) [s]
+    orders: Integers  # (n,)
+    taken: Integers  # (1,) number of those sub-steps
+
+
+class Embedded(NamedTuple):
+    """Error estimate of a Scheme."""
+
+    fifth: Vector  # (s + 1,) weights of the rates of the stages, and of the end of the step
+    third: Vector
+    rate: Vector  # (nv,) scratch
+    distance: Vector  # (nv,)
+
+
+@kernel
+def keep(line: Stretch, h: float, order: int) -> None:
+    """The trial becomes the node."""
+    n = line.taken[0]
+    copy_vector(line.x, line.starts[n])
+    line.lengths[n], line.orders[n] = h, order
+    line.taken[0] = n + 1
+    copy_vector(line.trial, line.x)
+    line.clock[Clock.TIME] += h
+    line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER
+    line.clock[Clock.BEYOND] = 0.0
+    if order == 2:
+        line.clock[Clock.READY] = 0.0
+        add_contacts(line)
+
+
+@kernel
+def add_contacts(line: Stretch) -> None:
+    """Impulses of both halves to those before, at their mean points; gaps, slips and normals of the end."""
+    for c in range(line.contacts.shape[0]):
+        out = line.contacts[c]
+        for half in range(2):
+            row = line.parts[half, c]
+            one, other = 0.0, 0.0
+            for k in range(3):
+                one, other = one + out[k] * out[k], other + row[k] * row[k]
+            one, other = sqrt(one), sqrt(other)
+            share = other / (one + other) if one + other > 0.0 else 1.0
+            for k in range(3):
+                out[k] += row[k]
+                out[3 + k] += share * (row[3 + k] - out[3 + k])
+            for k in range(6, out.shape[0]):
+                out[k] = row[k]
+        one, other = line.parts[0, c, 7], line.parts[1, c, 7]
+        line.slips[c] = max(0.0, 1.5 * other - 0.5 * one)
+
+
+@kernel
+def rest_contacts(line: Stretch) -> None:
+    """Gaps, slips and normals of the end of a flight; impulses stay."""
+    for c in range(line.contacts.shape[0]):
+        line.slips[c] = UNKNOWN
+        for k in range(6, line.contacts.shape[1]):
+            line.contacts[c, k] = line.parts[0, c, k]

@@ -1,0 +1,413 @@
+"""Engine whose steps are divided as their accuracy requires; states have the velocity of the node, as at order 8.
+
+A step depends on its state and input alone: its sub-steps begin anew with the longest.
+
+With contacts or limits an accuracy below 1e-6 is refused: the estimate sees no velocities, and bounces with restitution
+miss 1e-7 by a factor of 50. Joints are not released from their limits as exactly as contacts are.
+"""
+
+from __future__ import annotations
+
+import threading
+from math import inf
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.derivatives.momentum_gradient import momentum_jacobian
+from sim.integrators import runge_kutta
+from sim.integrators.adaptive import go_on
+from sim.integrators.feedback import FeedbackLaw, Path
+from sim.integrators.hamilton_gradient import Slopes
+from sim.integrators.landing import BEGINS
+from sim.integrators.node_slopes import node_slopes
+from sim.integrators.node_step import begin_work, mean_of_node, node_at
+from sim.integrators.rollout import Linearized, MotionBuffers, linearize, roll
+from sim.integrators.runge_kutta import Scheme
+from sim.integrators.stretch import Clock, Embedded, Stretch
+from sim.integrators.tableau import embedded
+from sim.mechanism.mechanism import Mechanism
+from sim.model.model import Model
+from sim.model.pace import pieces
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
+from sim.simulator.high_order_engine import HighOrderEngine
+from sim.simulator.link import link_gradient, link_smooth, link_step
+from sim.simulator.results import Interrupted
+from sim.simulator.settings import Settings
+from solvers.compiler import Table
+from solvers.status import Status
+from solvers.types import Cube, Integers, Vector
+
+SHORTEST = 1e-7  # [s]
+_SETTLED = (
+    10.0  # (h w)^2 of the shortest step h, w^2 = m g^2 h/kappa the stiffness over m of a contact that carries m g
+)
+_LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: the estimate sees no errors of the velocity after an impact
+_LEAST_KAPPA = 1e-13  # [N s m]
+_ROWS = 256  # sub-steps between two pauses
+
+
+Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
+
+
+class Substeps(NamedTuple):
+    """A step and its sub-steps."""
+
+    status: int
+    x: Vector  # (nx,) its end, or the last node before the sub-step that failed
+    report: Vector  # (6,)
+    contacts: Floats  # (ncontact, 11)
+    starts: Floats  # (n, nx) nodes where the sub-steps begin
+    lengths: Vector  # (n,) [s]
+    orders: Integers  # (n,)
+    error: float  # estimated, over the one allowed
+
+
+class AdaptiveEngine(HighOrderEngine):
+    """The kernels of one packed mechanism, with steps of the accuracy of its settings."""
+
+    def __init__(self, model: Model, settings: Settings) -> None:
+        super().__init__(model, settings)
+        halved = model._replace(dof_damper=0.5 * model.dof_damper)
+        self._second = Engine(halved, settings._replace(order=2))
+        coupled = len(model.pair_kind) + len(model.loop_ntrans) + len(model.gear_dof)
+        self._is_tree = coupled == 0
+        g = float(np.linalg.norm(model.gravity)) or 9.81
+        self._settling = (_SETTLED / _lightest(model)) ** 0.5 / g
+        self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
+
+    def _line(self) -> tuple[Table, Scheme, Embedded, Stretch]:
+        """Scratch of this thread."""
+        if not hasattr(self._kept, "line"):
+            nx, nv, ncontact = self.nx, self.sizes.nv, self.sizes.ncontact
+            errors = Embedded(*embedded(), np.zeros(nv), np.zeros(nv))
+            x, trial, mean, whole, half = (np.zeros(nx) for _ in range(5))
+            line = Stretch(
+                np.zeros(self.nu),
+                self.no_wrenches,
+                x,
+                trial,
+                mean,
+                whole,
+                half,
+                np.zeros(len(Clock)),
+                np.zeros(REPORT),
+                np.zeros((2, ncontact, CONTACT)),
+                np.zeros(ncontact),
+                np.zeros((ncontact, CONTACT)),
+                np.zeros((_ROWS, nx)),
+                np.zeros(_ROWS),
+                np.zeros(_ROWS, dtype=np.int64),
+                np.zeros(1, dtype=np.int64),
+            )
+            models = np.stack([self.linked(link_smooth, link_step), self._second.linked(link_step)])
+            self._kept.line = models, self._scheme(), errors, line
+        found: tuple[Table, Scheme, Embedded, Stretch] = self._kept.line
+        return found
+
+    def take(
+        self, x: Vector, u: Vector, wrench: Cube, kappa: float | None = None, length: float | None = None
+    ) -> Substeps:
+        """The step from x (nx,) under u (nu,) and external wrenches (1 or 0, nbody, 6)."""
+        s, (models, scheme, errors, line) = self.settings, self._line()
+        end = s.time_step
+        settings = s.array(kappa)
+        shortest = max(SHORTEST, self._settling * (settings[1] / s.time_step) ** 0.5)
+        goal = np.array([s.accuracy, s.time_step, end, shortest, _LEAST_KAPPA, float(self._is_tree)])
+        line = line._replace(u=u, wrench=wrench)
+        line.x[:], line.clock[:], line.report[:] = x, 0.0, 0.0
+        line.clock[[Clock.SHORT, Clock.LONG]] = end
+        line.clock[[Clock.SHORT_RATIO, Clock.LONG_RATIO]] = 1.0
+        line.clock[[Clock.LEAST, Clock.CUT]] = inf
+        line.slips[:], line.contacts[:] = BEGINS, 0.0
+        works, rows, status = self._scratch.tables(2), [], int(Status.SOLVED)
+        for _ in pieces(settings, 2):
+            status = int(go_on(models, works, settings, goal, scheme, errors, line))
+            n = int(line.taken[0])
+            rows.append((line.starts[:n].copy(), line.lengths[:n].copy(), line.orders[:n].copy()))
+            if status != Status.SOLVED or line.clock[Clock.TIME] >= end:
+                break
+        line.report[0], line.report[4] = status, -1.0
+        contacts = self._kept.contacts = line.contacts.copy()
+        parts = rows[0] if len(rows) == 1 else [np.concatenate(column) for column in zip(*rows, strict=True)]
+        starts, lengths, orders = parts
+        error = float(line.clock[Clock.ERROR]) / end
+        return Substeps(status, line.x.copy(), line.report.copy(), contacts, starts, lengths, orders, error)
+
+    # -- sub-steps one by one ------------------------------------------------------------------------------------------
+
+    def _part_settings(self, h: float, kappa: float | None) -> Vector:
+        """Settings of a step of order 2 of length h, as in `part_of` of node_step.py."""
+        settings = self._second.settings.array(kappa)
+        settings[0], settings[1] = h, max(settings[1] * h / self.settings.time_step, _LEAST_KAPPA)
+        return settings
+
+    def part(self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None) -> Vector:
+        """The node one sub-step of a length and order after x (nx,); NaN where it is not solved."""
+        u, wrench = held
+        if order == 8:
+            return self._long(x, held, h, False)[0]
+        mean, half = self._mean(x, held, 0.5 * h), np.zeros((3, self.nx))
+        half[0] = mean
+        us, wrenches = np.repeat(u[None], 2, axis=0), np.repeat(wrench, 2, axis=0)
+        contacts = np.zeros((2, self.sizes.ncontact, CONTACT))
+        line = MotionBuffers(half, us, wrenches, np.zeros((2, REPORT)), contacts, *self.unknown[:2])
+        model, data = self._second.linked(link_step), self._scratch.table()
+        if roll(model, data, self._part_settings(0.5 * h, kappa), line, 0) < 2:
+            return np.full(self.nx, np.nan)
+        return self._node(half[2], held, 0.5 * h)
+
+    def part_slopes(
+        self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None
+    ) -> tuple[Vector, Floats, Floats, Vector]:
+        """(node after a sub-step, its derivatives by x and by the input, report)."""
+        if order == 8:
+            return self._long(x, held, h, True)
+        u, wrench = held
+        part = 0.5 * h
+        mean = self._mean(x, held, part)
+        by_x, by_u = self._mean_slopes(x, held, part, mean)
+        model, data = self._second.linked(link_step, link_gradient), self._scratch.table()
+        A, B = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu))
+        x_next, reports, settings = np.zeros((1, self.nx)), np.zeros((1, REPORT)), self._part_settings(part, kappa)
+        for _ in range(2):
+            x_next[0] = mean
+            line = Linearized(mean[None], u[None], wrench, A, B, x_next, reports)
+            linearize(model, data, settings, (0, 0, 1), 1, line)
+            mean, by_x, by_u = x_next[0].copy(), A[0] @ by_x, A[0] @ by_u + B[0]
+        end = self._node(mean, held, part)
+        C, D = self._end_slopes(mean, held, part, end)
+        return end, C @ by_x, C @ by_u + D, reports[0]
+
+    def _long(self, x: Vector, held: Held, h: float, derivatives: bool) -> tuple[Vector, Floats, Floats, Vector]:
+        """As part_slopes, of order 8; without derivatives these are empty."""
+        (u, wrench), settings = held, self.settings.array()
+        settings[0] = h
+        model, data, scheme = self.linked(link_smooth), self._scratch.table(), self._scheme()
+        reports, (A, B) = np.zeros((1, REPORT)), self.unknown[:2]
+        if derivatives:
+            A, B, ends = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu)), np.zeros((1, self.nx))
+            line = Linearized(x[None], u[None], wrench, A, B, ends, reports)
+            runge_kutta.linearize(model, data, settings, scheme, 1, line, self._tangents(), 0)
+            return ends[0], A[0], B[0], reports[0]
+        xs = np.stack([x, np.full(self.nx, np.nan)])
+        motion = MotionBuffers(xs, u[None], wrench, reports, np.zeros((1, 0, CONTACT)), A, B)
+        if runge_kutta.roll(model, data, settings, scheme, motion, 0) == 0:
+            xs[1] = np.nan
+        return xs[1], A, B, reports[0]
+
+    def _mean(self, x: Vector, held: Held, h: float) -> Vector:
+        """The mean state of the node x before a step of length h; NaN where there is none."""
+        (u, wrench), mean, data = held, np.zeros(self.nx), self._scratch.table()
+        begin_work(data, wrench)
+        status = mean_of_node(self._second.linked(link_step), data, h, u, x, mean)
+        return mean if status == Status.SOLVED else np.full(self.nx, np.nan)
+
+    def _node(self, mean: Vector, held: Held, h: float) -> Vector:
+        """The node at the end of a step of length h to the mean state."""
+        (u, wrench), x, data = held, np.zeros(self.nx), self._scratch.table()
+        begin_work(data, wrench)
+        status = node_at(self._second.linked(link_step), data, h, u, mean, x)
+        return x if status == Status.SOLVED else np.full(self.nx, np.nan)
+
+    def _node_terms(self, x: Vector, held: Held) -> tuple[Slopes, Floats]:
+        """Derivatives of M(q) v and of the forces of inputs and wrenches, at the node x."""
+        nv, (u, wrench) = self.sizes.nv, held
+        slopes, by_q = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42))), np.zeros((nv, nv))
+        none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
+        node_slopes(self.linked(link_smooth, link_step), self._scratch.table(), none, u, wrench, x, slopes, by_q)
+        return slopes, by_q
+
+    def _momentum_slopes(self, h: float, mean: Vector) -> tuple[Floats, Floats]:
+        """dp/dq, dp/dv of a mean state over h."""
+        nv = self.sizes.nv
+        by_q, by_v = np.zeros((nv, nv)), np.zeros((nv, nv))
+        momentum_jacobian(self._second.linked(link_step, link_gradient), self._scratch.table(), h, mean, by_q, by_v)
+        return by_q, by_v
+
+    def _mean_slopes(self, x: Vector, held: Held, h: float, mean: Vector) -> tuple[Floats, Floats]:
+        """d(mean)/d(x, u):  p_v dv' = M dv + ((M v)_q - h/2 f_q - p_q) dq - h/2 f_u du."""
+        nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
+        by_q, by_v = self._momentum_slopes(h, mean)
+        A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
+        A[nv:] = np.linalg.solve(by_v, np.hstack([slopes.p_q - 0.5 * h * force - by_q, slopes.p_v]))
+        B[nv:] = np.linalg.solve(by_v, -0.5 * h * slopes.f_u)
+        return A, B
+
+    def _end_slopes(self, mean: Vector, held: Held, h: float, x: Vector) -> tuple[Floats, Floats]:
+        """d(x)/d(mean, u):  M dv = (p_v - h/2 D) dv' + (p_q + h/2 f_q - (M v)_q) dq + h/2 f_u du."""
+        nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
+        by_q, by_v = self._momentum_slopes(h, mean)
+        by_v -= 0.5 * h * np.diag(self.model.dof_damper)
+        A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
+        A[nv:] = np.linalg.solve(slopes.p_v, np.hstack([by_q + 0.5 * h * force - slopes.p_q, by_v]))
+        B[nv:] = np.linalg.solve(slopes.p_v, 0.5 * h * slopes.f_u)
+        return A, B
+
+    def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, float]:
+        """(A, B, accuracy of them) of a step: the products of those of its sub-steps, whose lengths are held."""
+        A, B, accuracy = np.eye(self.ndx), np.zeros((self.ndx, self.nu)), 0.0
+        for x, h, order in zip(path.starts, path.lengths, path.orders, strict=True):
+            _, dx, du, report = self.part_slopes(x, held, h, int(order), kappa)
+            A, B, accuracy = dx @ A, dx @ B + du, max(accuracy, report[5])
+            if report[0] != Status.SOLVED:
+                return np.full_like(A, np.nan), np.full_like(B, np.nan), accuracy
+        return A, B, accuracy
+
+    # -- motions -------------------------------------------------------------------------------------------------------
+
+    def roll(
+        self,
+        x: Vector,
+        us: Floats,
+        wrenches: Cube | None = None,
+        *,
+        kappa: float | None = None,
+        derivatives: bool = False,
+    ) -> Rolled:
+        """As Engine.roll."""
+        steps = len(us)
+        xs, reports = np.zeros((steps + 1, self.nx)), np.zeros((steps, REPORT))
+        contacts = np.zeros((steps, self.sizes.ncontact, CONTACT))
+        count = steps if derivatives else 0
+        A, B = np.zeros((count, self.ndx, self.ndx)), np.zeros((count, self.ndx, self.nu))
+        division, external = Division.none(steps), self.external(wrenches)
+        xs[0], knot = x, 0
+        try:
+            for t in range(steps):
+                held = us[t], external[t : t + 1]
+                path = self.take(xs[t], *held, kappa)
+                reports[t] = path.report
+                if path.status == Status.SOLVED and derivatives:
+                    A[t], B[t], reports[t, 5] = self.slopes(path, held, kappa)
+                    refuse(reports[t : t + 1], 1, A[t : t + 1], B[t : t + 1])
+                if reports[t, 0] != Status.SOLVED:
+                    break
+                xs[t + 1], contacts[t] = path.x, path.contacts
+                division.substeps[t], division.errors[t], knot = len(path.lengths), path.error, t + 1
+        except KeyboardInterrupt:
+            if derivatives:
+                raise KeyboardInterrupt from None
+            raise Interrupted(Rolled(knot, xs, interrupted(reports, knot), contacts, A, B, division)) from None
+        return Rolled(knot, xs, reports, contacts, A, B, division)
+
+    def linearize(
+        self,
+        xs: Floats,
+        us: Floats,
+        substeps: int,
+        kappa: float | None,
+        guess: Floats | None = None,
+        wrenches: Cube | None = None,
+    ) -> tuple[Floats, ...]:
+        """As Engine.linearize, on one core; without guess."""
+        self._check_swings()
+        n, external = len(us), self.external(wrenches)
+        A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
+        x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
+        for t in range(n):
+            held = np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(external[t : t + 1], substeps, axis=0)
+            rolled = self.roll(xs[t], *held, kappa=kappa, derivatives=True)
+            reports[t] = rolled.reports[min(rolled.knot, substeps - 1)]
+            if rolled.knot == substeps:
+                A[t] = np.eye(self.ndx)
+                for dx, du in zip(rolled.A, rolled.B, strict=True):
+                    A[t], B[t] = dx @ A[t], dx @ B[t] + du
+                x_next[t], reports[t, 5] = rolled.xs[-1], rolled.reports[:, 5].max()
+        return A, B, x_next, reports
+
+    def closed_loop(
+        self,
+        x: Vector,
+        policy: FeedbackLaw,
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """As Engine.closed_loop; the warm starts of the policy are not used."""
+        knots = len(policy.us)
+        path = self._path(knots, keep=keep, cones=False)
+        path.xs[0], total = x, 0.0
+        for t in range(knots):
+            try:
+                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
+                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
+                us = np.repeat(path.us[t : t + 1], substeps, axis=0)
+                external = np.repeat(policy.wrenches[t : t + 1], substeps, axis=0)
+                rolled = self.roll(path.xs[t], us, external, kappa=kappa)
+            except KeyboardInterrupt:
+                interrupted(path.report[None], 0)
+                raise Interrupted((t, path)) from None
+            path.report[:REPORT] = rolled.reports[min(rolled.knot, substeps - 1)]
+            if rolled.knot < substeps:
+                return t, path
+            total += rolled.reports[:, 1].sum()
+            path.xs[t + 1] = rolled.xs[-1]
+            if alpha < 1.0:
+                path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+        path.report[1] = total
+        return knots, path
+
+    def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
+        """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].
+
+        The sub-step in which a time lies is taken again as far as there, so a node has the accuracy of the motion.
+        """
+        xs, us, external = motion
+        wrenches = self.external(external)
+        h, out, known = self.settings.time_step, np.empty((len(times), self.nx)), -1
+        for i, time in enumerate(times):
+            t = min(int(time / h), len(us) - 1)
+            held = us[t], wrenches[t : t + 1]
+            if t != known:
+                path, known = self.take(xs[t], *held), t
+            rest = time - t * h
+            ends = np.cumsum(path.lengths)
+            k = int(np.searchsorted(ends, rest * (1.0 + 1e-12), side="right"))
+            begin = ends[k - 1] if k else 0.0
+            if k == len(ends):
+                out[i] = path.x
+            elif rest - begin <= 1e-12 * h:
+                out[i] = path.starts[k]
+            else:
+                out[i] = self.part(path.starts[k], held, rest - begin, int(path.orders[k]))
+        return out
+
+    def far(self) -> NDArray[np.bool_]:
+        """As Engine.far: contacts that carried nothing in the last step of this thread."""
+        carried: Floats = self._kept.contacts
+        return np.asarray(np.linalg.norm(carried[:, :3], axis=1) <= self.settings.tolerance)
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise ValueError(f"Simulator(accuracy=...): {what} those of steps of order 2; use replace(accuracy=None)")
+
+
+def _lightest(model: Model) -> float:
+    """Mass of the lightest tree of joints [kg]."""
+    mass = model.body_mass.copy()
+    for i in range(len(mass) - 1, -1, -1):
+        if model.body_parent[i] >= 0:
+            mass[model.body_parent[i]] += mass[i]
+    return float(mass[model.body_parent < 0].min())
+
+
+def check_adaptive(mechanism: Mechanism, accuracy: float) -> None:
+    """Refuse loops and gears, whose nodes have no velocity of their own, and an accuracy that contacts do not have."""
+    stops = any(np.isfinite(pair).any() for joint in mechanism.joints for pair in joint.limits or ())
+    stops = stops or any(joint.cone is not None for joint in mechanism.joints)
+    if accuracy < _LEAST_PRESSING and (mechanism.contacts or mechanism.collisions or stops):
+        raise ValueError(
+            f"Simulator(accuracy=...): expected at least {_LEAST_PRESSING:g} with contacts, collisions or limits of "
+            f"joints, whose errors are not seen below that, got {accuracy:g}"
+        )
+    names = [("loop joint", j.name) for j in mechanism.loops] + [("gear", g.name) for g in mechanism.gears]
+    if names:
+        what, name = names[0]
+        raise ValueError(
+            f"Simulator(accuracy=...): {mechanism.name!r} has the {what} {name!r}; steps of a given accuracy are for "
+            "trees: use a time step"
+        )

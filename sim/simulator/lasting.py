@@ -1,0 +1,26 @@
+"""Rollouts of a given duration: those of a simulator whose time step is that for which an input is held."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+
+
+def lasting(sim: Any, us: Any, steps: int | None, duration: float) -> tuple[Any, int]:
+    """(simulator, number of its steps) of a rollout of so many seconds: of one step for each input, or of `steps`.
+
+    sim: a Simulator.
+    Contacts press with the same force kappa/(h gap), whatever the step h.
+    """
+    call = "Simulator.rollout(duration=...)"
+    if sim.accuracy is None:
+        raise ValueError(f"{call}: expected a simulator with an accuracy; others take a number of time steps")
+    seconds = checks.number(call, duration, above=0.0)
+    count = len(np.asarray(us)) if steps is None and us is not None and not callable(us) else steps
+    h = seconds / whole_number("Simulator.rollout(steps=...)", 1 if count is None else count)
+    given = sim._given()["kappa"]
+    return sim.replace(time_step=h, kappa=None if given is None else given * h / sim.time_step), round(seconds / h)

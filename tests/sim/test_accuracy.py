@@ -1,0 +1,182 @@
+"""Steps of a given accuracy: asked against got, impacts at their times, derivatives, durations, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import dojo_opt as dojo
+from dojo_opt import models
+from sim.simulator.adaptive_engine import AdaptiveEngine
+from support.scenes import ball, block
+
+Floats = NDArray[np.float64]
+G = 9.81
+
+
+def engine(sim: dojo.Simulator) -> AdaptiveEngine:
+    """That of a simulator with an accuracy."""
+    assert isinstance(sim._engine, AdaptiveEngine)
+    return sim._engine
+
+
+def placed(sim: dojo.Simulator, height: float, speed: float) -> Floats:
+    """A free body at a height that moves along x."""
+    x = sim.neutral()
+    x[2], x[sim.nq] = height, speed
+    return x
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("links", [1, 2])
+def test_pendulums_have_the_accuracy_that_is_asked_for(links: int, accuracy: float) -> None:
+    mech = models.npendulum(links)
+    x = np.r_[np.full(links, 0.4), np.zeros(links)]
+    exact = dojo.Simulator(mech, time_step=0.002, order=8).rollout(x, steps=1000, throw=True).x[-1]
+    found = dojo.Simulator(mech, accuracy=accuracy).rollout(x, duration=2.0, throw=True)
+    assert np.abs(found.x[-1] - exact)[:links].max() < 2.0 * accuracy
+    assert found.time[-1] == 2.0
+    assert found.substeps[0] < 80
+
+
+def test_a_chain_goes_on_and_keeps_its_energy() -> None:
+    """Five undamped links, with which steps of 10 ms end."""
+    sim = dojo.Simulator(models.npendulum(5), time_step=0.05, accuracy=1e-4)
+    x = sim.rollout(np.r_[np.full(5, 1.5), np.zeros(5)], steps=100, throw=True).x
+    energy = sim.energy(x)
+    assert np.abs(energy - energy[0]).max() < 1e-2 * np.abs(energy[0])
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+def test_bounces_happen_at_their_times(accuracy: float) -> None:
+    """Dropped from 1 m with restitution 0.8: rebound speeds are v, e v, e^2 v, at times that add up."""
+    mech = ball(friction=0.0)
+    mech = replace(mech, contacts=tuple(replace(c, restitution=0.8) for c in mech.contacts))
+    sim = dojo.Simulator(mech, accuracy=accuracy)
+    found = sim.rollout(placed(sim, 1.1, 0.0), duration=2.0, throw=True).x[-1]
+    time, speed = np.sqrt(2.0 / G), 0.8 * np.sqrt(2.0 * G)
+    while time + 2.0 * speed / G < 2.0:
+        time, speed = time + 2.0 * speed / G, 0.8 * speed
+    rest = 2.0 - time
+    assert abs(found[2] - (0.1 + speed * rest - 0.5 * G * rest**2)) < 2.0 * accuracy
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("steps", [1, 20])
+def test_a_block_slides_as_far_as_it_should(accuracy: float, steps: int) -> None:
+    sim = dojo.Simulator(block(friction=0.3), accuracy=accuracy)
+    motion = sim.rollout(placed(sim, 0.25, 2.0), steps=steps, duration=1.0, throw=True)
+    assert abs(motion.x[-1][0] - 2.0**2 / (2.0 * 0.3 * G)) < 3.0 * accuracy
+    impulse = motion.contacts.impulse.sum(axis=(0, 1))
+    assert impulse == pytest.approx([-2.0, 0.0, G], abs=0.1 + 0.25 * G / steps)
+
+
+def test_an_input_acts_at_second_order_in_contact() -> None:
+    """A ball rolls under a force along x: its acceleration is F/(1.4 m)."""
+    sim = dojo.Simulator(ball(), accuracy=1e-5)
+    u = np.zeros(sim.nu)
+    u[0] = 1.0
+    found = sim.rollout(placed(sim, 0.1, 0.0), u[None], duration=0.4, throw=True).x[-1]
+    assert abs(found[0] - 0.5 * 0.4**2 / 1.4) < 3.0 * 0.4 * 1e-5
+
+
+def replayed(sim: dojo.Simulator, x: Floats, u: Floats, parts: tuple[Floats, NDArray[np.int64]]) -> Floats:
+    """The step in parts of given lengths and orders."""
+    for h, order in zip(*parts, strict=True):
+        x = engine(sim).part(x, (u, engine(sim).no_wrenches), h, int(order))
+    return x
+
+
+@pytest.mark.parametrize(("name", "height", "steps"), [("npendulum", 0.0, 0), ("hopper", 0.3, 0), ("hopper", 0.0, 3)])
+def test_derivatives_keep_the_division(name: str, height: float, steps: int) -> None:
+    rng = np.random.default_rng(3)
+    sim = dojo.Simulator(
+        (models.npendulum(2) if name == "npendulum" else models.hopper()), kappa=1e-5, tolerance=1e-12, accuracy=1e-3
+    )
+    x = sim.integrate(sim.neutral(), np.r_[np.zeros(sim.nv), 0.3 * rng.normal(size=sim.nv)])
+    x[1] += height
+    us = np.tile(rng.normal(size=sim.nu), (steps + 1, 1))
+    x = sim.rollout(x, us[:-1], throw=True).x[-1] if steps else x
+    path = engine(sim).take(x, us[0], engine(sim).no_wrenches)
+    parts = path.lengths, path.orders
+    np.testing.assert_allclose(replayed(sim, x, us[0], parts), path.x, rtol=0.0, atol=1e-9)
+    A, B = sim.linearize(x, us[0], throw=True)
+    for k in range(sim.ndx):
+        dx = 3e-8 * np.eye(sim.ndx)[k]
+        ahead, behind = (replayed(sim, sim.integrate(x, s * dx), us[0], parts) for s in (1.0, -1.0))
+        assert np.abs(sim.difference(ahead, behind) / 6e-8 - A[:, k]).max() < 1e-6 * np.abs(A).max()
+    for k in range(sim.nu):
+        du = 1e-4 * np.eye(sim.nu)[k]
+        ahead, behind = (replayed(sim, x, us[0] + s * du, parts) for s in (1.0, -1.0))
+        assert np.abs(sim.difference(ahead, behind) / 2e-4 - B[:, k]).max() < 1e-6 * np.abs(B).max()
+
+
+@pytest.fixture(scope="module")
+def swing() -> tuple[dojo.Simulator, dojo.Trajectory]:
+    """A double pendulum under two inputs."""
+    sim = dojo.Simulator(models.npendulum(2), time_step=0.05, accuracy=1e-6)
+    return sim, sim.rollout(np.r_[0.4, 0.3, 0.0, 0.0], 0.1 * np.ones((10, sim.nu)), throw=True)
+
+
+def test_sweeps_closed_loops_and_batches_follow(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    sim, motion = swing
+    xs, linear = sim.linearize_rollout(motion.x[0], motion.u, throw=True)
+    assert np.array_equal(xs, motion.x)
+    loss = np.random.default_rng(1).normal(size=(len(xs), sim.ndx))
+    gradient, costate = sim.vjp(motion, loss, throw=True), loss[-1]
+    for t in range(len(motion.u) - 1, -1, -1):
+        assert np.allclose(gradient["input"][t], linear.B[t].T @ costate)
+        costate = linear.A[t].T @ costate + loss[t]
+    assert np.allclose(gradient["state"], costate)
+    assert np.array_equal(sim.closed_loop(motion.x[0], motion.u, throw=True).x, motion.x)
+    assert np.array_equal(sim.rollout_batch(motion.x[:1], motion.u[None], throw=True).x[0], motion.x)
+    assert np.array_equal(pickle.loads(pickle.dumps(sim)).rollout(motion.x[0], motion.u).x, motion.x)
+
+
+def test_states_at_any_time_are_those_of_the_motion(swing: tuple[dojo.Simulator, dojo.Trajectory]) -> None:
+    sim, motion = swing
+    times = np.array([0.0, 0.013, 0.05, 0.111, 0.5])
+    fine = sim.replace(time_step=0.001, accuracy=1e-9).rollout(motion.x[0], np.repeat(motion.u, 50, axis=0))
+    assert np.abs(motion.at(times) - fine.x[[0, 13, 50, 111, 500]])[:, :2].max() < 1e-6
+    assert np.array_equal(motion.at([0.05, 0.5]), motion.x[[1, 10]])
+    with pytest.raises(ValueError, match="times from 0 to 0.5 s"):
+        motion.at([0.6])
+
+
+def test_what_cannot_be_is_refused() -> None:
+    mech = models.npendulum(2)
+    for settings, match in (({"accuracy": 0.0}, "accuracy"), ({"accuracy": 1e-20}, "at least")):
+        with pytest.raises(ValueError, match=match):
+            dojo.Simulator(mech, **settings)
+    with pytest.raises(ValueError, match="chooses the order"):
+        dojo.Simulator(mech, order=4, accuracy=1e-3)
+    with pytest.raises(ValueError, match="loop joint"):
+        dojo.Simulator(models.fourbar(), accuracy=1e-3)
+    with pytest.raises(ValueError, match="expected a simulator with an accuracy"):
+        dojo.Simulator(mech).rollout(np.zeros(4), duration=1.0)
+    assert dojo.Simulator(mech, accuracy=1e-3).replace(accuracy=None).order == 2
+
+
+def test_contacts_refuse_an_accuracy_that_they_do_not_have() -> None:
+    for mech in (ball(), models.hopper()):
+        with pytest.raises(ValueError, match="expected at least 1e-06 with contacts, collisions or limits of joints"):
+            dojo.Simulator(mech, accuracy=1e-7)
+    dojo.Simulator(models.npendulum(2), accuracy=1e-7)
+
+
+def test_estimated_errors_are_told() -> None:
+    """In flight each step has the error that is allowed; where contacts cannot have it, the message says so."""
+    pendulum = dojo.Simulator(models.npendulum(2), time_step=0.1, accuracy=1e-5)
+    swing = pendulum.rollout(np.array([1.0, 0.5, 0.0, 0.0]), steps=10, throw=True)
+    assert np.all(swing.errors > 0.0) and swing.errors.max() <= 1.0
+    assert "estimated error" not in swing.message
+    soft = dojo.Simulator(block(friction=0.3), time_step=0.05, accuracy=1e-6, kappa=1e-4)
+    slide = soft.rollout(placed(soft, 0.25, 2.0), steps=10)
+    worst = int(np.argmax(slide.errors))
+    assert slide.success and slide.errors[worst] > 1.0
+    assert slide.message.startswith(f"Solved, but the estimated error of step {worst} is ")
+    assert soft.step(slide.x[worst], np.zeros(soft.nu)).error == pytest.approx(slide.errors[worst])
