@@ -30,7 +30,7 @@ from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import configuration_difference
 from sim.integrators.hamilton import coordinate_rates
 from sim.integrators.landing import landing
-from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
+from sim.integrators.node_step import begin_part, is_damped, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import Scheme, advance
 from sim.integrators.runge_kutta import begin as begin_node
@@ -40,6 +40,7 @@ from sim.model.columns import Apart
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
+from sim.model.options import StepOptions
 from sim.model.pace import is_due, start_pace
 from solvers.compiler import Table, kernel
 from solvers.dense import copy_vector
@@ -58,6 +59,27 @@ _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes what is deepe
 _INSTANT = 1e-13  # [s] between a landing and the node before it
 _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 _FAILED = 1e300
+
+
+@kernel
+def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Stretch) -> int:
+    """line.trial = the node two steps after line.x, line.mean = its mean state, line.parts their contacts; Status."""
+    model, data, h = model_view(model_at), data_view(data_at), options.h
+    begin_part(data, line.wrench)
+    status = mean_of_node(model_at, data_at, h, line.u, line.x, line.mean)
+    begin_part(data, line.wrench)
+    for part in range(2):
+        if status == _SOLVED:
+            one, other = (line.mean, line.half) if part == 0 else (line.half, line.mean)
+            status = step_mean(model, data, options, line.u, one, other, line.report)
+            report_contacts(model, data, h, line.parts[part])
+        if status == _SOLVED and part == 0 and is_damped(model):
+            status = node_of_mean(model, data, h, line.u, line.half, line.trial)
+            if status == _SOLVED:
+                begin_part(data, line.wrench)
+                status = mean_of_node(model_at, data_at, h, line.u, line.trial, line.half)
+                begin_part(data, line.wrench)
+    return node_of_mean(model, data, h, line.u, line.mean, line.trial) if status == _SOLVED else status
 
 
 @kernel
@@ -80,16 +102,7 @@ def try_short(
     if found.error > 2.0 * _TOUCHING * goal[0]:
         line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
         return LANDS, _FAILED
-    begin_part(data, line.wrench)
-    status = mean_of_node(models[1], works[0], 0.5 * h, line.u, line.x, line.mean)
-    begin_part(data, line.wrench)
-    for part in range(2):
-        if status == _SOLVED:
-            one, other = (line.mean, line.half) if part == 0 else (line.half, line.mean)
-            status = step_mean(model, data, part_of(goal, settings, 0.5 * h), line.u, one, other, line.report)
-            report_contacts(model, data, 0.5 * h, line.parts[part])
-    if status == _SOLVED:
-        status = node_of_mean(model, data, 0.5 * h, line.u, line.mean, line.trial)
+    status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h), line)
     if status != _SOLVED:
         return status, _FAILED
     nq = data.theta1.shape[0]

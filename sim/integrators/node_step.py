@@ -102,6 +102,15 @@ def node_of_mean(model: Model, data: Data, h: float, u: Vector, mean: Vector, x:
 
 
 @kernel
+def is_damped(model: Model) -> bool:
+    """Whether joints have dampers: then half of their impulse acts at the node between two steps, else nothing does."""
+    for d in range(model.dof_damper.shape[0]):
+        if model.dof_damper[d] != 0.0:
+            return True
+    return False
+
+
+@kernel
 def part_of(goal: Vector, settings: Vector, h: float) -> StepOptions:
     """Options of a step of length h: kappa in proportion to it, so that contacts press with the same force.
 

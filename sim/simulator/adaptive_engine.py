@@ -148,15 +148,20 @@ class AdaptiveEngine(HighOrderEngine):
         u, wrench = held
         if order == 8:
             return self._long(x, held, h, False)[0]
-        mean, half = self._mean(x, held, 0.5 * h), np.zeros((3, self.nx))
-        half[0] = mean
-        us, wrenches = np.repeat(u[None], 2, axis=0), np.repeat(wrench, 2, axis=0)
-        contacts = np.zeros((2, self.sizes.ncontact, CONTACT))
-        line = MotionBuffers(half, us, wrenches, np.zeros((2, REPORT)), contacts, *self.unknown[:2])
+        for _ in range(2):
+            x = self._half(x, held, 0.5 * h, kappa)
+        return x
+
+    def _half(self, x: Vector, held: Held, h: float, kappa: float | None) -> Vector:
+        """The node one step of order 2 after x (nx,)."""
+        (u, wrench), xs = held, np.zeros((2, self.nx))
+        xs[0] = self._mean(x, held, h)
+        contacts = np.zeros((1, self.sizes.ncontact, CONTACT))
+        line = MotionBuffers(xs, u[None], wrench, np.zeros((1, REPORT)), contacts, *self.unknown[:2])
         model, data = self._second.linked(link_step), self._scratch.table()
-        if roll(model, data, self._part_settings(0.5 * h, kappa), line, 0) < 2:
+        if roll(model, data, self._part_settings(h, kappa), line, 0) < 1:
             return np.full(self.nx, np.nan)
-        return self._node(half[2], held, 0.5 * h)
+        return self._node(xs[1], held, h)
 
     def part_slopes(
         self, x: Vector, held: Held, h: float, order: int, kappa: float | None = None
@@ -165,20 +170,20 @@ class AdaptiveEngine(HighOrderEngine):
         if order == 8:
             return self._long(x, held, h, True)
         u, wrench = held
-        part = 0.5 * h
-        mean = self._mean(x, held, part)
-        by_x, by_u = self._mean_slopes(x, held, part, mean)
+        by_x, by_u = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
         model, data = self._second.linked(link_step, link_gradient), self._scratch.table()
         A, B = np.zeros((1, self.ndx, self.ndx)), np.zeros((1, self.ndx, self.nu))
-        x_next, reports, settings = np.zeros((1, self.nx)), np.zeros((1, REPORT)), self._part_settings(part, kappa)
+        half, reports = 0.5 * h, np.zeros((1, REPORT))
         for _ in range(2):
-            x_next[0] = mean
+            mean, x_next = self._mean(x, held, half), np.zeros((1, self.nx))
             line = Linearized(mean[None], u[None], wrench, A, B, x_next, reports)
-            linearize(model, data, settings, (0, 0, 1), 1, line)
-            mean, by_x, by_u = x_next[0].copy(), A[0] @ by_x, A[0] @ by_u + B[0]
-        end = self._node(mean, held, part)
-        C, D = self._end_slopes(mean, held, part, end)
-        return end, C @ by_x, C @ by_u + D, reports[0]
+            linearize(model, data, self._part_settings(half, kappa), (0, 0, 1), 1, line)
+            C, D = self._mean_slopes(x, held, half, mean)
+            x = self._node(x_next[0], held, half)
+            E, F = self._end_slopes(x_next[0], held, half, x)
+            by_u = E @ (A[0] @ (C @ by_u + D) + B[0]) + F
+            by_x = E @ A[0] @ C @ by_x
+        return x, by_x, by_u, reports[0]
 
     def _long(self, x: Vector, held: Held, h: float, derivatives: bool) -> tuple[Vector, Floats, Floats, Vector]:
         """As part_slopes, of order 8; without derivatives these are empty."""
