@@ -29,7 +29,7 @@ from sim.contact.contact_report import report_contacts
 from sim.dynamics.external_forces import set_external
 from sim.dynamics.state import configuration_difference
 from sim.integrators.hamilton import coordinate_rates
-from sim.integrators.landing import landing
+from sim.integrators.landing import NEVER, landing
 from sim.integrators.node_step import begin_part, is_damped, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.phases import leave, left_out, report_apart
 from sim.integrators.runge_kutta import Scheme, advance
@@ -53,12 +53,15 @@ _SOLVED = int(Status.SOLVED)
 _TOLERANCE_STEP = int(Status.TOLERANCE_STEP)
 _NOT_FINITE, _CONTACT_SUNK = int(Status.NOT_FINITE), int(Status.CONTACT_SUNK)
 _TOUCHING = 0.125  # gap of a contact that closes, in accuracies
+_PRESSED = 8.0
 _KINK, _KINKS = 0.05, 0.2  # error of a step with a kink, and of all in a stretch, in accuracies
 _NOISE = 1e-10  # [m, rad] error that is not seen: the gap of a contact on the central path is as exact
 _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes what is deeper, whatever its length
 _INSTANT = 1e-13  # [s] between a landing and the node before it
 _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 _FAILED = 1e300
+_SHORTEST_IMPACT = 1e-7  # [s]
+_AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
 @kernel
@@ -83,6 +86,46 @@ def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Str
 
 
 @kernel
+def _step_ahead(
+    model_at: Table, data_at: Table, options: StepOptions, line: Stretch, x: Vector, out: Vector
+) -> int:  # fmt: skip
+    """out = the mean state one step after the node x, in which the ground acts on both alike; the Status."""
+    model, data = model_view(model_at), data_view(data_at)
+    begin_part(data, line.wrench)
+    status = mean_of_node(model_at, data_at, options.h, line.u, x, line.half)
+    if status != _SOLVED:
+        return status
+    begin_part(data, line.wrench)
+    return step_mean(model, data, options, line.u, line.half, out, line.report)
+
+
+@kernel
+def _difference(
+    model_at: Table, data_at: Table, options: StepOptions, goal: Vector, line: Stretch, embedded: Embedded
+) -> float:  # fmt: skip
+    """Largest e = |q - q'|/2 + |v - v'| t of the coordinates after a step and after its two halves [m, rad].
+
+    In contact without an impact, _PRESSED times that: errors of the velocity go on there, and grow where a body tips.
+
+    v, v': after an impact, as means of another step, in which the ground has acted. Without an impact these do not
+    count: they are as different as the gap of a contact is, over the length of the step.
+    t: what is left of the stretch, at least half a second: for so long an error of the velocity goes on.
+    """
+    model, data = model_view(model_at), data_view(data_at)
+    nq, hits = data.theta1.shape[0], line.clock[Clock.HIT] > 0.0
+    one, other, presses = line.node, line.trial, data.active_count[0] > 0
+    if hits and _step_ahead(model_at, data_at, options, line, line.node, line.ahead) == _SOLVED:
+        if _step_ahead(model_at, data_at, options, line, line.trial, line.node) == _SOLVED:
+            one, other = line.ahead, line.node
+    configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
+    error, time = 0.0, max(goal[2] - line.clock[Clock.TIME], 0.5) if hits else 0.0
+    for d in range(embedded.distance.shape[0]):
+        moved, turned = 0.5 * abs(embedded.distance[d]), abs(one[nq + d] - other[nq + d])
+        error = max(error, max(moved - _NOISE, 0.0) + time * turned)
+    return _PRESSED * error if presses and not hits else error
+
+
+@kernel
 def try_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
@@ -96,24 +139,26 @@ def try_short(
     if status != _SOLVED:
         return status, _FAILED
     found = landing(model, data, options, goal[0], line.mean, line.slips)
+    line.clock[Clock.HIT], line.clock[Clock.AHEAD] = 1.0 if found.hits else 0.0, found.ahead
+    status = node_of_mean(model, data, h, line.u, line.whole, line.node)
     if found.longest < h:
         line.clock[Clock.CUT], line.clock[Clock.LEAST] = found.longest, 0.0
+        return LANDS, _FAILED
+    if found.hits and h > line.clock[Clock.IMPACT]:
+        _shorten_impact(line.clock, h, line.clock[Clock.IMPACT])
         return LANDS, _FAILED
     if found.error > 2.0 * _TOUCHING * goal[0]:
         line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
         return LANDS, _FAILED
-    status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h), line)
+    if status == _SOLVED:
+        status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h), line)
     if status != _SOLVED:
         return status, _FAILED
-    nq = data.theta1.shape[0]
-    configuration_difference(model, line.whole[:nq], line.mean[:nq], embedded.distance)
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
     error = stopping_error(model, line.parts, line.slips, h)
-    for d in range(embedded.distance.shape[0]):
-        error = max(error, 0.5 * abs(embedded.distance[d]))
-    noise = _NOISE if line.clock[Clock.LEAST] > 0.0 else 0.0  # a rebound leaves the ground behind
-    return _SOLVED, max(error - noise, 0.0) / (goal[0] * h)
+    error = max(error, _difference(models[1], works[0], part_of(goal, settings, max(0.5 * h, _AHEAD)), goal, line, embedded))
+    return _SOLVED, error / (goal[0] * h)
 
 
 @kernel
@@ -189,6 +234,13 @@ def _allows(clock: Vector, h: float, shortest: float, ratio: float) -> bool:
 
 
 @kernel
+def _shorten_impact(clock: Vector, tried: float, h: float) -> None:
+    """Steps with an impact are no longer than h < tried; where it comes later than h/2, a step ends before it."""
+    clock[Clock.IMPACT], ahead = h, clock[Clock.AHEAD]
+    clock[Clock.CUT] = 0.98 * ahead if 0.5 * h < ahead < tried else h
+
+
+@kernel
 def take_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
 ) -> int:  # fmt: skip
@@ -198,7 +250,8 @@ def take_short(
     """
     clock, rest = line.clock, goal[2] - line.clock[Clock.TIME]
     status, ratio = try_short(models, works, settings, goal, line, embedded, h)
-    shortest = min(goal[3], clock[Clock.LEAST])
+    rebounds = clock[Clock.HIT] > 0.0 or clock[Clock.LEAST] == 0.0
+    shortest = min(goal[3], _SHORTEST_IMPACT if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
         keep(line, h, 2)
@@ -217,7 +270,9 @@ def take_short(
         clock[Clock.BEYOND] = 1.7 * h
         failed = _TOLERANCE_STEP if status == _SOLVED or status == LANDS else status
         return _SOLVED if h < rest else failed
-    if status == _SOLVED:
+    if status == _SOLVED and clock[Clock.HIT] > 0.0:  # its error is h times what is left of the accuracy for it
+        _shorten_impact(clock, h, max(h * min(0.5, max(0.01, 0.8 * _KINK / (ratio * h))), shortest))
+    elif status == _SOLVED:
         clock[Clock.SHORT] = max(min(next_length(h, ratio, 1.0, 2.0), 0.9 * h), shortest)
     elif status == LANDS:
         return _SOLVED if h > _INSTANT else _TOLERANCE_STEP

@@ -19,7 +19,8 @@ from solvers.types import Vector
 
 NEVER = 1e300  # [s]
 UNKNOWN, BEGINS = -1.0, -2.0  # in place of a slip
-_ACCELERATION = 1e3  # [m/s^2] of impacts at least
+_ACCELERATION = 1e3  # [m/s^2] of impacts at least that forget the slip
+_HIT = 1e2  # [m/s^2, rad/s^2] of impacts at least
 
 
 class Landing(NamedTuple):
@@ -29,6 +30,7 @@ class Landing(NamedTuple):
     ahead: float  # [s] until the first contact or limit is reached
     longest: float  # [s] length of a step with an impact with restitution, at most
     depth: float  # [m, rad] of the deepest overlap at its beginning
+    hits: bool  # whether a velocity jumps
 
 
 @kernel
@@ -55,7 +57,7 @@ def _longest_rebound(model: Model, data: Data, h: float, accuracy: float, c: int
     speed = (b[Bounce.GAP1] - b[Bounce.GAP2]) / h + 0.5 * fall * h
     high = speed * speed > 0.5 * fall * accuracy and b[Bounce.GAP2] < accuracy
     impulse = contact_impulse(model, data, c)[0]
-    if fall > 0.0 and high and impulse > 0.5 * model.body_mass[model.contact_body[c]] * speed:
+    if fall > 0.0 and speed > 0.0 and high and impulse > 0.5 * model.body_mass[model.contact_body[c]] * speed:
         return 0.05 * speed / fall
     return NEVER
 
@@ -70,15 +72,16 @@ def landing(
     more than twice the impulse kappa/gap which was there before. Contacts that land have no slip before.
     """
     h, nq = options.h, data.theta1.shape[0]
-    error, ahead, longest, depth = 0.0, NEVER, NEVER, 0.0
+    error, ahead, longest, depth, hits = 0.0, NEVER, NEVER, 0.0, False
     for k in range(model.limit_dof.shape[0]):
         gap, time = _limit_reached(model, data, k, mean)
         depth = max(depth, -gap)
         if gap > 8.0 * data.bound_gap[k]:  # it is touched in the end
             jump = h * abs(data.nu[model.limit_dof[k]] - mean[nq + model.limit_dof[k]])
             error, ahead = max(error, min(2.0 * gap, jump)), min(ahead, time)
+            hits = hits or jump > h * h * _HIT
     if data.active_count[0] == 0:
-        return Landing(error, ahead, longest, depth)
+        return Landing(error, ahead, longest, depth, hits)
     look_back(model, data, h, 1)
     look_back(model, data, h, 2)
     for m in range(data.active_count[0]):
@@ -95,4 +98,5 @@ def landing(
                 ahead = min(ahead, h * gap / (before - gap))
             if push > h * h * _ACCELERATION:
                 slips[c] = UNKNOWN
-    return Landing(error, ahead, longest, depth)
+            hits = hits or push > h * h * _HIT
+    return Landing(error, ahead, longest, depth, hits)

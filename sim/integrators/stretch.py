@@ -24,9 +24,12 @@ class Clock(IntEnum):
     RECENT = 6  # length of the last accepted step of order 2
     KINKS = 7  # error of the steps with kinks so far, in accuracies
     LEAST = 8  # shortest length of an impact with restitution at the node
+    CUT = 9  # longest length before a contact or limit is reached, of this node
     BEYOND = 10  # length tried where the shortest step is not solved, 0 elsewhere
     ERROR = 11  # estimated, of the sub-steps so far, in accuracies times 1 s
-    CUT = 9  # longest length before a contact or limit is reached, of this node
+    HIT = 12  # 1 where the step just tried has an impact
+    AHEAD = 13  # time until the first contact of that step [s]
+    IMPACT = 14  # longest length of a step with an impact
 
 
 class Stretch(NamedTuple):
@@ -35,11 +38,13 @@ class Stretch(NamedTuple):
     u: Vector  # (nu,) in
     wrench: Cube  # (1, nbody, 6) in, or (0, nbody, 6)
     x: Vector  # (nx,) the node, in place
-    trial: Vector  # (nx,) scratch, as the next three
+    trial: Vector  # (nx,) scratch, as the next five
     mean: Vector
     whole: Vector
     half: Vector
-    clock: Vector  # (12,) in place
+    node: Vector  # (nx,) scratch: the node after the undivided step
+    ahead: Vector  # (nx,) scratch: mean state of a step from there
+    clock: Vector  # (15,) in place
     report: Vector  # (6,)
     parts: Cube  # (2, ncontact, 11) scratch
     slips: Vector  # (ncontact,) at the node, after the last step; -1 unknown, -2 at the beginning of the stretch
@@ -70,6 +75,8 @@ def keep(line: Stretch, h: float, order: int) -> None:
     line.clock[Clock.TIME] += h
     line.clock[Clock.CUT] = line.clock[Clock.LEAST] = NEVER
     line.clock[Clock.BEYOND] = 0.0
+    if order == 8 or line.clock[Clock.HIT] > 0.0:
+        line.clock[Clock.IMPACT] = NEVER
     if order == 2:
         line.clock[Clock.READY] = 0.0
         add_contacts(line)

@@ -82,7 +82,7 @@ class AdaptiveEngine(HighOrderEngine):
         if not hasattr(self._kept, "line"):
             nx, nv, ncontact = self.nx, self.sizes.nv, self.sizes.ncontact
             errors = Embedded(*embedded(), np.zeros(nv), np.zeros(nv))
-            x, trial, mean, whole, half = (np.zeros(nx) for _ in range(5))
+            x, trial, mean, whole, half, node, ahead = (np.zeros(nx) for _ in range(7))
             line = Stretch(
                 np.zeros(self.nu),
                 self.no_wrenches,
@@ -91,6 +91,8 @@ class AdaptiveEngine(HighOrderEngine):
                 mean,
                 whole,
                 half,
+                node,
+                ahead,
                 np.zeros(len(Clock)),
                 np.zeros(REPORT),
                 np.zeros((2, ncontact, CONTACT)),
@@ -119,7 +121,7 @@ class AdaptiveEngine(HighOrderEngine):
         line.x[:], line.clock[:], line.report[:] = x, 0.0, 0.0
         line.clock[[Clock.SHORT, Clock.LONG]] = end
         line.clock[[Clock.SHORT_RATIO, Clock.LONG_RATIO]] = 1.0
-        line.clock[[Clock.LEAST, Clock.CUT]] = inf
+        line.clock[[Clock.LEAST, Clock.CUT, Clock.IMPACT]] = inf
         line.slips[:], line.contacts[:] = BEGINS, 0.0
         works, rows, status = self._scratch.tables(2), [], int(Status.SOLVED)
         for _ in pieces(settings, 2):
