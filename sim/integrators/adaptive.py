@@ -17,8 +17,8 @@ No step of order 2 is shorter than the shortest length, whatever its error (`err
 on the central path a contact is a force kappa/(h gap), a spring without damping to steps that are short enough to
 follow it.
 
-    goal    (6,) accuracy [m/s, rad/s], time step of kappa [s], end of the stretch [s], shortest length [s],
-            least kappa, and whether order 8 can be: 1 or 0
+    goal    (7,) accuracy [m/s, rad/s], time step of kappa [s], end of the stretch [s], shortest length [s],
+            least kappa, whether order 8 can be: 1 or 0, shortest length of an impact [s]
 """
 
 from __future__ import annotations
@@ -60,7 +60,6 @@ _OVERLAP = 1e-7  # [m, rad] of contacts and limits; a step removes what is deepe
 _INSTANT = 1e-13  # [s] between a landing and the node before it
 _SUDDEN = 8.0  # ratio of the lengths of steps on a kink and before it
 _FAILED = 1e300
-_SHORTEST_IMPACT = 1e-7  # [s]
 _AHEAD = 1e-3  # [s] least length of the steps behind an impact whose velocities are compared
 
 
@@ -144,7 +143,7 @@ def try_short(
     if found.longest < h:
         line.clock[Clock.CUT], line.clock[Clock.LEAST] = found.longest, 0.0
         return LANDS, _FAILED
-    if found.hits and h > line.clock[Clock.IMPACT]:
+    if found.hits and h > line.clock[Clock.IMPACT] and line.clock[Clock.BEYOND] == 0.0:
         _shorten_impact(line.clock, h, line.clock[Clock.IMPACT])
         return LANDS, _FAILED
     if found.error > 2.0 * _TOUCHING * goal[0]:
@@ -157,7 +156,8 @@ def try_short(
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
     error = stopping_error(model, line.parts, line.slips, h)
-    error = max(error, _difference(models[1], works[0], part_of(goal, settings, max(0.5 * h, _AHEAD)), goal, line, embedded))
+    behind = part_of(goal, settings, max(0.5 * h, _AHEAD))
+    error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
     return _SOLVED, error / (goal[0] * h)
 
 
@@ -251,7 +251,7 @@ def take_short(
     clock, rest = line.clock, goal[2] - line.clock[Clock.TIME]
     status, ratio = try_short(models, works, settings, goal, line, embedded, h)
     rebounds = clock[Clock.HIT] > 0.0 or clock[Clock.LEAST] == 0.0
-    shortest = min(goal[3], _SHORTEST_IMPACT if rebounds else NEVER)
+    shortest = min(goal[3], goal[6] if rebounds else NEVER)
     if status == _SOLVED and _allows(clock, h, shortest, ratio):
         beyond, kink = clock[Clock.BEYOND] > 0.0, ratio > 1.0
         keep(line, h, 2)

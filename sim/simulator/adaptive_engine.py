@@ -115,8 +115,10 @@ class AdaptiveEngine(HighOrderEngine):
         s, (models, scheme, errors, line) = self.settings, self._line()
         end = s.time_step
         settings = s.array(kappa)
-        shortest = max(SHORTEST, self._settling * (settings[1] / s.time_step) ** 0.5)
-        goal = np.array([s.accuracy, s.time_step, end, shortest, _LEAST_KAPPA, float(self._is_tree)])
+        pressing = settings[1] / s.time_step  # [N m]
+        settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
+        impact = min(max(SHORTEST, 0.1 * _LEAST_KAPPA / pressing), settled)
+        goal = np.array([s.accuracy, s.time_step, end, settled, _LEAST_KAPPA, float(self._is_tree), impact])
         line = line._replace(u=u, wrench=wrench)
         line.x[:], line.clock[:], line.report[:] = x, 0.0, 0.0
         line.clock[[Clock.SHORT, Clock.LONG]] = end

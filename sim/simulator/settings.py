@@ -17,6 +17,7 @@ __all__ = ["LEAST_ACCURACY", "Settings", "default_kappa", "free_parts", "with_ac
 
 LEAST_ACCURACY = 1e-12  # [m/s, rad/s]
 _CREEP = 1e-9  # [m/s]
+_PUSH = 3e-4  # (speed at which an opening contact is pushed away, over the accuracy)^2
 _EARTH = 9.81  # [m/s^2] in scenes without gravity
 _SMALLEST, _LARGEST = 1e-13, 1e-6  # [N s m]; products of slack and impulse are rounded to 2e-14
 
@@ -43,14 +44,27 @@ class Settings(NamedTuple):
         return np.array((self.time_step, level, self.tolerance, *limits), dtype=np.float64)
 
 
-def with_accuracy(settings: Settings, accuracy: float) -> Settings:
-    """Settings of steps of an accuracy [m/s, rad/s], at least LEAST_ACCURACY, which choose their orders themselves."""
+def with_accuracy(settings: Settings, accuracy: float | None, mechanism: Mechanism | None) -> Settings:
+    """Settings of steps of an accuracy [m/s, rad/s], at least LEAST_ACCURACY, which choose their orders themselves.
+
+    mechanism: whose kappa is the default one; that is lowered to
+
+        kappa <= 3e-4 m accuracy^2 h,    at least 1e-13
+
+    since a contact that opens is pushed away with sqrt(kappa/(m h)); links are much lighter than their robot of mass m.
+    """
+    if accuracy is None:
+        return settings
     number = checks.number("Simulator(accuracy=...)", accuracy, above=0.0)
     if number < LEAST_ACCURACY:
         raise ValueError(f"Simulator(accuracy=...): expected at least {LEAST_ACCURACY:g}, got {accuracy!r}")
     if settings.order != 2:
         raise ValueError(f"Simulator(accuracy=...): it chooses the order itself, got order={settings.order}")
-    return settings._replace(accuracy=number, order=8)
+    kappa = settings.kappa
+    if mechanism is not None and (mechanism.contacts or mechanism.joints):
+        most = _PUSH * min(free_parts(mechanism), default=1.0) * number**2 * settings.time_step
+        kappa = min(kappa, max(most, _SMALLEST))
+    return settings._replace(accuracy=number, order=8, kappa=kappa)
 
 
 def free_parts(mechanism: Mechanism) -> list[float]:

@@ -103,7 +103,7 @@ class Simulator(RowStepping):
         level = default_kappa(mechanism, h) if self._kappa is None else self._kappa
         residual = checks.number("Simulator(tolerance=...)", tolerance, above=0.0)
         settings = Settings(h, level, residual, int(max_iterations), int(order), bool(divide))
-        super().__init__(mechanism, settings if accuracy is None else with_accuracy(settings, accuracy))
+        super().__init__(mechanism, with_accuracy(settings, accuracy, None if self._kappa else mechanism))
 
     def __reduce__(self) -> Any:
         return Simulator, (self.mechanism, *self._given().values())
