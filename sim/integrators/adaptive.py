@@ -129,7 +129,7 @@ def try_short(
     models: Table, works: Table, settings: Vector, goal: Vector, line: Stretch, embedded: Embedded, h: float
 ) -> tuple[int, float]:  # fmt: skip
     """line.trial = the node one step of order 2, in two halves, after line.x; (Status or LANDS, error over allowed)."""
-    model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h)
+    model, data, options = model_view(models[1]), data_view(works[0]), part_of(goal, settings, h, 2)
     begin_part(data, line.wrench)
     status = mean_of_node(models[1], works[0], h, line.u, line.x, line.mean)
     if status == _SOLVED:
@@ -150,13 +150,13 @@ def try_short(
         line.clock[Clock.CUT] = max(min(0.9 * found.ahead, 0.5 * h), 0.02 * h)
         return LANDS, _FAILED
     if status == _SOLVED:
-        status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h), line)
+        status = _two_halves(models[1], works[0], part_of(goal, settings, 0.5 * h, 1), line)
     if status != _SOLVED:
         return status, _FAILED
     if found.depth > _OVERLAP:
         return _SOLVED, 0.0
     error = stopping_error(model, line.parts, line.slips, h)
-    behind = part_of(goal, settings, max(0.5 * h, _AHEAD))
+    behind = part_of(goal, settings, max(0.5 * h, _AHEAD), 1)
     error = max(error, _difference(models[1], works[0], behind, goal, line, embedded))
     return _SOLVED, error / (goal[0] * h)
 

@@ -111,12 +111,14 @@ def is_damped(model: Model) -> bool:
 
 
 @kernel
-def part_of(goal: Vector, settings: Vector, h: float) -> StepOptions:
+def part_of(goal: Vector, settings: Vector, h: float, parts: int) -> StepOptions:
     """Options of a step of length h: kappa in proportion to it, so that contacts press with the same force.
+
+    parts: into which the same step is also divided: then they have the same gaps, even with the least kappa.
 
     goal: as in adaptive.py.
     """
-    kappa = max(settings[1] * h / goal[1], goal[4])
+    kappa = max(settings[1] * h / goal[1], parts * goal[4])
     return StepOptions(h, kappa, settings[2], int(settings[3]), settings[5], settings[6])
 
 
