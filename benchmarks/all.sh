@@ -50,7 +50,7 @@ export NUMBA_NUM_THREADS=1  # one core from here on, as the tables say
 measure robustness "$python" "$here/benchmarks/robustness.py" $quick --out "$out"
 measure attacks "$python" "$here/benchmarks/attacks.py" $quick --out "$out"
 measure division "$python" "$here/benchmarks/division.py" $quick --out "$out"
-measure accuracy_on_request "$python" "$here/benchmarks/accuracy_on_request.py" $quick --out "$out"
+measure accuracy "$python" "$here/benchmarks/accuracy.py" $quick --out "$out"
 measure falls "$python" "$here/benchmarks/falls.py" $quick --out "$out"
 measure gaits "$python" "$here/benchmarks/gaits.py" $quick --out "$out"
 measure loops "$python" "$here/benchmarks/loops.py" $quick --out "$out"

@@ -5,7 +5,8 @@ A sub-step of length h from a node is accepted where its estimate e of the error
     e <= accuracy h/(1 s)        [m, rad],  accuracy in m and rad per second of motion
 
 order 8    e from the embedded formulas of order 5 and 3 of Dormand and Prince (Hairer, Norsett, Wanner, II.10)
-order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py
+order 2    e = |q - q'|/2 of two steps of h/2 and one of h, node_step.py; in contact eight times that, with an impact
+           |v - v'| t besides, t the rest of the stretch, half a second at least
 
 and the next one has the length h (e/allowed)^-1/k times a PI controller's share (Gustafsson, ACM TOMS 17, 1991).
 

@@ -2,8 +2,8 @@
 
 A step depends on its state and input alone: its sub-steps begin anew with the longest.
 
-With contacts or limits an accuracy below 1e-6 is refused: the estimate sees no velocities, and bounces with restitution
-miss 1e-7 by a factor of 50. Joints are not released from their limits as exactly as contacts are.
+With contacts or limits an accuracy below 1e-6 is refused: sub-steps with an impact would be so short that velocities
+are rounded. Joints are not released from their limits as exactly as contacts are.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ from solvers.status import Status
 from solvers.types import Cube, Integers, Vector
 
 SHORTEST = 1e-7  # [s]
+_IMPACT = 1e-6  # [kg s] shortest length of an impact, times a mass: kappa is the least one there, and not to be felt
 _SETTLED = (
     10.0  # (h w)^2 of the shortest step h, w^2 = m g^2 h/kappa the stiffness over m of a contact that carries m g
 )
-_LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: the estimate sees no errors of the velocity after an impact
+_LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round velocities
 _LEAST_KAPPA = 1e-13  # [N s m]
 _ROWS = 256  # sub-steps between two pauses
 
@@ -74,7 +75,8 @@ class AdaptiveEngine(HighOrderEngine):
         coupled = len(model.pair_kind) + len(model.loop_ntrans) + len(model.gear_dof)
         self._is_tree = coupled == 0
         g = float(np.linalg.norm(model.gravity)) or 9.81
-        self._settling = (_SETTLED / _lightest(model)) ** 0.5 / g
+        self._lightest = _lightest(model)
+        self._settling = (_SETTLED / self._lightest) ** 0.5 / g
         self._kept = threading.local()  # scratch, and `contacts` (ncontact, 11) of the last step
 
     def _line(self) -> tuple[Table, Scheme, Embedded, Stretch]:
@@ -117,7 +119,7 @@ class AdaptiveEngine(HighOrderEngine):
         settings = s.array(kappa)
         pressing = settings[1] / s.time_step  # [N m]
         settled = max(self._settling * pressing**0.5, (self._settling**2 * _LEAST_KAPPA) ** (1.0 / 3.0), SHORTEST)
-        impact = min(max(SHORTEST, 0.1 * _LEAST_KAPPA / pressing), settled)
+        impact = min(max(SHORTEST, _IMPACT / self._lightest), settled)
         goal = np.array([s.accuracy, s.time_step, end, settled, _LEAST_KAPPA, float(self._is_tree), impact])
         line = line._replace(u=u, wrench=wrench)
         line.x[:], line.clock[:], line.report[:] = x, 0.0, 0.0

@@ -510,7 +510,7 @@ def missed(errors: Floats) -> str:
         return ""
     return (
         f"Solved, but the estimated error of step {worst} is {errors[worst]:.2g} times the one that the accuracy "
-        "allows: sub-steps in contact have a shortest length. A smaller kappa shortens it."
+        "allows: sub-steps in contact have a shortest length. Ask for less of it, or compare two accuracies."
     )
 
 

@@ -75,6 +75,36 @@ def test_a_block_slides_as_far_as_it_should(accuracy: float, steps: int) -> None
     assert impulse == pytest.approx([-2.0, 0.0, G], abs=0.1 + 0.25 * G / steps)
 
 
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("steps", [1, 10])
+def test_a_thrown_ball_lands_slides_and_rolls(accuracy: float, steps: int) -> None:
+    """It falls .2 m at 3 m/s, loses mu w of its speed at the impact w, slides, and rolls from 5/7 of it on."""
+    mu, seconds = 0.3, 0.8
+    sim = dojo.Simulator(ball(friction=mu), accuracy=accuracy)
+    fall, impact = np.sqrt(0.4 / G), np.sqrt(0.4 * G)
+    speed, spin = 3.0 - mu * impact, 25.0 * mu * impact
+    slide = (speed - 0.1 * spin) / (3.5 * mu * G)
+    end = 3.0 * fall + speed * slide - 0.5 * mu * G * slide**2 + (speed - mu * G * slide) * (seconds - fall - slide)
+    turned = spin * slide + 12.5 * mu * G * slide**2 + (spin + 25.0 * mu * G * slide) * (seconds - fall - slide)
+    found = sim.rollout(placed(sim, 0.3, 3.0), steps=steps, duration=seconds, throw=True).x[-1]
+    assert abs(found[0] - end) < 3.0 * seconds * accuracy
+    assert abs(np.angle(np.exp(1j * (2.0 * np.arctan2(found[5], found[3]) - turned)))) < 3.0 * seconds * accuracy
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
+def test_a_hopper_lands_as_exactly_or_says_so(accuracy: float) -> None:
+    """Against order 2 with steps of 20 us, exact to 3e-5: got at most three times asked, or times the estimated error."""
+    mech, seconds = models.hopper(), 0.4
+    q, v = np.array([0.0, 1.2, 0.1, 0.5, 0.9, 0.3]), 0.5 * np.random.default_rng(1).normal(size=6)
+    fine = dojo.Simulator(mech, time_step=2e-5, kappa=1e-13)
+    exact = fine.rollout(fine.start(q, v), steps=round(seconds / 2e-5), throw=True).x[-1]
+    sim = dojo.Simulator(mech, accuracy=accuracy)
+    found = sim.rollout(sim.start(q, v), duration=seconds, throw=True)
+    assert np.abs(found.x[-1] - exact)[:6].max() < 3.0 * seconds * accuracy * max(1.0, found.errors[0])
+    assert found.contacts.gap[-1].min() < 1e-6
+    assert ("estimated error" in found.message) == (found.errors[0] > 1.0)
+
+
 def test_an_input_acts_at_second_order_in_contact() -> None:
     """A ball rolls under a force along x: its acceleration is F/(1.4 m)."""
     sim = dojo.Simulator(ball(), accuracy=1e-5)
