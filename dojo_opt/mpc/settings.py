@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
@@ -28,6 +30,12 @@ class MPCSettings:
             state under the gains, "open loop" without them (default "states").
         gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
         delay: time from a measurement to the input that it causes [s]; plans start that much later (default 0).
+        computation: time that a plan takes [s]: a plan takes effect that much after the measurement it was made from,
+            and starts from where the plan before, which stays in force until then, leads the model (default 0). Unlike
+            `delay`, it lets measurements act at once, through the feedback.
+        servo: (kp, kd) of servos that take the place of the planner's gains between plans, each a number or (nu,), see
+            `dojo_opt.mpc.servo.Servo` [N/m, N m/rad; N s/m, N m s/rad] (default None: the planner's gains).
+        feedforward: whether the planned inputs are applied, too; without them a servo has to be there (default True).
         time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
         mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
             see `dojo_opt.mpc.measurement`.
@@ -45,6 +53,9 @@ class MPCSettings:
     guess: str = "states"
     gain_scale: float = 1.0
     delay: float = 0.0
+    computation: float = 0.0
+    servo: tuple[ArrayLike, ArrayLike] | None = None
+    feedforward: bool = True
     time_limit: float = float("inf")
     mean_velocity: bool = True
     friction: float | None = None
@@ -61,8 +72,12 @@ class MPCSettings:
             value = getattr(self, name)
             if value is not None and not value > above:
                 raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
-        for name in ("gain_scale", "delay"):
+        for name in ("gain_scale", "delay", "computation"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
+        if self.delay and self.computation:
+            raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
+        if not self.feedforward and self.servo is None:
+            raise ValueError("MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)")
         if self.log is not None:
             whole_number("MPC(log=...)", self.log)
         if self.friction is not None:
