@@ -15,7 +15,7 @@ from dojo_opt.mpc.horizon import shift_multipliers, tail
 from dojo_opt.mpc.measurement import Measurement
 from dojo_opt.mpc.moving import References
 from dojo_opt.mpc.policy import Policy
-from dojo_opt.mpc.servo import Servo
+from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
 from dojo_opt.planning.plan import Plan
@@ -49,14 +49,14 @@ class MPC:
 
     Args:
         problem: its simulator is the model; the plant may be another one. Its start and guess are those of the first
-            plan only, which is solved to the end; `reference` overwrites its references.
+            plan only, which is solved to the end, with the settings `first`; `reference` overwrites its references.
         iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
             equalities. An iteration that starts on the good side of an inequality does not see it; that takes about 3.
         reference: states to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
             problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
         **settings: period, kappa, kappa_grad, guess, gain_scale, delay, computation, servo, feedforward, time_limit,
-            mean_velocity, friction, learn_ground, options, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
+            mean_velocity, friction, learn_ground, options, first, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
@@ -88,7 +88,9 @@ class MPC:
             )
         self._delay = Delay(self.sim, self.settings.delay)
         self._predict = Prediction(self.sim, self.settings.computation)
-        self._servo = None if self.settings.servo is None else Servo(self.sim, self.settings.servo)
+        servo = self.settings.servo
+        self._actuator = ModelServo(self.sim) if isinstance(servo, str) else None
+        self._servo = None if servo is None or isinstance(servo, str) else Servo(self.sim, servo)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
@@ -145,7 +147,8 @@ class MPC:
             x: (nx,) measured state.
 
         Returns:
-            (nu,) input [N, N m]; with a `delay`, that for time + delay.
+            (nu,) input [N, N m], of servos in the model the forces of their actuators; with a `delay`, that for time +
+            delay.
 
         Raises:
             ValueError: for a time before the last plan, or a state of the wrong shape or with numbers that are not
@@ -165,7 +168,7 @@ class MPC:
             self._tick(now, self.policy)
         u = self._command(now, self._measured.state(), measured)
         self._delay.issue(now, u)
-        return u
+        return u if self._actuator is None else self._actuator(u, measured)
 
     def _command(self, now: float, x: Vector, sample: Vector) -> Vector:
         """The planned input, with feedback unless it is switched off.
@@ -203,7 +206,7 @@ class MPC:
         self._due = now + self.period
         self.problem.start = self._delay.ahead(now, self._measured)
         self.references.move(now + self.settings.delay, x=self.problem.start)
-        plan = self._first or Solver(self.problem).solve()
+        plan = self._first or Solver(self.problem, self.settings.first).solve()
         shape = (self.problem.horizon, self.sim.nu)
         if plan.u.shape != shape:
             raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")

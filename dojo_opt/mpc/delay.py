@@ -14,6 +14,7 @@ from sim.simulator.simulator import Simulator
 Vector = NDArray[np.float64]
 
 _PREDICTION = 5e-3  # longest step of the prediction [s]
+_HARD = 1e-6  # [N s m] a robot does not hover: at 1e-3, as in plans, a foot under 20 N would by 10 mm in such steps
 
 __all__ = ["Delay", "Prediction"]
 
@@ -23,7 +24,12 @@ class Prediction:
 
     def __init__(self, sim: Simulator, length: float) -> None:
         self._steps = int(np.ceil(length / _PREDICTION - 1e-9))
-        self._fine = sim.replace(time_step=length / self._steps) if length else None
+        if length:
+            h = length / self._steps
+            hard = min(_HARD, sim.kappa * h / sim.time_step)
+            self._fine: Simulator | None = sim.replace(time_step=h, kappa=hard)
+        else:
+            self._fine = None
 
     def __call__(self, now: float, measured: Measurement, command: Callable[[float, Vector], Vector]) -> Vector:
         """State (nx,) at the end.

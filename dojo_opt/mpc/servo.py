@@ -1,4 +1,4 @@
-"""Servo: proportional and derivative feedback of every driven joint to its planned motion, at the rate of the calls."""
+"""Servos: proportional and derivative feedback of every driven joint, at the rate of the calls."""
 
 from __future__ import annotations
 
@@ -8,17 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
 from sim.model.model import InputKind
 from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
-__all__ = ["Servo"]
+__all__ = ["ModelServo", "Servo"]
+
+_CALL = "MPC(servo=...)"
 
 
 class Servo:
-    """u = kp (q_plan - q) + kd (v_plan - v) on the coordinate that each input drives.
+    """Servos that follow the plan, which does not know them: kp (q_plan - q) + kd (v_plan - v), added to the inputs.
 
     The velocity of a state is the mean one over the interval before it, so that planned for a time is read half a step
     of the model later.
@@ -32,19 +36,14 @@ class Servo:
     """
 
     def __init__(self, sim: Simulator, gains: tuple[ArrayLike, ArrayLike]) -> None:
-        call = "MPC(servo=...)"
-        if not hasattr(gains, "__len__") or len(gains) != 2:
-            raise ValueError(f"{call}: expected (kp, kd), got {gains!r}")
-        self.kp, self.kd = (_gains(f"{call}: {name}", k, sim.nu) for name, k in zip(("kp", "kd"), gains, strict=True))
-        kinds = np.asarray(sim.model.input_kind)
-        if np.any(kinds != InputKind.JOINT):
-            raise ValueError(f"{call}: every input has to drive a joint; input {int(np.argmax(kinds != InputKind.JOINT))}"
-                             " acts on a body")  # fmt: skip
-        self._dof = np.asarray(sim.model.input_index)
+        if not hasattr(gains, "__len__") or isinstance(gains, str) or len(gains) != 2:
+            raise ValueError(f'{_CALL}: expected (kp, kd) or "model", got {gains!r}')
+        self.kp, self.kd = (_gains(f"{_CALL}: {name}", k, sim.nu) for name, k in zip(("kp", "kd"), gains, strict=True))
+        self._dof = driven(sim)
         self._sim = sim
 
     def __call__(self, policy: Policy, time: float, x: Vector) -> Vector:
-        """The torque of the servos.
+        """The forces of the servos.
 
         Args:
             policy: the plan.
@@ -52,12 +51,86 @@ class Servo:
             x: (nx,) measured state, with the velocity at that time.
 
         Returns:
-            (nu,) input [N, N m].
+            (nu,) forces [N, N m].
         """
         sim, at = self._sim, self._dof
         off = sim.difference(policy.state(time), x)[at]
         ahead = policy.state(time + 0.5 * sim.time_step)[sim.nq + at]
         return np.asarray(self.kp * off + self.kd * (ahead - x[sim.nq + at]))
+
+
+class ModelServo:
+    """Servos that the plan knows: the springs and dampers of the driven joints, where the model has them.
+
+        tau = u - kp (q - rest) - kd v
+
+    An input u = kp (target - rest) + feedforward moves the target. The robot, or the plant, has neither spring nor
+    damper there: its actuators make the force tau, and their limits hold for all of it.
+
+    Args:
+        sim: simulator of the model.
+
+    Attributes:
+        kp: (nu,) spring constants [N/m, N m/rad].
+        kd: (nu,) dampers [N s/m, N m s/rad].
+        rest: (nu,) coordinates at rest [m, rad].
+        dof: (nu,) numbers of the driven degrees of freedom.
+        place: (nu,) addresses of their coordinates in x.
+        velocity: (nu,) addresses of their velocities in x.
+
+    Raises:
+        ValueError: no driven joint has a spring or a damper, or an input drives no single coordinate.
+    """
+
+    def __init__(self, sim: Simulator) -> None:
+        self.dof = driven(sim)
+        model = sim.model
+        self.kp, self.kd, self.rest = (
+            np.array(of[self.dof]) for of in (model.dof_spring, model.dof_damper, model.dof_rest)
+        )
+        if not (self.kp.any() or self.kd.any()):
+            raise ValueError(f'{_CALL}: "model" stands for springs and dampers of driven joints, and there are none')
+        self.place = _coordinates(sim, self.dof)
+        self.velocity = sim.nq + self.dof
+
+    def __call__(self, u: Vector, x: Vector) -> Vector:
+        """The forces of the actuators.
+
+        Args:
+            u: (nu,) input of the model [N, N m].
+            x: (nx,) measured state, with the velocity at that time.
+
+        Returns:
+            (nu,) forces [N, N m].
+        """
+        return np.asarray(u - self.kp * (x[self.place] - self.rest) - self.kd * x[self.velocity])
+
+
+def driven(sim: Simulator) -> Integers:
+    """Numbers of the degrees of freedom that the inputs drive.
+
+    Args:
+        sim: the simulator.
+
+    Returns:
+        (nu,) numbers below nv.
+
+    Raises:
+        ValueError: an input acts on a body.
+    """
+    on_body = np.flatnonzero(np.asarray(sim.model.input_kind) != InputKind.JOINT)
+    if on_body.size:
+        raise ValueError(f"{_CALL}: every input has to drive a joint; input {on_body[0]} acts on a body")
+    return np.asarray(sim.model.input_index)
+
+
+def _coordinates(sim: Simulator, dofs: Integers) -> Integers:
+    """Addresses in x of the coordinates of degrees of freedom, none of them a rotation by quaternion."""
+    layout = tangent_layout(sim, sim.neutral())
+    at = np.asarray(layout)[dofs]
+    if np.any(at < 0):
+        raise ValueError(f"{_CALL}: an input drives a rotation of a quaternion joint, which is no single coordinate")
+    return at
 
 
 def _gains(call: str, value: Any, size: int) -> Vector:

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.cost import Tracking
+from dojo_opt.cost import ResidualCost, Tracking
 from dojo_opt.mpc.controller import MPC
+from dojo_opt.mpc.servo import ModelServo
 from dojo_opt.plant.loop import ClosedLoop, closed_loop
 from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
@@ -21,7 +22,7 @@ from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 
-__all__ = ["Outcome", "SuiteTask", "held", "quadratic"]
+__all__ = ["Outcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort"]
 
 _CLEAR = 1e-6  # [m] between a lifted start and what it was inside of
 _RAISED = 3  # times that a start is lifted: the coordinate may raise the deepest contact by less than its own change
@@ -31,9 +32,9 @@ class Outcome(NamedTuple):
     """How a run of a task ended.
 
     Attributes:
-        success: whether it did what the task asks for.
+        success: whether it lasted to its end and did what the task asks for.
         measures: numbers that decide it, by name with unit.
-        median: median of the times of the ticks [ms].
+        median: median of the processor times of the ticks [ms].
         late: 99th percentile of them [ms].
         penetration: largest depth of a contact [m].
         fallbacks: ticks whose plan was rejected.
@@ -134,7 +135,7 @@ class SuiteTask:
             Its outcome.
         """
         done, measures = self.judge(loop)
-        ms = milliseconds(loop.log)
+        ms = milliseconds(loop.log, cpu=True)
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)
         depth = max(0.0, -float(loop.contacts.gap.min(initial=np.inf)))
         return Outcome(loop.survived and done, measures, *times, depth, sum(tick.fallback for tick in loop.log))
@@ -158,6 +159,35 @@ def quadratic(
     size = max(np.size(w) for w in (*running, *end))
     rows = [np.concatenate([np.broadcast_to(w, (size,)) for w in pair]) for pair in (running, end)]
     return Tracking(reference, np.vstack([np.tile(dt * rows[0], (horizon, 1)), rows[1]]))
+
+
+def servo_effort(sim: Simulator, weight: ArrayLike, horizon: int) -> ResidualCost:
+    """sum_t tau_t' R tau_t of the forces tau = u - kp (q - rest) - kd v of servos in the model.
+
+    Args:
+        sim: simulator of a model with springs and dampers at its driven joints.
+        weight: R, a number or (nu,) [1/N^2, 1/(N m)^2].
+        horizon: number T of knots.
+
+    Returns:
+        The cost.
+    """
+    servo = ModelServo(sim)
+    kp, kd, rest, nu, ndx = servo.kp, servo.kd, servo.rest, sim.nu, sim.ndx
+    place, velocity, dof, nv = servo.place, servo.velocity, servo.dof, sim.nv
+
+    def force(x, u, out):  # type: ignore[no-untyped-def]
+        for i in range(nu):
+            out[i] = u[i] - kp[i] * (x[place[i]] - rest[i]) - kd[i] * x[velocity[i]]
+
+    def slope(x, u, out):  # type: ignore[no-untyped-def]
+        for i in range(nu):
+            out[i, :] = 0.0
+            out[i, dof[i]] = -kp[i]
+            out[i, nv + dof[i]] = -kd[i]
+            out[i, ndx + i] = 1.0
+
+    return ResidualCost(force, nu, weight, slope, knots=range(horizon))
 
 
 def held(loop: ClosedLoop, fulfilled: NDArray[np.bool_]) -> float:
