@@ -26,6 +26,7 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.mechanism import Mechanism
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -89,8 +90,8 @@ class MPC:
         self._delay = Delay(self.sim, self.settings.delay)
         self._predict = Prediction(self.sim, self.settings.computation)
         servo = self.settings.servo
-        self._actuator = ModelServo(self.sim) if isinstance(servo, str) else None
-        self._servo = None if servo is None or isinstance(servo, str) else Servo(self.sim, servo)
+        self._actuator = ModelServo(self.sim, servo) if isinstance(servo, Mechanism) else None
+        self._servo = None if servo is None or isinstance(servo, Mechanism) else Servo(self.sim, servo)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from dojo_opt.mpc.policy import Policy
 from dojo_opt.planning.manifold import tangent_layout
 from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
 from sim.model.model import InputKind
 from sim.simulator.simulator import Simulator
 
@@ -37,7 +38,7 @@ class Servo:
 
     def __init__(self, sim: Simulator, gains: tuple[ArrayLike, ArrayLike]) -> None:
         if not hasattr(gains, "__len__") or isinstance(gains, str) or len(gains) != 2:
-            raise ValueError(f'{_CALL}: expected (kp, kd) or "model", got {gains!r}')
+            raise ValueError(f'{_CALL}: expected (kp, kd) or a Mechanism, got {gains!r}')
         self.kp, self.kd = (_gains(f"{_CALL}: {name}", k, sim.nu) for name, k in zip(("kp", "kd"), gains, strict=True))
         self._dof = driven(sim)
         self._sim = sim
@@ -60,15 +61,16 @@ class Servo:
 
 
 class ModelServo:
-    """Servos that the plan knows: the springs and dampers of the driven joints, where the model has them.
+    """Servos that the plan knows: the springs and dampers that the model has at its driven joints, and the robot has not.
 
         tau = u - kp (q - rest) - kd v
 
-    An input u = kp (target - rest) + feedforward moves the target. The robot, or the plant, has neither spring nor
-    damper there: its actuators make the force tau, and their limits hold for all of it.
+    An input u = kp (target - rest) + feedforward moves the target. The robot's actuators make the force tau, and their
+    limits hold for all of it.
 
     Args:
         sim: simulator of the model.
+        own: mechanism of the robot, with the same joints.
 
     Attributes:
         kp: (nu,) spring constants [N/m, N m/rad].
@@ -79,17 +81,20 @@ class ModelServo:
         velocity: (nu,) addresses of their velocities in x.
 
     Raises:
-        ValueError: no driven joint has a spring or a damper, or an input drives no single coordinate.
+        ValueError: the joints differ, the model has no spring and no damper more, or an input drives no single
+            coordinate.
     """
 
-    def __init__(self, sim: Simulator) -> None:
+    def __init__(self, sim: Simulator, own: Mechanism) -> None:
+        mine = sim.mechanism
+        if mine.joint_names != own.joint_names or [j.kind for j in mine.joints] != [j.kind for j in own.joints]:
+            raise ValueError(f"{_CALL}: expected a mechanism with the joints of the model, got {own!r}")
         self.dof = driven(sim)
-        model = sim.model
-        self.kp, self.kd, self.rest = (
-            np.array(of[self.dof]) for of in (model.dof_spring, model.dof_damper, model.dof_rest)
-        )
+        self.kp, self.kd, self.rest = (_by_dof(mine, field)[self.dof] for field in ("spring", "damper", "rest"))
+        self.kp -= _by_dof(own, "spring")[self.dof]
+        self.kd -= _by_dof(own, "damper")[self.dof]
         if not (self.kp.any() or self.kd.any()):
-            raise ValueError(f'{_CALL}: "model" stands for springs and dampers of driven joints, and there are none')
+            raise ValueError(f"{_CALL}: the model has no springs and dampers that this mechanism has not")
         self.place = _coordinates(sim, self.dof)
         self.velocity = sim.nq + self.dof
 
@@ -131,6 +136,11 @@ def _coordinates(sim: Simulator, dofs: Integers) -> Integers:
     if np.any(at < 0):
         raise ValueError(f"{_CALL}: an input drives a rotation of a quaternion joint, which is no single coordinate")
     return at
+
+
+def _by_dof(mechanism: Mechanism, field: str) -> Vector:
+    """(nv,) spring constants, dampers or rests."""
+    return np.concatenate([np.broadcast_to(getattr(joint, field), (joint.nv,)) for joint in mechanism.joints])
 
 
 def _gains(call: str, value: Any, size: int) -> Vector:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.mechanism import Mechanism
 
 # penalties that grew with every tick would never stop; a second line search would take its time
 OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
@@ -34,8 +35,9 @@ class MPCSettings:
             and starts from where the plan before, which stays in force until then, leads the model (default 0). Unlike
             `delay`, it lets measurements act at once, through the feedback.
         servo: (kp, kd), each a number or (nu,), of servos that follow the plan in place of the planner's gains [N/m,
-            N m/rad; N s/m, N m s/rad]; or "model", where the springs and dampers of the model's driven joints are
-            servos: the controller then returns the forces of their actuators. See `dojo_opt.mpc.servo` (default None).
+            N m/rad; N s/m, N m s/rad]; or the mechanism of the robot, where the springs and dampers that the model's
+            driven joints have beyond it are servos: the controller then returns the forces of their actuators. See
+            `dojo_opt.mpc.servo` (default None).
         feedforward: whether the planned inputs are applied, too; without them a servo has to be there (default True).
         time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
         mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
@@ -56,7 +58,7 @@ class MPCSettings:
     gain_scale: float = 1.0
     delay: float = 0.0
     computation: float = 0.0
-    servo: tuple[ArrayLike, ArrayLike] | str | None = None
+    servo: tuple[ArrayLike, ArrayLike] | Mechanism | None = None
     feedforward: bool = True
     time_limit: float = float("inf")
     mean_velocity: bool = True
@@ -81,8 +83,6 @@ class MPCSettings:
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
         if self.delay and self.computation:
             raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
-        if isinstance(self.servo, str) and self.servo != "model":
-            raise ValueError(f'MPC(servo=...): expected (kp, kd) or "model", got {self.servo!r}')
         if not self.feedforward and self.servo is None:
             raise ValueError("MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)")
         if self.log is not None:

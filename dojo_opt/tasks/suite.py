@@ -17,6 +17,7 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import milliseconds
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
+from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.stance import gaps
 from sim.simulator.simulator import Simulator
 
@@ -161,18 +162,19 @@ def quadratic(
     return Tracking(reference, np.vstack([np.tile(dt * rows[0], (horizon, 1)), rows[1]]))
 
 
-def servo_effort(sim: Simulator, weight: ArrayLike, horizon: int) -> ResidualCost:
+def servo_effort(sim: Simulator, own: Mechanism, weight: ArrayLike, horizon: int) -> ResidualCost:
     """sum_t tau_t' R tau_t of the forces tau = u - kp (q - rest) - kd v of servos in the model.
 
     Args:
-        sim: simulator of a model with springs and dampers at its driven joints.
+        sim: simulator of a model whose driven joints have springs and dampers.
+        own: mechanism of the robot, without them.
         weight: R, a number or (nu,) [1/N^2, 1/(N m)^2].
         horizon: number T of knots.
 
     Returns:
         The cost.
     """
-    servo = ModelServo(sim)
+    servo = ModelServo(sim, own)
     kp, kd, rest, nu, ndx = servo.kp, servo.kd, servo.rest, sim.nu, sim.ndx
     place, velocity, dof, nv = servo.place, servo.velocity, servo.dof, sim.nv
 

@@ -68,21 +68,21 @@ def test_servos_follow_a_plan_that_does_not_know_them():
 def test_servos_of_the_model_are_the_forces_of_its_springs():
     """A plant without springs, driven by them, moves as one that has them."""
     model, plain = (dojo.Simulator(arm(*gains), time_step=1e-3) for gains in ((40.0, 4.0), (0.0, 0.0)))
-    servo = ModelServo(model)
+    servo = ModelServo(model, plain.mechanism)
     x = y = np.zeros(2)
     for _ in range(1000):
         u = np.array([40.0])  # a target of 1 rad
         x, y = model.step(x, u).x, plain.step(y, servo(u, y)).x
     assert x[0] == pytest.approx(y[0], abs=2e-3)
     assert abs(x[0] - 1.0) < 0.15  # gravity pulls at it
-    mpc = reaching(model.replace(time_step=0.05), servo="model", gain_scale=0.0)
+    mpc = reaching(model.replace(time_step=0.05), servo=plain.mechanism, gain_scale=0.0)
     force = mpc(0.0, [0.2, 0.5])[0]
     assert force == pytest.approx(mpc.policy.control(0.0)[0] - 40.0 * 0.2 - 4.0 * 0.5)
 
 
 def test_the_effort_of_servos_has_the_right_derivatives():
     sim = dojo.Simulator(arm(40.0, 4.0), time_step=0.05)
-    problem = dojo.Problem(sim, [0.0, 0.0], 3, cost=[servo_effort(sim, 0.5, 3)])
+    problem = dojo.Problem(sim, [0.0, 0.0], 3, cost=[servo_effort(sim, arm(damper=0.0), 0.5, 3)])
     xs, us = np.random.default_rng(0).normal(size=(4, 2)), np.random.default_rng(1).normal(size=(3, 1))
     force = us[:, 0] - 40.0 * xs[:3, 0] - 4.0 * xs[:3, 1]
     assert problem.cost(xs, us) == pytest.approx(0.5 * np.sum(force**2))
@@ -129,5 +129,31 @@ def test_a_plan_that_takes_time_leaves_the_one_before_in_force():
         reaching(sim, delay=0.01, computation=0.01)
     with pytest.raises(ValueError, match="nothing would drive"):
         reaching(sim, feedforward=False)
-    with pytest.raises(ValueError, match="there are none"):
-        reaching(dojo.Simulator(arm(damper=0.0), time_step=0.05), servo="model")
+    with pytest.raises(ValueError, match="has not"):
+        reaching(dojo.Simulator(arm(damper=0.0), time_step=0.05), servo=arm(damper=0.0))
+
+
+def test_a_compensated_body_floats():
+    """Beside one that falls; with half of its weight taken off, it falls half as fast. Energy and statics agree."""
+    bodies = [dojo.Body(name, 2.0, np.eye(3), gravity_compensation=c) for name, c in (("a", 0.0), ("b", 0.5), ("c", 1.0))]
+    mechanism = dojo.Mechanism(bodies, [dojo.Joint("floating", None, name) for name in "abc"], inputs=[])
+    sim = dojo.Simulator(mechanism, time_step=0.01)
+    motion = sim.rollout(sim.neutral(), steps=100)
+    z = motion.x[-1, [2, 9, 16]]
+    np.testing.assert_allclose(z / z[0], [1.0, 0.5, 0.0], atol=1e-12)
+    assert z[0] == pytest.approx(-0.5 * 9.81, rel=0.02)
+    assert np.ptp(sim.energy(sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv)))) == 0.0
+    torques = dojo.Kinematics(sim).gravity_torques(sim.neutral()[: sim.nq])
+    np.testing.assert_allclose(torques[[2, 8, 14]], 9.81 * 2.0 * np.array([1.0, 0.5, 0.0]))
+
+
+def test_the_step_of_a_compensated_arm_is_differentiated_by_mass_gravity_and_time_step():
+    body = dojo.Body("link", 1.0, np.diag([0.1, 0.1, 0.01]), gravity_compensation=0.3)
+    joint = dojo.Joint("revolute", None, "link", child_point=(0.0, 0.0, 0.5), axis=(0.0, 1.0, 0.0))
+    sim = dojo.Simulator(dojo.Mechanism([body], [joint], gravity=(1.0, 0.0, -9.81)), time_step=0.02)
+    x, u = np.array([0.7, 1.0]), np.array([0.3])
+    for name, value in (("mass:link", 1.0), ("gravity[2]", -9.81), ("time_step", 0.02)):
+        slope = sim.linearize(x, u, wrt=[name])[name]
+        e = 1e-5
+        ends = [sim.with_parameters({name: value + d}).step(x, u).x for d in (e, -e)]
+        np.testing.assert_allclose(slope.ravel(), (ends[0] - ends[1]) / (2.0 * e), rtol=1e-5, atol=1e-7)

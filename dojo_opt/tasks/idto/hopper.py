@@ -76,18 +76,19 @@ def hopper(**settings: Any) -> SuiteTask:
         ValueError: for an argument out of range.
     """
     sim = Simulator(mechanism(1.0, servos=True), time_step=_KNOT, kappa=1e-4)
+    own = mechanism(2.0 / 3.0)
     begin = sim.neutral()
     start = lifted(sim, begin, 1)
     goal = begin.copy()
     goal[0] = 0.5
     begin[5] = goal[5] = 0.5 / (_KNOT * _HORIZON)
     target = Onward(sim, begin, goal, _KNOT * _HORIZON)
-    cost = [quadratic(begin, _KNOT, _HORIZON, (np.ones(5), 0.1), (10.0 * np.ones(5), 1.0)), servo_effort(sim, _KNOT * 0.1, _HORIZON)]
+    cost = [quadratic(begin, _KNOT, _HORIZON, (np.ones(5), 0.1), (10.0 * np.ones(5), 1.0)), servo_effort(sim, own, _KNOT * 0.1, _HORIZON)]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": "model", "gain_scale": 0.0}
+    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-3}
     mpc = MPC(problem, reference=target, **{**given, **settings})
-    model = Simulator(mechanism(2.0 / 3.0), time_step=1e-3, kappa=1e-8)
+    model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.array([0.1, 0.02, 0.1, 0.1, 0.1] + [0.1] * 5)
     return SuiteTask("idto.hopper", mpc, model, start, 5.0, spread, _judge, _RATE, rise=1)
 

@@ -126,6 +126,7 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
         ValueError: for an argument out of range.
     """
     sim = Simulator(mechanism(1.0, terrain, servos=True), time_step=_KNOT, kappa=1e-3)
+    own = mechanism(2.0 / 3.0, terrain)
     begin = sim.neutral()
     start = lifted(sim, begin, 2)
     goal = begin.copy()
@@ -135,12 +136,12 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
     rates = np.concatenate([np.ones(6), np.full(12, 0.1)])
     running = np.concatenate([np.full(3, 10.0), np.full(3, quat), joints])
     end = np.concatenate([np.full(3, 10.0), np.full(3, 10.0 * quat), joints + 1.0])
-    cost = [quadratic(begin, _KNOT, _HORIZON, (running, rates), (end, rates)), servo_effort(sim, _KNOT * 0.01, _HORIZON)]
+    cost = [quadratic(begin, _KNOT, _HORIZON, (running, rates), (end, rates)), servo_effort(sim, own, _KNOT * 0.01, _HORIZON)]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": "model", "gain_scale": 0.0}
+    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-3, "first": _FIRST}
     mpc = MPC(problem, reference=target, **{**given, **settings})
-    model = Simulator(mechanism(2.0 / 3.0, terrain), time_step=1e-3, kappa=1e-8)
+    model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05] + [0.1] * 12 + [0.1] * 18)
     judge = _Judge(_WAY * speed / 0.4)
     return SuiteTask("idto.mini_cheetah", mpc, model, start, 10.0, spread, judge, _RATE, rise=2)
