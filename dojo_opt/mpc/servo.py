@@ -38,7 +38,7 @@ class Servo:
 
     def __init__(self, sim: Simulator, gains: tuple[ArrayLike, ArrayLike]) -> None:
         if not hasattr(gains, "__len__") or isinstance(gains, str) or len(gains) != 2:
-            raise ValueError(f'{_CALL}: expected (kp, kd) or a Mechanism, got {gains!r}')
+            raise ValueError(f"{_CALL}: expected (kp, kd) or a Mechanism, got {gains!r}")
         self.kp, self.kd = (_gains(f"{_CALL}: {name}", k, sim.nu) for name, k in zip(("kp", "kd"), gains, strict=True))
         self._dof = driven(sim)
         self._sim = sim
@@ -61,7 +61,7 @@ class Servo:
 
 
 class ModelServo:
-    """Servos that the plan knows: the springs and dampers that the model has at its driven joints, and the robot has not.
+    """Servos that the plan knows: springs and dampers that the model has at its driven joints, and the robot has not.
 
         tau = u - kp (q - rest) - kd v
 

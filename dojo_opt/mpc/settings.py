@@ -84,7 +84,9 @@ class MPCSettings:
         if self.delay and self.computation:
             raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
         if not self.feedforward and self.servo is None:
-            raise ValueError("MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)")
+            raise ValueError(
+                "MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)"
+            )
         if self.log is not None:
             whole_number("MPC(log=...)", self.log)
         if self.friction is not None:

@@ -23,13 +23,13 @@ from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 
-__all__ = ["Outcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort"]
+__all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort"]
 
 _CLEAR = 1e-6  # [m] between a lifted start and what it was inside of
 _RAISED = 3  # times that a start is lifted: the coordinate may raise the deepest contact by less than its own change
 
 
-class Outcome(NamedTuple):
+class TaskOutcome(NamedTuple):
     """How a run of a task ended.
 
     Attributes:
@@ -126,7 +126,7 @@ class SuiteTask:
         plant = self.plant(seed) if plant is None else plant
         return closed_loop(self.mpc, plant, self.duration if seconds is None else seconds)
 
-    def outcome(self, loop: ClosedLoop) -> Outcome:
+    def outcome(self, loop: ClosedLoop) -> TaskOutcome:
         """How a run ended.
 
         Args:
@@ -139,7 +139,7 @@ class SuiteTask:
         ms = milliseconds(loop.log, cpu=True)
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)
         depth = max(0.0, -float(loop.contacts.gap.min(initial=np.inf)))
-        return Outcome(loop.survived and done, measures, *times, depth, sum(tick.fallback for tick in loop.log))
+        return TaskOutcome(loop.survived and done, measures, *times, depth, sum(tick.fallback for tick in loop.log))
 
 
 def quadratic(

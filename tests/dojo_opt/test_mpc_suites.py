@@ -135,7 +135,9 @@ def test_a_plan_that_takes_time_leaves_the_one_before_in_force():
 
 def test_a_compensated_body_floats():
     """Beside one that falls; with half of its weight taken off, it falls half as fast. Energy and statics agree."""
-    bodies = [dojo.Body(name, 2.0, np.eye(3), gravity_compensation=c) for name, c in (("a", 0.0), ("b", 0.5), ("c", 1.0))]
+    bodies = [
+        dojo.Body(name, 2.0, np.eye(3), gravity_compensation=c) for name, c in (("a", 0.0), ("b", 0.5), ("c", 1.0))
+    ]
     mechanism = dojo.Mechanism(bodies, [dojo.Joint("floating", None, name) for name in "abc"], inputs=[])
     sim = dojo.Simulator(mechanism, time_step=0.01)
     motion = sim.rollout(sim.neutral(), steps=100)

@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 from dojo_opt.tasks.idto.acrobot import acrobot
 from dojo_opt.tasks.idto.allegro import allegro
 from dojo_opt.tasks.idto.hopper import hopper
+from dojo_opt.tasks.idto.jaco_ball import jaco_ball
 from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah
 from dojo_opt.tasks.idto.spinner import spinner
 from sim.mechanism.checks import nearest
 
-__all__ = ["acrobot", "allegro", "hopper", "mini_cheetah", "spinner"]
+__all__ = ["acrobot", "allegro", "hopper", "jaco_ball", "mini_cheetah", "spinner"]
 
 
 if not TYPE_CHECKING:

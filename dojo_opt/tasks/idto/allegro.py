@@ -12,7 +12,7 @@ from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
-from dojo_opt.tasks.idto.assembly import Link, assembled, from_com
+from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
@@ -46,7 +46,7 @@ _RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
 _THUMB_RANGES = ((0.263, 1.396), (-0.105, 2.163), (-0.189, 1.644), (-0.162, 1.719))
 
 
-def _finger(name: str, side: float, limits: bool) -> list[Link]:
+def _finger(name: str, side: float, limits: bool) -> list[FileLink]:
     """The links of a finger; side: 1 for the outer, -1 for the inner one, 0 in the middle."""
     base = (0.0, side * 0.0435, 0.0957 if side == 0.0 else 0.093458)
     half = np.radians(-2.5 * side)
@@ -57,15 +57,15 @@ def _finger(name: str, side: float, limits: bool) -> list[Link]:
     last = (1.263e-5, 1.182e-5, 2.484e-6, 2.1e-9, -9.8e-9, -1.3e-8)
     zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     links = [
-        Link(f"{name}_0", None, 0.0119, zero, first, pos=place, quat=_product(_UP, turn), axis=(0.0, 0.0, -1.0)),
-        Link(f"{name}_1", f"{name}_0", 0.065, zero, second, pos=(0.0, 0.0, 0.0164), axis=y),
-        Link(f"{name}_2", f"{name}_1", 0.0355, zero, third, pos=(0.0, 0.0, 0.054), axis=y),
-        Link(f"{name}_3", f"{name}_2", 0.0264, zero, last, pos=(0.0, 0.0, 0.0384), axis=y),
+        FileLink(f"{name}_0", None, 0.0119, zero, first, pos=place, quat=_product(_UP, turn), axis=(0.0, 0.0, -1.0)),
+        FileLink(f"{name}_1", f"{name}_0", 0.065, zero, second, pos=(0.0, 0.0, 0.0164), axis=y),
+        FileLink(f"{name}_2", f"{name}_1", 0.0355, zero, third, pos=(0.0, 0.0, 0.054), axis=y),
+        FileLink(f"{name}_3", f"{name}_2", 0.0264, zero, last, pos=(0.0, 0.0, 0.0384), axis=y),
     ]
     return [link._replace(damping=0.015, limits=r if limits else None) for link, r in zip(links, _RANGES, strict=True)]
 
 
-def _thumb(limits: bool) -> list[Link]:
+def _thumb(limits: bool) -> list[FileLink]:
     """The links of the thumb."""
     place = rotation_matrix(_UP) @ np.array([-0.0182, -0.019333, 0.049013])
     turn = (0.477714638, 0.521333448, -0.521334096, 0.477714267)
@@ -75,10 +75,10 @@ def _thumb(limits: bool) -> list[Link]:
     last = (7.054e-5, 6.564e-5, 1.954e-5, 0.0, 0.0, -3.3e-8)
     zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
     links = [
-        Link("thumb_0", None, 0.0176, zero, first, pos=place, quat=_product(_UP, turn), axis=(1.0, 0.0, 0.0)),
-        Link("thumb_1", "thumb_0", 0.0119, zero, second, pos=(-0.027, -0.005, 0.0399), axis=(0.0, 0.0, -1.0)),
-        Link("thumb_2", "thumb_1", 0.038, zero, third, pos=(0.0, 0.0, 0.0177), axis=y),
-        Link("thumb_3", "thumb_2", 0.0556, (0.0, 0.0, 0.012781), last, pos=(0.0, 0.0, 0.0514), axis=y),
+        FileLink("thumb_0", None, 0.0176, zero, first, pos=place, quat=_product(_UP, turn), axis=(1.0, 0.0, 0.0)),
+        FileLink("thumb_1", "thumb_0", 0.0119, zero, second, pos=(-0.027, -0.005, 0.0399), axis=(0.0, 0.0, -1.0)),
+        FileLink("thumb_2", "thumb_1", 0.038, zero, third, pos=(0.0, 0.0, 0.0177), axis=y),
+        FileLink("thumb_3", "thumb_2", 0.0556, (0.0, 0.0, 0.012781), last, pos=(0.0, 0.0, 0.0514), axis=y),
     ]
     ranges = zip(links, _THUMB_RANGES, strict=True)
     return [link._replace(damping=0.015, limits=r if limits else None) for link, r in ranges]
@@ -139,7 +139,7 @@ def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
     collisions.append(Collision("ball", None, ball, box, friction=palm, name="palm"))
     neutral: dict[str, Any] = {f"{name}_{k}": angle for name in _OPEN for k, angle in enumerate(_OPEN[name])}
     neutral["ball"] = (*place, 1.0, 0.0, 0.0, 0.0)
-    limits = {} if servos else {"limits": (-_EFFORT, _EFFORT)}
+    limits: dict[str, Any] = {} if servos else {"limits": (-_EFFORT, _EFFORT)}
     return Mechanism(
         [*bodies, Body("ball", mass, 0.4 * mass * radius**2 * np.eye(3))],
         [*joints, Joint("floating", None, "ball")],
@@ -189,10 +189,10 @@ def allegro(**settings: Any) -> SuiteTask:
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.concatenate([np.full(16, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
-    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Judge(goal[19:23]), _RATE)
+    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Turned(goal[19:23]), _RATE)
 
 
-class _Judge:
+class _Turned:
     """Whether the ball ends as `goal` (4,) and is never dropped."""
 
     def __init__(self, goal: Vector) -> None:

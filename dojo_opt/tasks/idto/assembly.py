@@ -1,4 +1,4 @@
-"""Links as robot files give them, frames at their joints, made into bodies and joints with frames at centres of mass."""
+"""Links as robot files give them, with frames at their joints, made into bodies and joints."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.mechanism.parts import Body, Joint
 
 Vector = NDArray[np.float64]
 
-__all__ = ["Link", "assembled", "from_com"]
+__all__ = ["FileLink", "assembled", "from_com"]
 
 
-class Link(NamedTuple):
+class FileLink(NamedTuple):
     """A link with the joint that it hangs on.
 
     Attributes:
@@ -35,17 +35,17 @@ class Link(NamedTuple):
     name: str
     parent: str | None
     mass: float
-    com: Sequence[float]
+    com: ArrayLike
     inertia: Sequence[float]
     kind: str = "revolute"
-    pos: Sequence[float] = (0.0, 0.0, 0.0)
-    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    pos: ArrayLike = (0.0, 0.0, 0.0)
+    quat: ArrayLike = (1.0, 0.0, 0.0, 0.0)
     axis: Sequence[float] = (0.0, 0.0, 1.0)
     damping: float = 0.0
     limits: tuple[float, float] | None = None
 
 
-def assembled(links: Sequence[Link]) -> tuple[list[Body], list[Joint]]:
+def assembled(links: Sequence[FileLink]) -> tuple[list[Body], list[Joint]]:
     """Bodies and joints of a tree of links.
 
     Args:
@@ -69,7 +69,7 @@ def assembled(links: Sequence[Link]) -> tuple[list[Body], list[Joint]]:
                 parent_point=np.asarray(link.pos) - before,
                 child_point=-com,
                 axis=link.axis,
-                orientation=np.asarray(link.quat) / np.linalg.norm(link.quat),
+                orientation=np.asarray(link.quat) / np.linalg.norm(np.asarray(link.quat)),
                 damper=link.damping,
                 limits=link.limits,
             )
@@ -77,7 +77,7 @@ def assembled(links: Sequence[Link]) -> tuple[list[Body], list[Joint]]:
     return bodies, joints
 
 
-def from_com(links: Sequence[Link], name: str, point: Sequence[float]) -> Vector:
+def from_com(links: Sequence[FileLink], name: str, point: Sequence[float]) -> Vector:
     """A point of a link from its centre of mass.
 
     Args:

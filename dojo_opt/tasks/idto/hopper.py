@@ -43,7 +43,9 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
     ]
     across = (0.0, -1.0, 0.0)
     hip, knee = (0.0, 0.0, -0.2), (0.0, 0.0, 0.2)
-    hinge: dict[str, Any] = {"axis": across} | ({"spring": _SERVO[0], "damper": _SERVO[1]} if servos else {})
+    hinge: dict[str, Any] = {"axis": across}
+    if servos:
+        hinge |= {"spring": _SERVO[0], "damper": _SERVO[1]}
     joints = [
         Joint("planar_axis", None, "torso", axis=across),
         Joint("revolute", "torso", "leg", parent_point=hip, child_point=knee, **hinge),
@@ -53,7 +55,7 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
         Contact("foot", (0.1, 0.0, 0.0), _RADIUS, friction, name="toe"),
         Contact("foot", (-0.1, 0.0, 0.0), _RADIUS, friction, name="heel"),
     ]
-    neutral = {"torso": (0.0, 0.61, 0.3), "leg": -0.5, "foot": 0.2}
+    neutral: dict[str, Any] = {"torso": (0.0, 0.61, 0.3), "leg": -0.5, "foot": 0.2}
     inputs = [Input("leg", name="knee"), Input("foot", name="ankle")]
     return Mechanism(bodies, joints, balls, inputs, name="hopper", neutral=neutral)
 
@@ -61,9 +63,9 @@ def mechanism(friction: float, servos: bool = False) -> Mechanism:
 def hopper(**settings: Any) -> SuiteTask:
     """Move half a metre along x and stay there: 40 knots of 50 ms at 100 Hz.
 
-    The nominal motion of every plan begins at x = 0 and ends at .5 m after 2 s, wherever the robot is by then, as in the
-    publication. A run of 5 s is a success when the torso ends within 50 mm of x = .5 m with its pitch within .2 rad of
-    .3. The start touches the ground, which that of the publication is 3.1 mm inside of.
+    The nominal motion of every plan begins at x = 0 and ends at .5 m after 2 s, wherever the robot is by then, as in
+    the publication. A run of 5 s is a success when the torso ends within 50 mm of x = .5 m with its pitch within .2 rad
+    of .3. The start touches the ground, which that of the publication is 3.1 mm inside of.
 
     Args:
         **settings: settings of `dojo.MPC`, instead of the ones of the task.
@@ -83,7 +85,10 @@ def hopper(**settings: Any) -> SuiteTask:
     goal[0] = 0.5
     begin[5] = goal[5] = 0.5 / (_KNOT * _HORIZON)
     target = Onward(sim, begin, goal, _KNOT * _HORIZON)
-    cost = [quadratic(begin, _KNOT, _HORIZON, (np.ones(5), 0.1), (10.0 * np.ones(5), 1.0)), servo_effort(sim, own, _KNOT * 0.1, _HORIZON)]
+    cost = [
+        quadratic(begin, _KNOT, _HORIZON, (np.ones(5), 0.1), (10.0 * np.ones(5), 1.0)),
+        servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
+    ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
     given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-3}

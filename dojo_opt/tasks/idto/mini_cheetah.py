@@ -13,7 +13,7 @@ from dojo_opt.mpc.moving import Onward
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
-from dojo_opt.tasks.idto.assembly import Link, assembled, from_com
+from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
 from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact, Input
@@ -42,7 +42,7 @@ def mechanism(friction: float, terrain: Terrain | None = None, servos: bool = Fa
     Returns:
         The mechanism, which stands.
     """
-    links = [Link("trunk", None, 3.3, (0.0, 0.0, 0.0), (0.012677, 0.017298, 0.024475), "floating")]
+    links = [FileLink("trunk", None, 3.3, (0.0, 0.0, 0.0), (0.012677, 0.017298, 0.024475), "floating")]
     for leg, (front, left) in _LEGS.items():
         turn = front * left  # of both diagonals
         abduction = (0.00024813, 0.00054315, 0.00045809, -turn * 7.3074e-5, 0.0, 0.0)
@@ -50,7 +50,7 @@ def mechanism(friction: float, terrain: Terrain | None = None, servos: bool = Fa
         shank = (0.00034489, 0.00034717, 5.7021e-6, 0.0, 0.0, -1.1541e-6)
         across, limits = (0.0, -1.0, 0.0), (-2.6, 2.6)
         links += [
-            Link(
+            FileLink(
                 f"{leg}_abduction",
                 "trunk",
                 0.54,
@@ -60,7 +60,7 @@ def mechanism(friction: float, terrain: Terrain | None = None, servos: bool = Fa
                 axis=(1.0, 0.0, 0.0),
                 limits=(-1.6, 1.6),
             ),
-            Link(
+            FileLink(
                 f"{leg}_thigh",
                 f"{leg}_abduction",
                 0.634,
@@ -70,7 +70,7 @@ def mechanism(friction: float, terrain: Terrain | None = None, servos: bool = Fa
                 axis=across,
                 limits=limits,
             ),
-            Link(
+            FileLink(
                 f"{leg}_shank",
                 f"{leg}_thigh",
                 0.064,
@@ -99,7 +99,7 @@ def mechanism(friction: float, terrain: Terrain | None = None, servos: bool = Fa
     neutral: dict[str, Any] = {"trunk": (0.0, 0.0, 0.29, 1.0, 0.0, 0.0, 0.0)}
     neutral |= {f"{leg}_{part}": angle for leg in _LEGS for part, angle in zip(parts, _STANCE, strict=True)}
     inputs = [
-        Input(f"{leg}_{part}", **({} if servos else {"limits": (-effort, effort)}))
+        Input(f"{leg}_{part}", limits=(-np.inf, np.inf) if servos else (-effort, effort))
         for leg in _LEGS
         for part, effort in zip(parts, _EFFORT, strict=True)
     ]
@@ -136,18 +136,21 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
     rates = np.concatenate([np.ones(6), np.full(12, 0.1)])
     running = np.concatenate([np.full(3, 10.0), np.full(3, quat), joints])
     end = np.concatenate([np.full(3, 10.0), np.full(3, 10.0 * quat), joints + 1.0])
-    cost = [quadratic(begin, _KNOT, _HORIZON, (running, rates), (end, rates)), servo_effort(sim, own, _KNOT * 0.01, _HORIZON)]
+    cost = [
+        quadratic(begin, _KNOT, _HORIZON, (running, rates), (end, rates)),
+        servo_effort(sim, own, _KNOT * 0.01, _HORIZON),
+    ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
     given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-3, "first": _FIRST}
     mpc = MPC(problem, reference=target, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05] + [0.1] * 12 + [0.1] * 18)
-    judge = _Judge(_WAY * speed / 0.4)
+    judge = _Walked(_WAY * speed / 0.4)
     return SuiteTask("idto.mini_cheetah", mpc, model, start, 10.0, spread, judge, _RATE, rise=2)
 
 
-class _Judge:
+class _Walked:
     """Whether the robot gets `far` [m] on its feet."""
 
     def __init__(self, far: float) -> None:

@@ -138,7 +138,9 @@ def _compensation(model: Any, group: GeomGroup, notes: Notes) -> float:
     shares = np.array([float(model.body_gravcomp[b]) for b in members])
     masses = np.array([float(model.body_mass[b]) for b in members])
     if np.ptp(shares[masses > 0.0]) > 0.0:
-        notes.add("gravity compensation acts at the centre of mass of bodies that are one here", [group.name], warn=True)
+        notes.add(
+            "gravity compensation acts at the centre of mass of bodies that are one here", [group.name], warn=True
+        )
     return float(shares @ masses / masses.sum())
 
 
