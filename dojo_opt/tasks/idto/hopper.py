@@ -9,6 +9,7 @@ import numpy as np
 from dojo_opt.gaits.equilibrium import equilibrium
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Onward
+from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort
@@ -91,7 +92,7 @@ def hopper(**settings: Any) -> SuiteTask:
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
     given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
-    given |= {"kappa": 1e-3}
+    given |= {"kappa": 1e-3, "first": Options(stages=(Stage(1e-3, 1e-3),))}
     mpc = MPC(problem, reference=target, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.array([0.1, 0.02, 0.1, 0.1, 0.1] + [0.1] * 5)

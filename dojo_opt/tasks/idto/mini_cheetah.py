@@ -26,7 +26,7 @@ _KNOT, _HORIZON, _RATE = 0.05, 20, 60.0  # [s], knots, [Hz]
 _WAY, _LOW, _TILT = 3.2, 0.15, 0.5  # [m] in 10 s, [m] and [rad] of the trunk
 _STANCE = (0.0, -0.8, 1.6)  # [rad] abduction, hip, knee
 _EFFORT = (18.0, 18.0, 26.0)  # [N m]
-_FIRST = Options(stages=(Stage(1e-3, 1e-3),))  # smoother contact holds a robot of 8 kg up without its feet
+_KAPPA = 5e-3  # [N s m] harder contact stands or falls, and from 1e-2 the robot hovers without a step
 _SERVO = 50.0, 2.0  # [N m/rad], [N m s/rad]
 _LEGS = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
 
@@ -125,7 +125,7 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
         TypeError: for an unknown setting.
         ValueError: for an argument out of range.
     """
-    sim = Simulator(mechanism(1.0, terrain, servos=True), time_step=_KNOT, kappa=1e-3)
+    sim = Simulator(mechanism(1.0, terrain, servos=True), time_step=_KNOT, kappa=_KAPPA)
     own = mechanism(2.0 / 3.0, terrain)
     begin = sim.neutral()
     start = lifted(sim, begin, 2)
@@ -142,7 +142,8 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
     given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
-    given |= {"kappa": 1e-3, "first": _FIRST}
+    given |= {"kappa": _KAPPA, "iterations": 3}
+    given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
     mpc = MPC(problem, reference=target, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)
     spread = np.array([0.05, 0.05, 0.01, 0.05, 0.05, 0.05] + [0.1] * 12 + [0.1] * 18)
