@@ -1,9 +1,12 @@
 """Tasks of published suites, and what they need of MPC: servos, targets that go along, plans that come late."""
 
+import json
+
 import numpy as np
 import pytest
 
 import dojo_opt as dojo
+from dojo_opt.cli import main
 from dojo_opt.cost import Effort, Tracking
 from dojo_opt.mpc.moving import Onward
 from dojo_opt.mpc.servo import ModelServo
@@ -159,3 +162,33 @@ def test_the_step_of_a_compensated_arm_is_differentiated_by_mass_gravity_and_tim
         e = 1e-5
         ends = [sim.with_parameters({name: value + d}).step(x, u).x for d in (e, -e)]
         np.testing.assert_allclose(slope.ravel(), (ends[0] - ends[1]) / (2.0 * e), rtol=1e-5, atol=1e-7)
+
+
+def test_a_task_runs_from_the_command_line(tmp_path, capsys):
+    page = tmp_path / "spinner.html"
+    command = ["run", "idto.spinner", "--set", "seed=1", "--seconds", "0.05", "--json", "--html", str(page)]
+    assert main(command) == 1  # the disc does not turn yet
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers["survived"] and not numbers["success"]
+    assert numbers["ticks"] == 10 and numbers["rate_hz"] == 200.0
+    assert page.stat().st_size > 1000
+    assert main(["run", "idto.spiner"]) == 2
+    assert "did you mean" in capsys.readouterr().err
+
+
+def test_a_task_runs_on_the_plant_of_mujoco():
+    """A finger pressed onto the disc turns it there, too, and MuJoCo's soft contact lets it in."""
+    pytest.importorskip("mujoco")
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    task = dojo.tasks.idto.spinner()
+    start = task.start.copy()
+    start[0] = 0.36
+    plants = [MujocoPlant(task.model, start), dojo.Plant(task.model, start)]
+    loops = [dojo.closed_loop(lambda time, x: np.array([3.0, 3.0]), plant, 0.4) for plant in plants]
+    assert np.abs(loops[0].x[:20, :2] - loops[1].x[:20, :2]).max() < 1e-3  # before they touch
+    assert min(loop.x[-1, 2] for loop in loops) > 0.1
+    depths = [task.outcome(loop).penetration for loop in loops]
+    assert depths[0] > 1e-4 > depths[1]
+    with pytest.raises(ValueError, match="only the start"):
+        plants[0].perturbed(dojo.Perturbation())
