@@ -29,6 +29,7 @@ from sim.mechanism.checks import nearest
 PROBLEMS = ("hop", "block", "swingup", "trot", "bound", "pace", "walk", "turn", "jump", "leap")
 GAITS = ("trot", "bound", "pace", "walk", "turn", "jump", "leap")
 LOOPS = ("hopper_mpc", "quadruped_mpc")  # run in closed loop with a plant
+SUITES = ("idto",)  # of tasks that are run by SUITE.TASK, such as idto.spinner
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -38,7 +39,7 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "Plan a reference problem, or run a closed-loop task."
     run = commands.add_parser("run", help="plan a reference problem, or run a closed-loop task", description=text)
-    run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS]))
+    run.add_argument("name", metavar="NAME", help=", ".join([*PROBLEMS, *LOOPS, "idto.TASK"]))
     run.add_argument(
         "--set",
         action="append",
@@ -53,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY=VALUE",
         help="change of the plant of a task, such as payload=1.0",
     )
-    run.add_argument("--seconds", type=float, metavar="S", help="length of a closed-loop task [s], 4 by default")
+    run.add_argument("--seconds", type=float, metavar="S", help="length of a closed loop [s]; 4, or that of its suite")
     run.add_argument("--out", "--plot", type=Path, metavar="FILE", help="write the figure of the plan (png, pdf, svg)")
     run.add_argument("--html", type=Path, metavar="FILE", help="write an animation that opens in a browser")
     run.add_argument("--json", action="store_true", help="print the result as JSON instead of a table")
@@ -92,9 +93,11 @@ def _arguments(pairs: Sequence[str]) -> dict[str, Any]:
 def _run(args: argparse.Namespace) -> int:
     if args.name in LOOPS:
         return _run_loop(args)
+    if args.name.partition(".")[0] in SUITES:
+        return _run_suite(args)
     name = args.name.removeprefix("quadruped_") if args.name.removeprefix("quadruped_") in GAITS else args.name
     if name not in PROBLEMS:
-        there = [*PROBLEMS, *LOOPS]
+        there = [*PROBLEMS, *LOOPS, *(f"{suite}.TASK" for suite in SUITES)]
         raise ValueError(f"no problem or task {args.name!r}; there are {', '.join(there)}{nearest(args.name, there)}")
     if args.perturb or args.seconds is not None:
         raise ValueError(f"--perturb and --seconds apply to closed loops ({', '.join(LOOPS)}); {name} is a plan")
@@ -141,6 +144,34 @@ def _run_loop(args: argparse.Namespace) -> int:
             times = "ticks: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms, {fallbacks} fallbacks"
             print(times.format(**numbers))
     return 0 if loop.survived else 1
+
+
+def _run_suite(args: argparse.Namespace) -> int:
+    suite, _, name = args.name.partition(".")
+    there = getattr(dojo.tasks, suite)
+    if name not in there.__all__:
+        raise ValueError(f"no task {args.name!r}; {suite} has {', '.join(there.__all__)}{nearest(name, there.__all__)}")
+    given = _arguments(args.set)
+    seed = given.pop("seed", None)
+    task = getattr(there, name)(**given)
+    loop = task.run(seed, task.plant(seed, **_arguments(args.perturb)), args.seconds)
+    outcome = task.outcome(loop)
+    if args.out:
+        dojo.plots.closed_loop(loop).savefig(args.out, dpi=150)
+    if args.html:
+        dojo.viewer.save_html(loop, args.html)
+    numbers = {"task": args.name, "success": outcome.success, "survived": loop.survived, "message": loop.message}
+    numbers |= {"seconds": loop.duration, "measures": outcome.measures, "ticks": len(loop.log)}
+    numbers |= {"tick_median_ms": outcome.median, "tick_99_ms": outcome.late, "fallbacks": outcome.fallbacks}
+    numbers |= {"rate_hz": task.rate, "penetration_mm": 1e3 * outcome.penetration}
+    if args.json:
+        print(json.dumps(numbers | {"time": loop.time.tolist(), "x": loop.x.tolist()}))
+    else:
+        print(f"{'success' if outcome.success else 'no success'}: {loop.message}")
+        print("  " + ", ".join(f"{what} {value:.3g}" for what, value in outcome.measures.items()))
+        ticks = "ticks at {rate_hz:g} Hz: median {tick_median_ms:.2f} ms, 99 % {tick_99_ms:.2f} ms of the processor"
+        print((ticks + ", {fallbacks} fallbacks; penetration {penetration_mm:.2g} mm").format(**numbers))
+    return 0 if outcome.success else 1
 
 
 def _models(args: argparse.Namespace) -> int:

@@ -112,7 +112,7 @@ def test_commands_of_the_pages_exist() -> None:
         if command == "report":
             assert name == "all" or name in dojo.report.STUDIES
         if command == "run":
-            assert name in cli.LOOPS or name.removeprefix("quadruped_") in cli.PROBLEMS
+            assert name in (*cli.LOOPS, *cli.SUITES) or name.removeprefix("quadruped_") in cli.PROBLEMS
     compared = re.findall(r"benchmarks/compare\.py (\w+)", text)
     assert set(compared) <= {"all", *compare.STUDIES} and "timing" in compared
 

@@ -42,6 +42,8 @@ def check(model: Model) -> None:
         raise ValueError("PyBullet: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("PyBullet: terrain and restitution are not represented")
+    if np.any(model.body_weight != 1.0):
+        raise ValueError("PyBullet: gravity compensation is not represented")
     if np.any(model.joint_lead):
         raise ValueError("PyBullet: joints that turn and slide in one are not represented")
     several = (model.joint_ntrans > 0) & (model.joint_ntrans + model.joint_nrot > 1)

@@ -45,6 +45,8 @@ def load(model: Model, time_step: float, approximation: str = "") -> DrakePlant:
         raise ValueError("Drake: collisions between bodies and closed loops and gears are not represented")
     if model.contact_terrain.any() or model.contact_restitution.any():
         raise ValueError("Drake: terrain and restitution are not represented")
+    if np.any(model.body_weight != 1.0):
+        raise ValueError("Drake: gravity compensation is not represented")
     if np.any(model.joint_lead):
         raise ValueError("Drake: joints that turn and slide in one are not represented")
     if not approximation and len(model.limit_dof):

@@ -107,7 +107,8 @@ def _body(model: Model, body: int, hinges: bool) -> list[str]:
     """<body> with its joints, inertia, contact spheres and children."""
     offset = model.joint_offset[body]
     pos = model.joint_parent_point[body] - _rotate(offset, model.joint_child_point[body])
-    lines = [_tag("body", {"name": f"body{body}", "pos": _numbers(pos), "quat": _numbers(offset)}, close=False)]
+    place = {"name": f"body{body}", "pos": _numbers(pos), "quat": _numbers(offset)}
+    lines = [_tag("body", place | {"gravcomp": _numbers(1.0 - model.body_weight[body])}, close=False)]
     J = model.body_inertia[body].reshape(3, 3)
     inertia = [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
     mass = {"pos": "0 0 0", "mass": _numbers(model.body_mass[body]), "fullinertia": _numbers(inertia)}

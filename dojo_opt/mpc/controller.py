@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dojo_opt.mpc.delay import Delay
+from dojo_opt.mpc.delay import Delay, Prediction
 from dojo_opt.mpc.ground import Ground
 from dojo_opt.mpc.horizon import shift_multipliers, tail
 from dojo_opt.mpc.measurement import Measurement
 from dojo_opt.mpc.moving import References
 from dojo_opt.mpc.policy import Policy
+from dojo_opt.mpc.servo import ModelServo, Servo
 from dojo_opt.mpc.settings import MPCSettings
 from dojo_opt.planning.ilqr import Iterate, Iteration, Solver
 from dojo_opt.planning.plan import Plan
@@ -25,6 +26,7 @@ from dojo_opt.plant.plant import Plant
 from dojo_opt.plant.tick import Tick
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.mechanism import Mechanism
 from solvers.status import Status
 
 Vector = NDArray[np.float64]
@@ -32,6 +34,7 @@ Matrix = NDArray[np.float64]
 Stack = NDArray[np.float64]
 
 _SCALES = (1.0, 0.5, 0.0)  # of the gains of the rollouts that guess="feedback" chooses from
+_ROUNDING = 1e-9  # [s] times are sums of floating-point steps
 _LOST = 10.0  # times the merit of the shifted plan: a rollout worse than that has left it
 
 __all__ = ["MPC"]
@@ -47,18 +50,19 @@ class MPC:
 
     Args:
         problem: its simulator is the model; the plant may be another one. Its start and guess are those of the first
-            plan only, which is solved to the end; `reference` overwrites its references.
+            plan only, which is solved to the end, with the settings `first`; `reference` overwrites its references.
         iterations: iterations of the planner per tick (default 1). One is enough for costs, control limits and
             equalities. An iteration that starts on the good side of an inequality does not see it; that takes about 3.
         reference: states to track over time, see `dojo_opt.mpc.moving.References` (default None: the reference of the
             problem at every tick).
         plan: the first plan, at the time of the first call (default None: that of `ilqr` without refinement).
-        **settings: period, kappa, kappa_grad, guess, gain_scale, delay, time_limit, mean_velocity, friction,
-            learn_ground, options, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
+        **settings: period, kappa, kappa_grad, guess, gain_scale, delay, computation, servo, feedforward, time_limit,
+            mean_velocity, friction, learn_ground, options, first, log; see `help(dojo_opt.mpc.settings.MPCSettings)`.
 
     Raises:
         TypeError: for an unknown setting, or an argument of the wrong kind.
-        ValueError: for a setting out of range, or a reference of the wrong shape.
+        ValueError: for a setting out of range, a reference of the wrong shape, or a plan that takes longer than its
+            period.
     """
 
     def __init__(
@@ -78,7 +82,16 @@ class MPC:
         self.period = float(self.settings.period or self.problem.knot_time)
         self._solver = Solver(self.problem, self.settings.planner(iterations))
         self.references = References(self.problem, reference)
+        if self.settings.computation > self.period + _ROUNDING:
+            raise ValueError(
+                f"MPC(computation={self.settings.computation:g}): a plan takes longer than the period of "
+                f"{self.period:g} s in which the next one begins"
+            )
         self._delay = Delay(self.sim, self.settings.delay)
+        self._predict = Prediction(self.sim, self.settings.computation)
+        servo = self.settings.servo
+        self._actuator = ModelServo(self.sim, servo) if isinstance(servo, Mechanism) else None
+        self._servo = None if servo is None or isinstance(servo, Mechanism) else Servo(self.sim, servo)
         terms = (t for t in self.problem.costs if isinstance(t, StateTerm) and t.knots[0] == 0)
         self._tracking = next(terms, None)  # whose error is logged
         self._first = plan
@@ -118,7 +131,8 @@ class MPC:
     def reset(self) -> None:
         """Forget plan, measurements and log."""
         self.log: list[Tick] = []
-        self.policy: Policy | None = None
+        self.policy: Policy | None = None  # in force
+        self._next: Policy | None = None  # made, and not yet in force
         self._measured = Measurement(self.sim, self.settings.mean_velocity)
         self._delay.forget(self.problem.controls0[0])
         self._due = -np.inf
@@ -134,7 +148,8 @@ class MPC:
             x: (nx,) measured state.
 
         Returns:
-            (nu,) input [N, N m]; with a `delay`, that for time + delay.
+            (nu,) input [N, N m], of servos in the model the forces of their actuators; with a `delay`, that for time +
+            delay.
 
         Raises:
             ValueError: for a time before the last plan, or a state of the wrong shape or with numbers that are not
@@ -146,38 +161,59 @@ class MPC:
             raise ValueError(f"MPC(time): expected a time after {last:g} s, got {now:g} s; call reset() to start again")
         measured = checks.array("MPC(x)", x, (self.sim.nx,))
         self._measured.add(now, measured)
+        if self._next is not None and now >= self._next.time - _ROUNDING:
+            self.policy, self._next = self._next, None
         if self.policy is None:
             self._begin(now)
-        elif now >= self._due - 1e-9:
+        elif now >= self._due - _ROUNDING:
             self._tick(now, self.policy)
-        return self._command(now)
+        u = self._command(now, self._measured.state(), measured)
+        self._delay.issue(now, u)
+        return u if self._actuator is None else self._actuator(u, measured)
 
-    def _command(self, now: float) -> Vector:
-        """The planned input, with feedback unless it is switched off."""
+    def _command(self, now: float, x: Vector, sample: Vector) -> Vector:
+        """The planned input, with feedback unless it is switched off.
+
+        x: (nx,) measured state as the model means it, sample: as it was measured.
+        """
         policy, settings = self.policy, self.settings
         assert policy is not None
-        u = policy.control(now + settings.delay)
-        scale = 1.0 if self.log[-1].fallback else settings.gain_scale
-        if scale > 0.0:
-            u += scale * policy.feedback(now, self._measured.state())
+        u = policy.control(now + settings.delay) if settings.feedforward else np.zeros(self.sim.nu)
+        scale = 1.0 if self.log and self.log[-1].fallback else settings.gain_scale
+        if self._servo is not None:
+            u += self._servo(policy, now, sample)
+        elif scale > 0.0:
+            u += scale * policy.feedback(now, x)
         limits = self.problem.control_limits
         if limits is not None:
             np.clip(u, *limits, out=u)
-        self._delay.issue(now, u)
         return u
+
+    def _ahead(self, now: float) -> Vector:
+        """State (nx,) of the model when the plan that begins now takes effect."""
+        if self.settings.computation and self.policy is not None:
+            return self._predict(now, self._measured, lambda time, x: self._command(time, x, x))
+        return self._delay.ahead(now, self._measured)
+
+    @property
+    def _later(self) -> float:
+        """Time from a measurement to the plan made from it [s]."""
+        settings = self.settings
+        return settings.delay if self.policy is None else settings.delay + settings.computation
 
     def _begin(self, now: float) -> None:
         """The first plan."""
         begin = clock.perf_counter(), clock.thread_time()
         self._due = now + self.period
-        self.references.move(now + self.settings.delay)
         self.problem.start = self._delay.ahead(now, self._measured)
-        plan = self._first or Solver(self.problem).solve()
+        self.references.move(now + self.settings.delay, x=self.problem.start)
+        plan = self._first or Solver(self.problem, self.settings.first).solve()
         shape = (self.problem.horizon, self.sim.nu)
         if plan.u.shape != shape:
             raise ValueError(f"MPC(plan=...): expected inputs of shape {shape}, got {plan.u.shape}")
         self._solver.reset(plan.multipliers)
         self.policy = self._policy(now, plan.x, plan.u, plan.K)
+        self._next = None
         fallback = not np.isfinite(plan.fun) or plan.status == Status.SIMULATION_FAILED
         self._record(now, begin, plan.status, fallback, plan.nit, plan.fun, 1.0, plan.x[0])
 
@@ -185,12 +221,12 @@ class MPC:
         """Shift, iterate, and take the new plan when it is one."""
         begin = clock.perf_counter(), clock.thread_time()
         solver, problem = self._solver, self.problem
-        start = solver.states("MPC(x)", self._delay.ahead(now, self._measured))
+        start = solver.states("MPC(x)", self._ahead(now))
         if self.settings.learn_ground:
             self._ground.learn(old, now, self._measured.last[1], self._measured.first)
         self._due = now + self.period
-        self.references.move(now + self.settings.delay, self._ground.rise)
-        shifted = old.shifted(now + self.settings.delay, lambda count: tail(old, self.references, count))
+        self.references.move(now + self._later, self._ground.rise, start)
+        shifted = old.shifted(now + self._later, lambda count: tail(old, self.references, count))
         problem.start = start
         shift_multipliers(problem.constraints, (now - self.log[-1].time) / problem.knot_time)
         guess = self._guess(shifted)
@@ -205,7 +241,11 @@ class MPC:
         if after is None and result.status in (Status.SOLVED, Status.LINE_SEARCH):
             after = self._rolled(result)
         if after is not None:
-            self.policy = self._policy(now, after.x, after.u, result.K.copy())
+            made = self._policy(now, after.x, after.u, result.K.copy())
+            if self.settings.computation:
+                self._next = made
+            else:
+                self.policy = made
         cost = self.log[-1].cost if after is None else after.cost
         iterations = len(result.history)
         self._record(now, begin, result.status, not taken, iterations, cost, result.alpha, shifted.x[0])
@@ -217,9 +257,8 @@ class MPC:
 
     def _policy(self, now: float, x: Matrix, u: Matrix, K: Stack) -> Policy:
         """A plan made at `now`, which starts when its first input can act."""
-        delay = self.settings.delay
-        lead = (now, self._measured.state()) if delay else None
-        return Policy(self.sim, now + delay, x, u, K, self.problem.substeps, lead)
+        lead = (now, self._measured.state()) if self.settings.delay else None
+        return Policy(self.sim, now + self._later, x, u, K, self.problem.substeps, lead)
 
     def _usable(self, result: Iteration) -> bool:
         """Whether the result is a trajectory of the model, up to the gaps that a short step leaves open."""

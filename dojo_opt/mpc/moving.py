@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.planning.names import chosen_components
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import PickTerm, StateTerm
 from sim.mechanism import checks
@@ -20,7 +21,7 @@ Moving = Callable[[Any], ArrayLike]  # times (n,) [s] -> rows (n, nx) or (n, nu)
 
 _ROUNDING = 1e-9  # laps: times are sums of floating-point steps
 
-__all__ = ["References", "Sampled"]
+__all__ = ["Onward", "References", "Sampled"]
 
 
 class Sampled:
@@ -112,11 +113,70 @@ class Sampled:
         return Sampled(self.time, rows, sim, self.cycle)
 
 
+class Onward:
+    """A target that goes along with the robot: the reference of a velocity, or of a ramp that every plan begins anew.
+
+        x(t) = begin + (end - begin) min(s, 1),  s = (t - t0) / duration,  on the manifold
+
+    t0 is the beginning of the present horizon. The `anchored` coordinates begin where the robot is measured at t0, and
+    do not stop at the end of the ramp: a constant velocity for ever.
+
+    Args:
+        sim: simulator of the model.
+        begin: (nx,) first state.
+        end: (nx,) state after the duration (default None: the first one).
+        duration: length of the ramp [s].
+        anchored: numbers below nv, or names as in `Mechanism.components`, of coordinates that begin where they are
+            measured (default none).
+
+    Raises:
+        ValueError: for an argument of the wrong shape or out of range, or an unknown name.
+    """
+
+    def __init__(
+        self, sim: Simulator, begin: ArrayLike, end: ArrayLike | None = None, duration: float = 1.0, anchored: Any = ()
+    ) -> None:
+        self.begin = checks.array("Onward(begin)", begin, (sim.nx,))
+        self._end = self.begin if end is None else checks.array("Onward(end=...)", end, (sim.nx,))
+        self._duration = checks.number("Onward(duration=...)", duration, above=0.0)
+        self._step = sim.difference(self._end, self.begin)
+        self._on = np.zeros(sim.ndx, dtype=bool)
+        if np.size(anchored):
+            self._on[chosen_components("Onward(anchored=...)", anchored, sim)] = True
+        self._sim = sim
+        self.anchor(0.0, self.begin)
+
+    def anchor(self, time: float, x: Vector) -> None:
+        """Begin anew.
+
+        Args:
+            time: beginning of the horizon [s].
+            x: (nx,) state there.
+        """
+        self._t0, sim = time, self._sim
+        off = np.where(self._on, sim.difference(np.asarray(x), self.begin), 0.0)
+        self._from = sim.integrate(self.begin, off)
+
+    def __call__(self, times: ArrayLike) -> Matrix:
+        """The target at given times.
+
+        Args:
+            times: (n,) times [s].
+
+        Returns:
+            (n, nx) states.
+        """
+        share = (np.asarray(times, dtype=np.float64)[:, None] - self._t0) / self._duration
+        share = np.where(self._on, share, np.clip(share, 0.0, 1.0))
+        return self._sim.integrate(self._from, share * self._step)
+
+
 class References:
     """The costs of a problem whose references move, and the functions that move them.
 
     A function takes times (n,) [s] and returns rows (n, nx) or (n, nu). A trajectory is rows one knot apart, or
-    anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero.
+    anything with `x` (n, nx) and `time` (n,), such as a plan. Both start at time zero. A function with a method
+    anchor(time, x), such as `Onward`, is told the beginning of each horizon and the state there before it is called.
 
     Args:
         problem: the problem; the references of its terms are overwritten.
@@ -144,7 +204,8 @@ class References:
             if not isinstance(term, StateTerm | PickTerm):
                 raise ValueError(f"{call}: the reference of a {term.name} cannot move")
             self._moving.append((term, self._function(call, value, isinstance(term, StateTerm))))
-        self.state: Moving | None = next((f for term, f in self._moving if isinstance(term, StateTerm)), None)
+        states = (f for term, f in self._moving if isinstance(term, StateTerm) and not hasattr(f, "anchor"))
+        self.state: Moving | None = next(states, None)  # one that is a function of time alone
         self._call_checked(0.0)
         self._begin = np.nan  # [s] of the first knot
         self.rise = 0.0  # [m] of a floating base, at the last move
@@ -169,15 +230,18 @@ class References:
             times = time + self._h * term.knots
             checks.array(f"MPC(reference=...) at {times.size} times", function(times), term.reference.shape)
 
-    def move(self, time: float, rise: float = 0.0) -> None:
+    def move(self, time: float, rise: float = 0.0, x: Vector | None = None) -> None:
         """Move the references to the present.
 
         Args:
             time: time of the first knot [s].
             rise: height of the ground, added to that of a floating base [m].
+            x: (nx,) state at the first knot, for functions that are anchored there (default None: they stay).
         """
         self._begin, self.rise = time, rise
         for term, function in self._moving:
+            if x is not None and hasattr(function, "anchor"):
+                function.anchor(time, x)
             term.reference[:] = function(time + self._h * term.knots)
             if rise and isinstance(term, StateTerm):
                 term.reference[:, 2] += rise

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
 from sim.mechanism.checks import whole_number
+from sim.mechanism.mechanism import Mechanism
 
 # penalties that grew with every tick would never stop; a second line search would take its time
 OPTIONS = Options(halvings=4, penalty_growth=1.0, tolerance=1e-6, shooting=0.0)
@@ -28,6 +31,14 @@ class MPCSettings:
             state under the gains, "open loop" without them (default "states").
         gain_scale: factor of the feedback between plans; 0 applies the planned inputs without feedback (default 1).
         delay: time from a measurement to the input that it causes [s]; plans start that much later (default 0).
+        computation: time that a plan takes [s]: a plan takes effect that much after the measurement it was made from,
+            and starts from where the plan before, which stays in force until then, leads the model (default 0). Unlike
+            `delay`, it lets measurements act at once, through the feedback.
+        servo: (kp, kd), each a number or (nu,), of servos that follow the plan in place of the planner's gains [N/m,
+            N m/rad; N s/m, N m s/rad]; or the mechanism of the robot, where the springs and dampers that the model's
+            driven joints have beyond it are servos: the controller then returns the forces of their actuators. See
+            `dojo_opt.mpc.servo` (default None).
+        feedforward: whether the planned inputs are applied, too; without them a servo has to be there (default True).
         time_limit: limit of the wall time of a tick, looked at before each iteration [s] (default inf).
         mean_velocity: whether the velocity is taken from the coordinates one step of the model ago (default True);
             see `dojo_opt.mpc.measurement`.
@@ -36,6 +47,7 @@ class MPCSettings:
         learn_ground: whether to take the height of the ground from the standing contacts (default False).
         options: settings of the planner in a tick (default None: `OPTIONS`); its stage is made from kappa and
             kappa_grad.
+        first: settings of the planner for the first plan (default None: those of `ilqr`).
         log: number of the last ticks that `MPC.log` keeps, about 1 kB each; None keeps all (default 10,000).
     """
 
@@ -45,24 +57,36 @@ class MPCSettings:
     guess: str = "states"
     gain_scale: float = 1.0
     delay: float = 0.0
+    computation: float = 0.0
+    servo: tuple[ArrayLike, ArrayLike] | Mechanism | None = None
+    feedforward: bool = True
     time_limit: float = float("inf")
     mean_velocity: bool = True
     friction: float | None = None
     learn_ground: bool = False
     options: Options | None = None
+    first: Options | None = None
     log: int | None = 10_000
 
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:
             raise ValueError(f"MPC(guess=...): expected one of {GUESSES}, got {self.guess!r}")
-        if self.options is not None and not isinstance(self.options, Options):
-            raise TypeError(f"MPC(options=...): expected Options, got {self.options!r}")
+        for name in ("options", "first"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, Options):
+                raise TypeError(f"MPC({name}=...): expected Options, got {value!r}")
         for name, above in (("kappa", 0.0), ("time_limit", 0.0), ("period", 0.0), ("kappa_grad", 0.0)):
             value = getattr(self, name)
             if value is not None and not value > above:
                 raise ValueError(f"MPC({name}=...): expected a number > 0, got {value}")
-        for name in ("gain_scale", "delay"):
+        for name in ("gain_scale", "delay", "computation"):
             checks.number(f"MPC({name}=...)", getattr(self, name), at_least=0.0)
+        if self.delay and self.computation:
+            raise ValueError("MPC(delay=..., computation=...): give one of them, got both")
+        if not self.feedforward and self.servo is None:
+            raise ValueError(
+                "MPC(feedforward=False): without a servo nothing would drive the robot; give servo=(kp, kd)"
+            )
         if self.log is not None:
             whole_number("MPC(log=...)", self.log)
         if self.friction is not None:

@@ -47,7 +47,7 @@ def arriving_momentum(model: Model, h: float, end: Arrival, origin: Vec3, fall: 
     for i in range(model.body_parent.shape[0]):
         P, t, m = out[i], end.turn[i], model.body_mass[i]
         for k in range(3):
-            P[k] = m * (end.move[i, k] / h + fall * model.gravity[k])
+            P[k] = m * (end.move[i, k] / h + fall * model.body_weight[i] * model.gravity[k])
         x, y, z = end.pos[i, 0] - origin[0], end.pos[i, 1] - origin[1], end.pos[i, 2] - origin[2]
         mx, my, mz = cross(x, y, z, P[0], P[1], P[2])
         a, b, c = angular_momentum(end.inertia, i, h, t[0], -t[1], -t[2], -t[3])
@@ -182,11 +182,12 @@ def kinetic_energy(model: Model, data: Data, h: float, x: Vector) -> float:
 
 @kernel
 def gravity_energy(model: Model, pos: Matrix) -> float:
-    """Sum of -m g.x [J].   pos: (nbody, 3) positions of the bodies, or displacements."""
+    """Sum of -m g.x [J], of g the share that acts.   pos: (nbody, 3) positions of the bodies, or displacements."""
     energy = 0.0
     for i in range(pos.shape[0]):
+        m = model.body_mass[i] * model.body_weight[i]
         for k in range(3):
-            energy -= model.body_mass[i] * model.gravity[k] * pos[i, k]
+            energy -= m * model.gravity[k] * pos[i, k]
     return energy
 
 

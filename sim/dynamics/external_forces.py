@@ -42,7 +42,7 @@ def outer_wrenches(model: Model, data: Data, u: Vector, out: Matrix) -> None:
     n = model.body_parent.shape[0]
     o, g = data.origin, model.gravity
     for i in range(n):
-        m = model.body_mass[i]
+        m = model.body_mass[i] * model.body_weight[i]
         F = out[i]
         e = data.external[i]
         F[0], F[1], F[2] = m * g[0] + e[0], m * g[1] + e[1], m * g[2] + e[2]
@@ -80,7 +80,7 @@ def outer_slopes(model: Model, data: Data, u: Vector, out: Matrix) -> None:
         for k in range(36):
             out[i, k] = 0.0
         for k in range(3):
-            w[k] = model.body_mass[i] * model.gravity[k] + data.external[i, k]
+            w[k] = model.body_mass[i] * model.body_weight[i] * model.gravity[k] + data.external[i, k]
         _add_force_slope(w, data.pos2[i, 0] - o[0], data.pos2[i, 1] - o[1], data.pos2[i, 2] - o[2], out[i])
     for j in range(u.shape[0]):
         if model.input_kind[j] == InputKind.JOINT:

@@ -70,7 +70,7 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
         world_inertia(model, data.rot2, data.inertia_world)
         mean_momenta(model, data, h)
     for i in range(model.body_parent.shape[0]):
-        m = h * model.body_mass[i]
+        m = h * model.body_mass[i] * model.body_weight[i]
         for k in range(3):
             data.momentum_in[i, k] += m * model.gravity[k]
             data.momentum_in[i, k] += h * data.external[i, k]

@@ -75,6 +75,7 @@ def _pack_tree(mech: Mechanism, model: Model) -> None:
         model.body_qadr[i + 1] = model.body_qadr[i] + joint.nq
         model.body_vadr[i + 1] = model.body_vadr[i] + joint.nv
         model.body_mass[i] = body.mass
+        model.body_weight[i] = 1.0 - body.gravity_compensation
         model.body_leaf[i] = body.name not in carrying
         model.body_inertia[i] = np.ravel(np.asarray(body.inertia, dtype=np.float64))
 

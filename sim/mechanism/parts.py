@@ -55,6 +55,8 @@ class Body:
             ground (`Mechanism.on`), obstacles and other bodies where asked, each with its own friction and restitution.
             Several shapes share the mass by their volumes; `shapes` has them as a tuple.
         visuals: picture of the body, where it is another one than the shapes (default none).
+        gravity_compensation: share of its weight that is taken off it: 1 for a body that floats, such as the link of an
+            arm whose drives carry it, 0 for none (default 0).
 
     Raises:
         ValueError: for a value out of range, or an inertia that no rigid body has; the message names the body.
@@ -65,6 +67,7 @@ class Body:
     inertia: ArrayLike | None = None
     shape: Solid | Sequence[Solid] | None = None
     visuals: Sequence[Visual] = ()
+    gravity_compensation: float = 0.0
 
     def __post_init__(self) -> None:
         checks.name("Body(name=...)", self.name)
@@ -73,6 +76,8 @@ class Body:
         if self.mass != 0 or self.inertia is not None or self.shape is not None:
             object.__setattr__(self, "mass", checks.number(f"{call}, mass=...)", self.mass, above=0.0))
         object.__setattr__(self, "inertia", inertia_of(call, self))
+        compensation = checks.number(f"{call}, gravity_compensation=...)", self.gravity_compensation)
+        object.__setattr__(self, "gravity_compensation", compensation)
         object.__setattr__(self, "visuals", tuple(self.visuals))
         for visual in self.visuals:
             if not isinstance(visual, Visual):

@@ -75,6 +75,7 @@ class Model(NamedTuple):
     input_index: Integers  # (nu,) degree of freedom, or body
     # numbers
     body_mass: Vector  # (nbody,) [kg]
+    body_weight: Vector  # (nbody,) share of gravity that acts, 1 without compensation
     body_inertia: Matrix  # (nbody, 9) about the centre of mass, body axes [kg m^2]
     joint_parent_point: Matrix  # (nbody, 3) joint frame in the parent body, from its centre of mass [m]
     joint_child_point: Matrix  # (nbody, 3) joint point in the child body, from its centre of mass [m]

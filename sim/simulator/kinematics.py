@@ -197,7 +197,8 @@ class Kinematics:
             (..., nv) forces and torques [N, N m].
         """
         J, _ = self._body_jacobians(self._q("Kinematics.gravity_torques(q)", q))
-        weight = np.outer(self._mass, np.asarray(self.mechanism.gravity))
+        share = np.array([1.0 - b.gravity_compensation for b in self.mechanism.bodies])
+        weight = np.outer(share * self._mass, np.asarray(self.mechanism.gravity))
         return -np.einsum("bk,...bkd->...d", weight, J[..., :3, :])
 
     def bias_forces(self, q: ArrayLike, v: ArrayLike) -> Floats:

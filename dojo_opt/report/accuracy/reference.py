@@ -86,7 +86,9 @@ class TreeReference:
             lin[i] -= _skew(r) @ ang[i]
             m, J = model.body_mass[i], R[i] @ model.body_inertia[i].reshape(3, 3) @ R[i].T
             M += m * lin[i].T @ lin[i] + ang[i].T @ J @ ang[i]
-            f += m * lin[i].T @ (model.gravity - acc[i]) - ang[i].T @ (J @ alpha[i] + _cross(w[i], J @ w[i]))
+            f += m * lin[i].T @ (model.body_weight[i] * model.gravity - acc[i]) - ang[i].T @ (
+                J @ alpha[i] + _cross(w[i], J @ w[i])
+            )
         return np.asarray(np.linalg.solve(M, f))
 
     def _joint_forces(self, q: Floats, v: Floats, u: Floats | None) -> Floats:

@@ -40,13 +40,13 @@ def moment(data: Data, i: int, f: Vec3, t: Vec3) -> Vec3:
 
 @kernel
 def add_mass(model: Model, data: Data, h: float, i: int, w: float, col: int) -> None:
-    """f = (x3 - 2 x2 + x1)/h - h g"""
-    g = model.gravity
+    """f = (x3 - 2 x2 + x1)/h - h g, of g the share that acts"""
+    g, s = model.gravity, h * model.body_weight[i]
     a, b, c = data.pos1[i], data.pos2[i], data.pos3[i]
     f = (
-        (c[0] - 2.0 * b[0] + a[0]) / h - h * g[0],
-        (c[1] - 2.0 * b[1] + a[1]) / h - h * g[1],
-        (c[2] - 2.0 * b[2] + a[2]) / h - h * g[2],
+        (c[0] - 2.0 * b[0] + a[0]) / h - s * g[0],
+        (c[1] - 2.0 * b[1] + a[1]) / h - s * g[1],
+        (c[2] - 2.0 * b[2] + a[2]) / h - s * g[2],
     )
     add_wrench(model, data, i, f, moment(data, i, f, (0.0, 0.0, 0.0)), w, col)
 
@@ -92,10 +92,10 @@ def add_inertia(model: Model, data: Data, h: float, i: int, e: int, w: float, co
 
 @kernel
 def add_gravity(model: Model, data: Data, h: float, k: int, w: float, col: int) -> None:
-    """f = -h m e_k on every body"""
+    """f = -h m e_k on every body, of gravity the share that acts"""
     e = unit_vector(k)
     for i in range(model.body_parent.shape[0]):
-        m = -h * model.body_mass[i]
+        m = -h * model.body_mass[i] * model.body_weight[i]
         f = (m * e[0], m * e[1], m * e[2])
         add_wrench(model, data, i, f, moment(data, i, f, (0.0, 0.0, 0.0)), w, col)
 
@@ -224,7 +224,7 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
     h, g = at.h, model.gravity
     X = data.columns
     for i in range(model.body_parent.shape[0]):
-        m = -2.0 * model.body_mass[i]
+        m = -2.0 * model.body_mass[i] * model.body_weight[i]
         b = data.balance[i]
         e = data.external[i]
         f = (m * g[0] - 2.0 * e[0], m * g[1] - 2.0 * e[1], m * g[2] - 2.0 * e[2])

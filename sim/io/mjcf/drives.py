@@ -90,8 +90,6 @@ def left_out(model: Any, collisions: bool, notes: Notes) -> None:
             notes.add(f"{what} is left out", warn=True)
     if model.opt.density or model.opt.viscosity:
         notes.add("the drag of a fluid is left out", warn=True)
-    if np.any(model.body_gravcomp):
-        notes.add("gravity compensation is left out", warn=True)
     moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] != 0]
     types, affinities = model.geom_contype[moving], model.geom_conaffinity[moving]
     if collisions or not len(moving):

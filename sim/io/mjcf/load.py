@@ -120,11 +120,28 @@ def _tree(
     for group in groups:
         carried = carry(model, group, merge, notes)
         inertia = group.inertia
-        solid = Body(group.name, inertia.mass, inertia.inertia, body_shapes(model, group)) if inertia.mass else None
-        bodies += [*carried.bodies, solid or Body(group.name, 0.0)]
+        if inertia.mass:
+            floats = _compensation(model, group, notes)
+            shapes = body_shapes(model, group)
+            solid = Body(group.name, inertia.mass, inertia.inertia, shapes, gravity_compensation=floats)
+        else:
+            solid = Body(group.name, 0.0)
+        bodies += [*carried.bodies, solid]
         joints += carried.joints
         homes |= carried.homes
     return bodies, joints, homes
+
+
+def _compensation(model: Any, group: GeomGroup, notes: Notes) -> float:
+    """The gravity compensation of the bodies that are one here: their mean by mass, with a note where they differ."""
+    members = list(group.members)
+    shares = np.array([float(model.body_gravcomp[b]) for b in members])
+    masses = np.array([float(model.body_mass[b]) for b in members])
+    if np.ptp(shares[masses > 0.0]) > 0.0:
+        notes.add(
+            "gravity compensation acts at the centre of mass of bodies that are one here", [group.name], warn=True
+        )
+    return float(shares @ masses / masses.sum())
 
 
 def _compile(source: str | Path) -> tuple[Any, str]:

@@ -1,0 +1,99 @@
+"""Contact-implicit MPC on published task suites: successes, tick times and penetration, beside the published rates.
+
+    NUMBA_NUM_THREADS=1 python benchmarks/mpc_suites.py [TASK ...] [--runs N]
+
+Tasks are those of IDTO (arXiv 2309.01813): costs, horizons, rates and the delay of one tick are theirs, contact is
+ours. Every task runs from its start and from N perturbed ones, on two plants: ours, at 1 ms with kappa 1e-8, and
+MuJoCo's with its default contacts, where it is installed. Measured here: everything but the rates. The publication
+replans at these on four threads, and gives no rates of success: what counts as one is said by `help(TASK)`. Ticks are
+timed by the processor, on one core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from command import deliver, number, parser, progress
+
+import dojo_opt as dojo
+from dojo_opt.plant.tick import milliseconds
+from dojo_opt.report.result import Cell, Report, Row, Table
+
+TASKS = tuple(dojo.tasks.idto.__all__)
+OURS, MUJOCO = "ours, 1 ms, kappa 1e-8", "MuJoCo, default contacts"
+HEADER = (
+    *("task", "succeed", "of", "replans at [Hz]", "allowed [ms]", "tick [ms]", "99 % [ms]", "fell back", "of ticks"),
+    *("penetration [mm]", "measured in the first run", "other ends"),
+)
+QUICK = 0.2  # [s] of a run that only checks that it runs
+
+
+def starts(task: Any, kind: str, runs: int) -> list[Any]:
+    """The plant of the given start, and of perturbed ones."""
+    seeds: list[int | None] = [None, *range(runs)]
+    if kind == OURS:
+        return [task.plant(seed) for seed in seeds]
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    return [MujocoPlant(task.model, task.begin(seed)) for seed in seeds]
+
+
+def line(task: Any, kind: str, runs: int, seconds: float | None) -> tuple[list[Cell], list[Any]]:
+    """One line of a table, and the outcomes behind it."""
+    loops = [task.run(plant=plant, seconds=seconds) for plant in starts(task, kind, runs)]
+    outcomes = [task.outcome(loop) for loop in loops]
+    cpu = np.concatenate([milliseconds(loop.log, cpu=True) for loop in loops])
+    times = [float(np.median(cpu)), float(np.percentile(cpu, 99))] if cpu.size else [np.nan, np.nan]
+    fallbacks, ticks = sum(o.fallbacks for o in outcomes), sum(len(loop.log) for loop in loops)
+    depth = 1e3 * max(o.penetration for o in outcomes)
+    first = ", ".join(f"{name} {value:.3g}" for name, value in outcomes[0].measures.items())
+    ends = "; ".join(sorted({loop.message for loop in loops if not loop.survived})[:3])
+    succeeded = sum(o.success for o in outcomes)
+    cells: list[Cell] = [task.name, succeeded, len(loops), task.rate, 1e3 / task.rate, *times, fallbacks, ticks, depth]
+    return [*cells, first, ends], outcomes
+
+
+def run(args: argparse.Namespace) -> Report:
+    """What was asked for."""
+    report = Report("MPC on published suites", "")
+    kinds = [OURS] + ([MUJOCO] if find_spec("mujoco") is not None else [])
+    runs, seconds = (1, QUICK) if args.quick else (args.runs, None)
+    tasks = {name: getattr(dojo.tasks.idto, name)() for name in args.tasks}
+    for kind in kinds:
+        lines = []
+        for name in progress()([(n, n) for n in args.tasks], kind):
+            cells, outcomes = line(tasks[name], kind, runs, seconds)
+            lines.append(cells)
+            report.rows += rows(f"{name}, {kind}", cells, tasks[name].rate, bars=not args.quick)
+            report.details[f"{name}, {kind}"] = [outcome._asdict() for outcome in outcomes]
+        report.tables.append(Table(f"IDTO's tasks, plant: {kind}", HEADER, lines))
+    report.notes.append("Rates are those of the publication, on four threads; all else was measured here, on one core.")
+    return report
+
+
+def rows(name: str, cells: list[Cell], rate: float, bars: bool) -> list[Row]:
+    """The numbers of a line: nine of ten runs have to succeed, and a tick has to fit into its period."""
+    _, succeeded, runs, _, _, tick, late, _, _, depth, *_ = cells
+    least = int(np.ceil(0.9 * float(runs or 0))) if bars else None
+    return [
+        Row(f"{name}: succeed", float(succeeded or 0), f"of {runs}", least, at_least=True),
+        number(f"{name}: tick, median", float(tick or 0.0), 1e3 / rate if bars else None, unit="ms"),
+        number(f"{name}: tick, 99 %", float(late or 0.0), unit="ms"),
+        number(f"{name}: penetration", float(depth or 0.0), 0.1 if bars and OURS in name else None, unit="mm"),
+    ]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report."""
+    arguments = parser(__doc__)
+    arguments.add_argument("tasks", nargs="*", default=list(TASKS), metavar="TASK", help=", ".join(TASKS))
+    arguments.add_argument("--runs", type=int, default=10, help="perturbed starts per task")
+    return deliver("mpc_suites", run, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

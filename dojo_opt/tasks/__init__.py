@@ -1,0 +1,18 @@
+"""Closed-loop tasks: an MPC with its reference, ready to run on a plant; `idto` has those of a published suite."""
+
+from typing import TYPE_CHECKING, Any
+
+from dojo_opt.tasks import idto
+from dojo_opt.tasks.hopping import Hopping, hopper_mpc
+from dojo_opt.tasks.plants import plant
+from dojo_opt.tasks.trotting import quadruped_mpc
+from sim.mechanism.checks import nearest
+
+__all__ = ["Hopping", "hopper_mpc", "idto", "plant", "quadruped_mpc"]
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A name that is not there, with the ones that are."""
+        raise AttributeError(f"dojo_opt.tasks has no {name!r}; there are {', '.join(__all__)}{nearest(name, __all__)}")

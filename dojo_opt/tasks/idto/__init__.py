@@ -1,0 +1,32 @@
+"""Tasks of IDTO (Kurtz, Castro, Onol, Lin: arXiv 2309.01813) with hard contact: costs, horizons and rates are theirs.
+
+Every builder returns a `SuiteTask`:
+
+    task = dojo.tasks.idto.spinner()
+    loop = task.run()
+    print(task.outcome(loop))
+
+Theirs are contacts by springs that act at a distance, where ours are hard; the plans of both take effect one tick after
+the measurement, and PD controllers follow them in between. The publication gives rates and no rates of success: what
+counts as one is ours, and is said with each task. Models are typed from their files, in axes of our own.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from dojo_opt.tasks.idto.acrobot import acrobot
+from dojo_opt.tasks.idto.allegro import allegro
+from dojo_opt.tasks.idto.hopper import hopper
+from dojo_opt.tasks.idto.jaco_ball import jaco_ball
+from dojo_opt.tasks.idto.mini_cheetah import mini_cheetah
+from dojo_opt.tasks.idto.spinner import spinner
+from sim.mechanism.checks import nearest
+
+__all__ = ["acrobot", "allegro", "hopper", "jaco_ball", "mini_cheetah", "spinner"]
+
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A task that is not there, with the ones that are."""
+        raise AttributeError(f"dojo_opt.tasks.idto has no {name!r}; there are {', '.join(__all__)}"
+                             f"{nearest(name, __all__)}")  # fmt: skip

@@ -1,0 +1,204 @@
+"""A hand of four fingers turns a ball on its palm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.mpc.controller import MPC
+from dojo_opt.planning.options import Options, Stage
+from dojo_opt.planning.problem import Problem
+from dojo_opt.plant.loop import ClosedLoop
+from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
+from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort
+from sim.mechanism.collision import Collision
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Body, Input, Joint
+from sim.mechanism.shapes import Box, Sphere, rotation_matrix
+from sim.simulator.simulator import Simulator
+
+Vector = NDArray[np.float64]
+
+__all__ = ["allegro"]
+
+_KNOT, _HORIZON, _RATE = 0.05, 40, 10.0  # [s], knots, [Hz]
+_ANGLE, _LOW = np.radians(15.0), 0.05  # [rad] off the goal at the end, [m] of the ball
+_SERVO = 0.5, 1e-3  # [N m/rad], [N m s/rad]
+_EFFORT = 0.7  # [N m]
+_UP = np.array([0.5**0.5, 0.0, -(0.5**0.5), 0.0])  # the palm, whose fingers point along -x
+_BALL = 0.05, 0.06, (-0.06, 0.0, 0.0712)  # [kg], [m], place [m]
+_NOMINAL = {
+    "outer": (-0.1, 1.0, 1.0, 1.0),
+    "thumb": (0.6, 1.9, 1.0, 1.0),
+    "middle": (0.0, 0.7, 1.0, 1.0),
+    "inner": (0.1, 1.0, 1.0, 1.0),
+}  # [rad] of the publication, whose fingers are up to 7.2 mm inside the ball
+_OPEN = {
+    "outer": (-0.1, 0.86, 1.0, 1.0),
+    "thumb": (0.6, 1.9, 0.95, 1.0),
+    "middle": (0.0, 0.57, 1.0, 1.0),
+    "inner": (0.1, 0.86, 1.0, 1.0),
+}  # [rad] of the start, which touches nothing
+_RANGES = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
+_THUMB_RANGES = ((0.263, 1.396), (-0.105, 2.163), (-0.189, 1.644), (-0.162, 1.719))
+
+
+def _finger(name: str, side: float, limits: bool) -> list[FileLink]:
+    """The links of a finger; side: 1 for the outer, -1 for the inner one, 0 in the middle."""
+    base = (0.0, side * 0.0435, 0.0957 if side == 0.0 else 0.093458)
+    half = np.radians(-2.5 * side)
+    turn, place = (np.cos(half), np.sin(half), 0.0, 0.0), rotation_matrix(_UP) @ np.asarray(base)
+    first = (1.954e-6, 1.179e-6, 1.497e-6, 3.034e-9, 8.923e-8, -3.707e-8)
+    second = (7.192e-5, 7.438e-5, 5.406e-6, 0.0, 0.0, 7.322e-7)
+    third = (3.169e-5, 3.105e-5, 3.203e-6, 1.071e-9, -4.913e-9, 3.875e-8)
+    last = (1.263e-5, 1.182e-5, 2.484e-6, 2.1e-9, -9.8e-9, -1.3e-8)
+    zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    links = [
+        FileLink(f"{name}_0", None, 0.0119, zero, first, pos=place, quat=_product(_UP, turn), axis=(0.0, 0.0, -1.0)),
+        FileLink(f"{name}_1", f"{name}_0", 0.065, zero, second, pos=(0.0, 0.0, 0.0164), axis=y),
+        FileLink(f"{name}_2", f"{name}_1", 0.0355, zero, third, pos=(0.0, 0.0, 0.054), axis=y),
+        FileLink(f"{name}_3", f"{name}_2", 0.0264, zero, last, pos=(0.0, 0.0, 0.0384), axis=y),
+    ]
+    return [link._replace(damping=0.015, limits=r if limits else None) for link, r in zip(links, _RANGES, strict=True)]
+
+
+def _thumb(limits: bool) -> list[FileLink]:
+    """The links of the thumb."""
+    place = rotation_matrix(_UP) @ np.array([-0.0182, -0.019333, 0.049013])
+    turn = (0.477714638, 0.521333448, -0.521334096, 0.477714267)
+    first = (8.139e-6, 1.314e-5, 1.002e-5, 2.552e-6, 3.899e-6, -1.463e-6)
+    second = (1.926e-6, 1.153e-6, 1.496e-6, 3.05e-9, 8.866e-8, -3.645e-8)
+    third = (3.67e-5, 3.54e-5, 3.633e-6, 1e-9, 1.485e-7, -3.7e-8)
+    last = (7.054e-5, 6.564e-5, 1.954e-5, 0.0, 0.0, -3.3e-8)
+    zero, y = (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    links = [
+        FileLink("thumb_0", None, 0.0176, zero, first, pos=place, quat=_product(_UP, turn), axis=(1.0, 0.0, 0.0)),
+        FileLink("thumb_1", "thumb_0", 0.0119, zero, second, pos=(-0.027, -0.005, 0.0399), axis=(0.0, 0.0, -1.0)),
+        FileLink("thumb_2", "thumb_1", 0.038, zero, third, pos=(0.0, 0.0, 0.0177), axis=y),
+        FileLink("thumb_3", "thumb_2", 0.0556, (0.0, 0.0, 0.012781), last, pos=(0.0, 0.0, 0.0514), axis=y),
+    ]
+    ranges = zip(links, _THUMB_RANGES, strict=True)
+    return [link._replace(damping=0.015, limits=r if limits else None) for link, r in ranges]
+
+
+def _product(p: Any, q: Any) -> Vector:
+    """Quaternion of q followed by p."""
+    a, b = np.asarray(p, dtype=np.float64), np.asarray(q, dtype=np.float64)
+    return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
+_SPHERES: dict[str, tuple[tuple[int, float, float], ...]] = {  # of a link: number, height [m], radius [m]
+    "finger": ((0, 0.0082, 0.015), (1, 0.027, 0.015), (2, 0.0192, 0.015), (3, 0.01335, 0.015), (3, 0.0267, 0.012)),
+    "thumb": ((2, 0.0257, 0.015), (3, 0.02115, 0.015), (3, 0.0423, 0.012)),
+}
+
+
+def mechanism(friction: float, palm: float, servos: bool = False) -> Mechanism:
+    """The left hand, its palm up and fixed, and the ball: 20 pairs of the hand and the ball, and no others.
+
+        q  (23,) outer finger, thumb, middle and inner finger [rad], ball
+
+    Args:
+        friction: coefficient of friction of fingers and ball.
+        palm: that of palm and ball.
+        servos: whether it is the model of the controller: joints with servos and without stops (default False).
+
+    Returns:
+        The mechanism, its fingers about the ball.
+    """
+    fingers = {"outer": 1.0, "middle": 0.0, "inner": -1.0}
+    links = [
+        link
+        for name in _NOMINAL
+        for link in (_thumb(not servos) if name == "thumb" else _finger(name, fingers[name], not servos))
+    ]
+    bodies, joints = assembled(links)
+    if servos:
+        joints = [replace(joint, spring=_SERVO[0], damper=0.015 + _SERVO[1]) for joint in joints]
+    mass, radius, place = _BALL
+    ball = Sphere(radius)
+    pairs = [("thumb_0", (-0.0179, 0.009, 0.0145), 0.015)]
+    for name in _NOMINAL:
+        spheres = _SPHERES["thumb" if name == "thumb" else "finger"]
+        pairs += [(f"{name}_{k}", (0.0, 0.0, height), size) for k, height, size in spheres]
+    collisions = [
+        Collision(
+            "ball",
+            link,
+            ball,
+            Sphere(size, center=from_com(links, link, point)),
+            friction=friction,
+            name=f"{link}:{k}",
+        )
+        for k, (link, point, size) in enumerate(pairs)
+    ]
+    box = Box(0.0408, 0.113, 0.095, center=rotation_matrix(_UP) @ np.array([-0.0093, 0.0, 0.0475]), orientation=_UP)
+    collisions.append(Collision("ball", None, ball, box, friction=palm, name="palm"))
+    neutral: dict[str, Any] = {f"{name}_{k}": angle for name in _OPEN for k, angle in enumerate(_OPEN[name])}
+    neutral["ball"] = (*place, 1.0, 0.0, 0.0, 0.0)
+    limits: dict[str, Any] = {} if servos else {"limits": (-_EFFORT, _EFFORT)}
+    return Mechanism(
+        [*bodies, Body("ball", mass, 0.4 * mass * radius**2 * np.eye(3))],
+        [*joints, Joint("floating", None, "ball")],
+        [],
+        [Input(link.name, **limits) for link in links],
+        collisions=collisions,
+        name="allegro",
+        neutral=neutral,
+    )
+
+
+def allegro(**settings: Any) -> SuiteTask:
+    """Turn a ball by 90 degrees about the vertical, where it is: 40 knots of 50 ms at 10 Hz.
+
+    A run of 10 s is a success when the ball ends within 15 degrees of its goal and stays above z = 50 mm throughout.
+    The fingers of the start are opened until they touch nothing: those of the publication are up to 7.2 mm inside the
+    ball. The stop of the thumb is where its start fits.
+
+    Args:
+        **settings: settings of `dojo.MPC`, instead of the ones of the task.
+
+    Returns:
+        The task.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range.
+    """
+    sim = Simulator(mechanism(1.0, 1.0, servos=True), time_step=_KNOT, kappa=1e-5)
+    own = mechanism(1.0, 0.18)
+    start = sim.neutral()
+    goal = start.copy()
+    goal[:16] = np.concatenate(list(_NOMINAL.values()))
+    goal[19:23] = 0.5**0.5 * np.array([1.0, 0.0, 0.0, -1.0])
+    quat = 0.25  # squares of four numbers are a quarter of those of the rotation vector
+    fingers = np.ones(16)
+    running = np.concatenate([0.01 * fingers, np.full(3, 10.0), np.full(3, 10.0 * quat)])
+    end = np.concatenate([fingers, np.full(3, 100.0), np.full(3, 100.0 * quat)])
+    rates = np.concatenate([1e-3 * fingers, np.ones(6)]), np.full(22, 10.0)
+    cost = [
+        quadratic(goal, _KNOT, _HORIZON, (running, rates[0]), (end, rates[1])),
+        servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
+    ]
+    problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:16])
+    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
+    given |= {"kappa": 1e-5, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(1e-5, 1e-5)))}
+    mpc = MPC(problem, **{**given, **settings})
+    model = Simulator(own, time_step=1e-3, kappa=1e-8)
+    spread = np.concatenate([np.full(16, 0.03), np.full(3, 1e-3), np.full(3, 0.1), np.full(22, 0.02)])
+    return SuiteTask("idto.allegro", mpc, model, start, 10.0, spread, _Turned(goal[19:23]), _RATE)
+
+
+class _Turned:
+    """Whether the ball ends as `goal` (4,) and is never dropped."""
+
+    def __init__(self, goal: Vector) -> None:
+        self._goal = goal
+
+    def __call__(self, loop: ClosedLoop) -> tuple[bool, dict[str, float]]:
+        off = 2.0 * float(np.arccos(min(1.0, abs(float(loop.x[-1, 19:23] @ self._goal)))))
+        low = float(loop.x[:, 18].min())
+        return off < _ANGLE and low > _LOW, {"angle off [deg]": float(np.degrees(off)), "lowest [m]": low}

@@ -1,0 +1,193 @@
+"""Tasks of published suites, and what they need of MPC: servos, targets that go along, plans that come late."""
+
+import json
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.cli import main
+from dojo_opt.cost import Effort, Tracking
+from dojo_opt.mpc.moving import Onward
+from dojo_opt.mpc.servo import ModelServo
+from dojo_opt.tasks.suite import servo_effort
+
+
+def arm(spring=0.0, damper=0.1):
+    """A link of 1 kg and 1 m on a hinge, driven."""
+    body = dojo.Body("link", 1.0, np.diag([0.1, 0.1, 0.01]))
+    joint = dojo.Joint("revolute", None, "link", child_point=(0, 0, 0.5), axis=(0, 1, 0), spring=spring, damper=damper)
+    return dojo.Mechanism([body], [joint], inputs=[dojo.Input("link")], name="arm")
+
+
+def reaching(sim, **settings):
+    goal = np.array([1.0, 0.0])
+    u = 9.81 * 0.5 * np.sin(1.0) + sim.mechanism.joints[0].spring[0]
+    problem = dojo.Problem(sim, [0.0, 0.0], 20, cost=[Tracking(goal, [10.0, 0.1]), Effort(1e-3, u)])
+    return dojo.MPC(problem, **settings)
+
+
+def test_the_spinner_starts_to_turn():
+    """Within 1.5 s, by contact alone; its ticks are on time for the plan before to be in force."""
+    task = dojo.tasks.idto.spinner()
+    loop = task.run(seconds=1.5)
+    assert loop.survived
+    assert loop.x[-1, 2] > 0.5
+    assert np.median([tick.cpu_milliseconds for tick in loop.log[1:]]) < 50.0
+    outcome = task.outcome(loop)
+    assert outcome.penetration < 1e-4
+    assert set(outcome.measures) == {"mean speed [rad/s]"}
+
+
+def test_a_start_is_perturbed_and_lifted_out_of_the_ground():
+    task = dojo.tasks.idto.hopper()
+    given, other, same = (task.begin(seed) for seed in (None, 3, 3))
+    assert np.array_equal(other, same)
+    assert not np.array_equal(given, other)
+    sim = task.model
+    for x in (given, other):
+        gaps = [c.gap(sim.maximal(x)[2, :3] + turned(sim.maximal(x)[2, 6:10], c.point)) for c in sim.mechanism.contacts]
+        assert 0.0 <= min(gaps) < 1e-5
+
+
+def turned(quaternion, vector):
+    w, r = quaternion[0], quaternion[1:]
+    return vector + 2.0 * np.cross(r, np.cross(r, vector) + w * np.asarray(vector))
+
+
+def test_servos_follow_a_plan_that_does_not_know_them():
+    """u = u_plan + kp (q_plan - q) + kd (v_plan - v), at every call; without feedforward the rest of it."""
+    sim = dojo.Simulator(arm(), time_step=0.05, kappa=1e-4)
+    full, bare = reaching(sim, servo=(30.0, 3.0)), reaching(sim, servo=(30.0, 3.0), feedforward=False)
+    x = np.array([0.1, 0.7])
+    for mpc in (full, bare):
+        mpc(0.0, [0.0, 0.0])
+    plan = full.policy
+    wanted = 30.0 * (plan.state(0.02)[0] - 0.1) + 3.0 * (plan.state(0.045)[1] - 0.7)
+    assert bare(0.02, x)[0] == pytest.approx(wanted, abs=1e-9)
+    assert full(0.02, x)[0] == pytest.approx(wanted + plan.control(0.02)[0], abs=1e-9)
+
+
+def test_servos_of_the_model_are_the_forces_of_its_springs():
+    """A plant without springs, driven by them, moves as one that has them."""
+    model, plain = (dojo.Simulator(arm(*gains), time_step=1e-3) for gains in ((40.0, 4.0), (0.0, 0.0)))
+    servo = ModelServo(model, plain.mechanism)
+    x = y = np.zeros(2)
+    for _ in range(1000):
+        u = np.array([40.0])  # a target of 1 rad
+        x, y = model.step(x, u).x, plain.step(y, servo(u, y)).x
+    assert x[0] == pytest.approx(y[0], abs=2e-3)
+    assert abs(x[0] - 1.0) < 0.15  # gravity pulls at it
+    mpc = reaching(model.replace(time_step=0.05), servo=plain.mechanism, gain_scale=0.0)
+    force = mpc(0.0, [0.2, 0.5])[0]
+    assert force == pytest.approx(mpc.policy.control(0.0)[0] - 40.0 * 0.2 - 4.0 * 0.5)
+
+
+def test_the_effort_of_servos_has_the_right_derivatives():
+    sim = dojo.Simulator(arm(40.0, 4.0), time_step=0.05)
+    problem = dojo.Problem(sim, [0.0, 0.0], 3, cost=[servo_effort(sim, arm(damper=0.0), 0.5, 3)])
+    xs, us = np.random.default_rng(0).normal(size=(4, 2)), np.random.default_rng(1).normal(size=(3, 1))
+    force = us[:, 0] - 40.0 * xs[:3, 0] - 4.0 * xs[:3, 1]
+    assert problem.cost(xs, us) == pytest.approx(0.5 * np.sum(force**2))
+    g, H = np.zeros((4, 3)), np.zeros((4, 3, 3))
+    problem.costs[0].expand(xs, us, g, H)
+    slope = np.array([-40.0, -4.0, 1.0])
+    np.testing.assert_allclose(g[:3], force[:, None] * slope, rtol=1e-9)
+    np.testing.assert_allclose(H[1], np.outer(slope, slope), rtol=1e-9)
+
+
+def test_a_target_goes_along_with_the_robot():
+    """The anchored coordinate begins where it is measured and never stops; the other one is where it was given."""
+    sim = dojo.tasks.idto.spinner().mpc.sim
+    begin = sim.neutral()
+    end = begin.copy()
+    end[1] += 0.4
+    end[2] += 2.0
+    target = Onward(sim, begin, end, 2.0, anchored=[2])
+    x = begin.copy()
+    x[:3] += 0.7
+    target.anchor(10.0, x)
+    rows = target([10.0, 11.0, 14.0])
+    np.testing.assert_allclose(rows[:, 0], begin[0])
+    np.testing.assert_allclose(rows[:, 1], begin[1] + np.array([0.0, 0.2, 0.4]))
+    np.testing.assert_allclose(rows[:, 2], x[2] + np.array([0.0, 1.0, 4.0]))
+
+
+def test_a_plan_that_takes_time_leaves_the_one_before_in_force():
+    sim = dojo.Simulator(arm(), time_step=0.05, kappa=1e-4)
+    mpc = reaching(sim, period=0.02, computation=0.02)
+    mpc(0.0, [0.0, 0.0])
+    first = mpc.policy
+    mpc(0.02, [0.3, 0.0])  # a plan begins, from where the first one leads
+    assert mpc.policy is first
+    mpc(0.03, [0.3, 0.0])
+    assert mpc.policy is first
+    mpc(0.04, [0.3, 0.1])
+    assert mpc.policy is not first
+    assert mpc.policy.time == pytest.approx(0.04)
+    assert len(mpc.log) == 3
+    with pytest.raises(ValueError, match="takes longer than the period"):
+        reaching(sim, period=0.02, computation=0.03)
+    with pytest.raises(ValueError, match="give one of them"):
+        reaching(sim, delay=0.01, computation=0.01)
+    with pytest.raises(ValueError, match="nothing would drive"):
+        reaching(sim, feedforward=False)
+    with pytest.raises(ValueError, match="has not"):
+        reaching(dojo.Simulator(arm(damper=0.0), time_step=0.05), servo=arm(damper=0.0))
+
+
+def test_a_compensated_body_floats():
+    """Beside one that falls; with half of its weight taken off, it falls half as fast. Energy and statics agree."""
+    bodies = [
+        dojo.Body(name, 2.0, np.eye(3), gravity_compensation=c) for name, c in (("a", 0.0), ("b", 0.5), ("c", 1.0))
+    ]
+    mechanism = dojo.Mechanism(bodies, [dojo.Joint("floating", None, name) for name in "abc"], inputs=[])
+    sim = dojo.Simulator(mechanism, time_step=0.01)
+    motion = sim.rollout(sim.neutral(), steps=100)
+    z = motion.x[-1, [2, 9, 16]]
+    np.testing.assert_allclose(z / z[0], [1.0, 0.5, 0.0], atol=1e-12)
+    assert z[0] == pytest.approx(-0.5 * 9.81, rel=0.02)
+    assert np.ptp(sim.energy(sim.start(sim.neutral()[: sim.nq], np.zeros(sim.nv)))) == 0.0
+    torques = dojo.Kinematics(sim).gravity_torques(sim.neutral()[: sim.nq])
+    np.testing.assert_allclose(torques[[2, 8, 14]], 9.81 * 2.0 * np.array([1.0, 0.5, 0.0]))
+
+
+def test_the_step_of_a_compensated_arm_is_differentiated_by_mass_gravity_and_time_step():
+    body = dojo.Body("link", 1.0, np.diag([0.1, 0.1, 0.01]), gravity_compensation=0.3)
+    joint = dojo.Joint("revolute", None, "link", child_point=(0.0, 0.0, 0.5), axis=(0.0, 1.0, 0.0))
+    sim = dojo.Simulator(dojo.Mechanism([body], [joint], gravity=(1.0, 0.0, -9.81)), time_step=0.02)
+    x, u = np.array([0.7, 1.0]), np.array([0.3])
+    for name, value in (("mass:link", 1.0), ("gravity[2]", -9.81), ("time_step", 0.02)):
+        slope = sim.linearize(x, u, wrt=[name])[name]
+        e = 1e-5
+        ends = [sim.with_parameters({name: value + d}).step(x, u).x for d in (e, -e)]
+        np.testing.assert_allclose(slope.ravel(), (ends[0] - ends[1]) / (2.0 * e), rtol=1e-5, atol=1e-7)
+
+
+def test_a_task_runs_from_the_command_line(tmp_path, capsys):
+    page = tmp_path / "spinner.html"
+    command = ["run", "idto.spinner", "--set", "seed=1", "--seconds", "0.05", "--json", "--html", str(page)]
+    assert main(command) == 1  # the disc does not turn yet
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers["survived"] and not numbers["success"]
+    assert numbers["ticks"] == 10 and numbers["rate_hz"] == 200.0
+    assert page.stat().st_size > 1000
+    assert main(["run", "idto.spiner"]) == 2
+    assert "did you mean" in capsys.readouterr().err
+
+
+def test_a_task_runs_on_the_plant_of_mujoco():
+    """A finger pressed onto the disc turns it as far as here, and MuJoCo's soft contact lets it in, ours does not."""
+    pytest.importorskip("mujoco")
+    from benchmarks.engines.mujoco_plant import MujocoPlant
+
+    task = dojo.tasks.idto.spinner()
+    plants = [MujocoPlant(task.model, task.start), dojo.Plant(task.model, task.start)]
+    theirs, ours = (dojo.closed_loop(lambda time, x: np.array([1.0, -2.0]), plant, 0.5) for plant in plants)
+    np.testing.assert_allclose(theirs.x[100, :2], ours.x[100, :2], atol=1e-4)  # before they touch
+    assert ours.x[-1, 2] < -0.2
+    assert theirs.x[-1, 2] == pytest.approx(ours.x[-1, 2], rel=0.03)
+    assert task.outcome(theirs).penetration > 1e-3
+    assert task.outcome(ours).penetration < 1e-6
+    with pytest.raises(ValueError, match="only the start"):
+        plants[0].perturbed(dojo.Perturbation())
