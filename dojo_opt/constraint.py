@@ -1,4 +1,7 @@
-"""Constraints: the hard aims of a plan, met by an augmented Lagrangian with a multiplier and a penalty per entry."""
+"""Constraints: the hard aims of a plan, met by an augmented Lagrangian with a multiplier and a penalty per entry.
+
+Those in task space, from `CenterOfMass` to `Velocity`, are also costs: it depends on where they are given.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.names import chosen_components, chosen_inputs, component_name
 from dojo_opt.planning.residual import ResidualKernels, check_residual
+from dojo_opt.planning.task_space.body_tasks import CenterOfMass, Frame, Momentum, Point, Velocity
+from dojo_opt.planning.task_space.contact_tasks import Clearance, ContactForce, FrictionUse, Slip, TorqueRate
+from dojo_opt.planning.task_space.joint_limits import JointLimits
 from dojo_opt.planning.term import (
     PeriodicTerm,
     Pick,
@@ -29,7 +35,25 @@ from sim.mechanism.brief import brief_repr
 Integers = NDArray[np.int64]
 Vector = NDArray[np.float64]
 
-__all__ = ["ControlBounds", "Goal", "Periodic", "ResidualConstraint", "SpeedLimits", "StateBounds"]
+__all__ = [
+    "CenterOfMass",
+    "Clearance",
+    "ContactForce",
+    "ControlBounds",
+    "Frame",
+    "FrictionUse",
+    "Goal",
+    "JointLimits",
+    "Momentum",
+    "Periodic",
+    "Point",
+    "ResidualConstraint",
+    "Slip",
+    "SpeedLimits",
+    "StateBounds",
+    "TorqueRate",
+    "Velocity",
+]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 """Costs: the soft aims of a plan. All are weighted squares of residuals, so Gauss-Newton is exact for linear ones.
 
 Weights multiply squares without a factor 1/2: a cost is `scale * sum w r^2`. Use `scale=0.5` for the other convention.
+
+Those in task space, from `CenterOfMass` to `Velocity`, are also constraints: it depends on where they are given.
 """
 
 from __future__ import annotations
@@ -14,13 +16,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.names import input_weight, state_weight
 from dojo_opt.planning.residual import ResidualKernels, check_residual
+from dojo_opt.planning.task_space.body_tasks import CenterOfMass, Frame, Momentum, Point, Velocity
+from dojo_opt.planning.task_space.contact_tasks import Clearance, ContactForce, FrictionUse, Slip, TorqueRate
+from dojo_opt.planning.task_space.joint_limits import JointLimits
 from dojo_opt.planning.term import Pick, PickTerm, ResidualTerm, Spec, StateTerm, Term, knot_list, state_table, table
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 
 Integers = NDArray[np.int64]
 
-__all__ = ["Effort", "ResidualCost", "Spec", "Tracking"]
+__all__ = [
+    "CenterOfMass",
+    "Clearance",
+    "ContactForce",
+    "Effort",
+    "Frame",
+    "FrictionUse",
+    "JointLimits",
+    "Momentum",
+    "Point",
+    "ResidualCost",
+    "Slip",
+    "Spec",
+    "TorqueRate",
+    "Tracking",
+    "Velocity",
+]
 
 
 def _checked_weight(call: str, value: ArrayLike, rows: int, columns: int, scale: float) -> NDArray[np.float64]:

@@ -229,7 +229,7 @@ class Solver:
 
     def guess(self, xs: Matrix, us: Matrix) -> Iterate:
         """States (T + 1, nx) and inputs (T, nu) to begin with; their gaps are not known yet."""
-        cost, merit = self.objective.evaluate(xs, us)
+        cost, merit = self.objective.at_kappa(self.options.stages[0].kappa_eval).evaluate(xs, us)
         return Iterate(xs, us, cost=cost, merit=merit)
 
     def rollout(self, now: Iterate, K: Stack | None = None) -> Iterate | None:
@@ -583,7 +583,7 @@ class Solver:
         """Take derivatives at `now`, expand the objective there, and regularise in units of the mean control weight."""
         now, n = self.now, self.problem.sim.ndx
         self._linear, self._expanded_at = linear, now
-        self.objective.expand(now.x, now.u)
+        self.objective.at_kappa(now.kappa).expand(now.x, now.u)
         weight = self.objective.H[:-1].diagonal(axis1=1, axis2=2)[:, n:].mean(axis=0)
         self._unit = np.where(weight > 0.0, weight, 1.0)
 

@@ -94,6 +94,7 @@ class Search:
 
     def iterate(self, shot: Any, gaps: Matrix | None, kappa: float) -> Iterate:
         """A rollout with its cost."""
+        self._objective.at_kappa(kappa)
         return Iterate(shot.x, shot.u, gaps, *self._objective.evaluate(shot.x, shot.u), kappa, shot.steps)
 
     def rollouts(self, now: Iterate, direction: Direction, kappa: float) -> tuple[float, Iterate]:
@@ -129,6 +130,7 @@ class Search:
         judged by merit + sum of price |gap|, an exact penalty with the largest costates so far as prices.
         """
         problem, options, promise = self._problem, self._options, direction.promise
+        self._objective.at_kappa(kappa)
         dx, du = _full_step(now, direction)
         gaps = 0.0 if now.gaps is None else np.abs(now.gaps).sum(axis=0)
         self._price = np.maximum(self._price, self._costates(direction.linear, dx, du))

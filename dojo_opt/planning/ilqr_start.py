@@ -11,6 +11,7 @@ from dojo_opt.planning.ilqr_search import Iterate
 from dojo_opt.planning.objective import Objective
 from dojo_opt.planning.options import Stage
 from dojo_opt.planning.problem import Problem
+from dojo_opt.planning.task_space.task_term import PeriodicTaskTerm
 from dojo_opt.planning.term import PeriodicTerm
 from sim.simulator.horizon import Horizon
 from solvers.riccati import Quadratic, Regularization, backward, value_hessian, work_size
@@ -79,13 +80,14 @@ class FreeStart:
 
     def __init__(self, problem: Problem) -> None:
         self._free = problem.free_start
-        self._terms = [term for term in problem.constraints if isinstance(term, PeriodicTerm)]
+        self._terms = [term for term in problem.constraints if isinstance(term, PeriodicTerm | PeriodicTaskTerm)]
         self.step = np.zeros(problem.sim.ndx)
 
     @property
     def stride(self) -> Array | None:
         """(ndx,) displacement over one period, None unless all of the end is tied to the start."""
-        return next((term.shift for term in self._terms if term.mask.all()), None)
+        ties = (term for term in self._terms if isinstance(term, PeriodicTerm))
+        return next((term.shift for term in ties if term.mask.all()), None)
 
     def solve(
         self, model: Quadratic, K: Array, k: Array, mu: float, damping: Array, xs: Array, us: Array

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dojo_opt.planning.names import component_name
 from dojo_opt.planning.options import Options
 from dojo_opt.planning.problem import Problem
 from dojo_opt.planning.term import Term
@@ -67,6 +66,13 @@ class Objective:
         own = own[term.columns]
         return np.where(own > 0.0, np.maximum(own, _LEAST * largest), largest)
 
+    def at_kappa(self, kappa: float | None) -> Objective:
+        """Take forces at this central-path parameter from now on: that of the trajectory; None changes nothing."""
+        if kappa is not None:
+            for term in (*self.costs, *self.constraints):
+                term.at_kappa(kappa)
+        return self
+
     def evaluate(self, xs: Matrix, us: Matrix) -> tuple[float, float]:
         """(cost, merit) at (xs, us)."""
         cost = 0.0
@@ -92,7 +98,7 @@ class Objective:
             size = term.violation()
             if size.size and size.max() > found[0]:
                 row, entry = divmod(int(size.argmax()), size.shape[1])
-                what = f"entry {entry}" if term.columns is None else component_name(self._sim, term.columns[entry])
+                what = term.entry_name(self._sim, entry)
                 found = float(size.max()), f"{term.name} of {what} at knot {term.knots[row]}"
         return found
 

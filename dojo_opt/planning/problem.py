@@ -189,8 +189,17 @@ class Problem:
         return own
 
     def bind(self) -> None:
-        """Make the terms of `specs` anew, with arrays and compiled functions of their own."""
+        """Make the terms of `specs` anew, with arrays and compiled functions of their own.
+
+        Raises:
+            ValueError: a field of a term is refused, or a cost ties the end to the start.
+        """
         self.costs = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[0]]
+        for i, term in enumerate(self.costs):
+            if hasattr(term, "coupling"):
+                raise ValueError(
+                    f"Problem(cost=...): entry {i} ties the end to the start, so it has to be a constraint"
+                )
         self.constraints = [spec.bind(self.sim, self.horizon, self.layout) for spec in self.specs[1]]
 
     def __getstate__(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.planning.manifold import state_residual
+from dojo_opt.planning.names import component_name
 from dojo_opt.planning.penalty import add_dense_expansion, add_expansion, penalty, penalty_derivatives
 from dojo_opt.planning.residual import ResidualKernels
 from sim.mechanism import checks
@@ -77,6 +78,13 @@ class Term:
         self.update(xs, us)
         penalty_derivatives(self.residual, self.weight, self.slope, self.one_sided, self._first, self._second)
         self._add(xs, us, g, H)
+
+    def entry_name(self, sim: Any, entry: int) -> str:
+        """What an entry of the residual is about."""
+        return f"entry {entry}" if self.columns is None else component_name(sim, int(self.columns[entry]))
+
+    def at_kappa(self, kappa: float | None) -> None:
+        """Take forces at this central-path parameter from now on; None for that of the simulator."""
 
     def violation(self) -> Matrix:
         """|r| of equalities, max(r, 0) of inequalities, at the last `update`; zero where an entry takes no part."""

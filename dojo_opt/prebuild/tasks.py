@@ -200,6 +200,22 @@ def _plans() -> None:
         dojo.ilqr(problem, max_iterations=4)
 
 
+def _task_space() -> None:
+    """Costs and constraints in task space: their entries are the same for all scenes."""
+    sim = dojo.Simulator(dojo.models.block(), time_step=0.01)
+    name, x, us = sim.mechanism.body_names[0], sim.neutral(), np.zeros((2, sim.nu))
+    box, ball = dojo.Box(0.1, 0.1, 0.1), dojo.Sphere(0.1, center=(1.0, 0.0, 1.0))
+    cost = dojo.cost
+    tasks = (
+        *(cost.Frame(name, x[:3], x[3:7]), cost.Velocity(name), cost.CenterOfMass(), cost.Momentum(), cost.Slip()),
+        *(cost.ContactForce(), cost.FrictionUse(), cost.Clearance(name, ball, 0.1, box)),
+    )
+    problem = dojo.Problem(sim, x, 2, cost=tasks)
+    g, H = np.zeros((3, sim.ndx + sim.nu)), np.zeros((3, sim.ndx + sim.nu, sim.ndx + sim.nu))
+    for term in problem.costs:
+        term.expand(np.stack([x] * 3), us, g, H)
+
+
 def _mpc() -> None:
     for make in (dojo.tasks.hopper_mpc, dojo.tasks.quadruped_mpc):
         mpc = make()
@@ -233,6 +249,7 @@ _SCENES: dict[str, Callable[[], None]] = {  # which the above leave little to co
     "models": _models,
     "plans": _plans,
     "closed loops": _mpc,
+    "task space": _task_space,
 }
 
 

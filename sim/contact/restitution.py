@@ -36,7 +36,7 @@ from math import sqrt
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
 from sim.contact.pairs.pair_contact import gap_normal, is_absent, pair_arm, pair_force, pair_kinematics
-from sim.model.columns import Bounce, Frame, Kin
+from sim.model.columns import Bounce, Kin, PairFrame
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
@@ -81,10 +81,10 @@ def look_back(model: Model, data: Data, h: float, configuration: int) -> None:
         n = gap_normal(model, data, c - model.contact_height.shape[0])
         row[0], row[1], row[2] = n
         row[3], row[4], row[5] = cross(
-            F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2], n[0], n[1], n[2]
+            F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2], n[0], n[1], n[2]
         )
         for r in range(3):
-            b[16 + r if first else 19 + r] = F[Frame.POINT + r]
+            b[16 + r if first else 19 + r] = F[PairFrame.POINT + r]
         if is_absent(data, c - model.contact_height.shape[0]):  # absent contacts have no impact
             b[14 if first else 15] = -_NEVER if first else _NEVER
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from sim.model.columns import Bounce, Cone, ConeScale, Frame, Kin
+from sim.model.columns import Bounce, Cone, ConeScale, Kin, PairFrame
 from sim.model.data import Data
 from sim.model.model import Law, Model
 from solvers.compiler import kernel
@@ -66,7 +66,7 @@ def responses(model: Model, data: Data, h: float, c: int) -> tuple[float, float]
             M += free_response(model, b)
             p, o = data.pair_frame[j], data.pos3[b]
             u, v, w = speed_before(
-                data, h, b, p[Frame.POINT] - o[0], p[Frame.POINT + 1] - o[1], p[Frame.POINT + 2] - o[2]
+                data, h, b, p[PairFrame.POINT] - o[0], p[PairFrame.POINT + 1] - o[1], p[PairFrame.POINT + 2] - o[2]
             )
             x, y, z = x - u, y - v, z - w
     g = model.gravity

@@ -23,7 +23,7 @@ class Kin(IntEnum):
     BY_TRANSLATION = 18  # (3, 3) d(gap, slip)/d(translation)
 
 
-class Frame(IntEnum):
+class PairFrame(IntEnum):
     """pair_frame: the rows n, t1, t2 of a frame, and behind them"""
 
     POINT = 9  # (3,) the contact point, world axes

@@ -78,6 +78,21 @@ class Kinematics:
         own = rotation_matrix(checks.quaternion("Kinematics.add(orientation)", unit))
         self._frames[name] = body, at, turn @ own
 
+    def place(self, frame: str) -> tuple[int, Floats, Floats]:
+        """Where a frame sits on its body.
+
+        Args:
+            frame: name of the frame.
+
+        Returns:
+            (number of the body, -1 for the world; the frame's origin from the centre of mass (3,) [m]; rotation (3, 3)
+            from the axes of the frame to those of the body).
+
+        Raises:
+            ValueError: the frame is unknown.
+        """
+        return self._frame("Kinematics.place(frame)", frame)
+
     def pose(self, frame: str, q: ArrayLike) -> tuple[Floats, Floats]:
         """Place and orientation of a frame.
 

@@ -21,6 +21,7 @@ from sim.simulator.engine import Engine
 from sim.simulator.loop_closure import Closure
 from sim.simulator.results import fastest, sentence
 from sim.simulator.settings import Settings
+from sim.simulator.task_space.calls import TaskSpace
 from solvers.status import Status
 
 if TYPE_CHECKING:
@@ -245,6 +246,14 @@ class StateSpace:
         qs, vs, lead = self._arguments.paired("bodies", ("q", q, self.nq), ("v", v, self.nv))
         xs = self._arguments.states("Simulator.bodies(q)", np.concatenate([qs, vs], axis=1))
         return self._arguments.finite("bodies", self._engine.bodies(xs), xs).reshape(*lead, self.nbody, 13)
+
+    def task_space(self) -> TaskSpace:
+        """Frames, momenta, contacts and distances along trajectories, with their derivatives, for planners.
+
+        Returns:
+            TaskSpace, whose arrays are not checked.
+        """
+        return TaskSpace(self._engine.whole())
 
     def integrate(self, x: ArrayLike, dx: ArrayLike) -> Floats:
         """x (+) dx: the state moved by a perturbation.

@@ -16,12 +16,14 @@ from dojo_opt.report.accuracy import advice, smooth_scene
 from dojo_opt.report.accuracy import error_curves as curves
 from dojo_opt.report.accuracy import robot_accuracy as robot
 from dojo_opt.report.accuracy import starting_pose as start
-from dojo_opt.report.accuracy.error_curves import Point
+from dojo_opt.report.accuracy.error_curves import CurvePoint
 from dojo_opt.report.accuracy.robot_accuracy import SettingTrial
 
 
-def points(*pairs: tuple[float, float]) -> list[Point]:
-    return [Point(0.01 / (k + 1), seconds, 10, {"position": error}, "") for k, (seconds, error) in enumerate(pairs)]
+def points(*pairs: tuple[float, float]) -> list[CurvePoint]:
+    return [
+        CurvePoint(0.01 / (k + 1), seconds, 10, {"position": error}, "") for k, (seconds, error) in enumerate(pairs)
+    ]
 
 
 def test_equal_time_interpolates_on_logarithmic_axes_and_never_promises_speed() -> None:

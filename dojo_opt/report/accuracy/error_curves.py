@@ -22,7 +22,7 @@ FLOOR = 1e-12  # errors below are rounding, of us and of the reference: neither 
 LOST = 1.0  # of the energy, relative to all there is: such a run is lost, reported or not
 
 
-class Point(NamedTuple):
+class CurvePoint(NamedTuple):
     """One run of one engine."""
 
     time_step: float  # [s]
@@ -32,7 +32,7 @@ class Point(NamedTuple):
     message: str
 
 
-Curves = dict[str, list[Point]]  # by the name of the engine
+Curves = dict[str, list[CurvePoint]]  # by the name of the engine
 
 
 def engines(rounds: int, peers: Sequence[PhysicsEngine] = ()) -> list[PhysicsEngine]:
@@ -65,17 +65,17 @@ def measure(scene: SmoothScene, engines: Sequence[PhysicsEngine], steps: Sequenc
     return curves
 
 
-def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> Point:
+def point(scene: SmoothScene, engine: PhysicsEngine, h: float, exact: Run) -> CurvePoint:
     """One run against the reference; one that the engine refuses has infinite errors, and the reason."""
     args: dict[str, Any] = {"time_step": h, "q": scene.q, "v": scene.v, "duration": scene.duration}
     try:
         run = engine.simulate(scene.mechanism, **args, samples=SAMPLES)
     except ValueError as error:
-        return Point(h, 0.0, 0, scene.errors(exact._replace(time=exact.time[:0]), exact), str(error))
+        return CurvePoint(h, 0.0, 0, scene.errors(exact._replace(time=exact.time[:0]), exact), str(error))
     errors, message = scene.errors(run, exact), run.message
     if not errors["energy"] < LOST:
         errors, message = dict.fromkeys(errors, np.inf), message or f"energy off by {errors['energy']:.2g} of all"
-    return Point(h, run.seconds, run.steps, errors, message)
+    return CurvePoint(h, run.seconds, run.steps, errors, message)
 
 
 def floors(scene: SmoothScene) -> dict[str, float]:
@@ -84,7 +84,7 @@ def floors(scene: SmoothScene) -> dict[str, float]:
     return {what: max(FLOOR, error) for what, error in scene.errors(moved.exact(), scene.exact()).items()}
 
 
-def at_time(points: Sequence[Point], what: str, seconds: float, floor: float = FLOOR) -> float:
+def at_time(points: Sequence[CurvePoint], what: str, seconds: float, floor: float = FLOOR) -> float:
     """Smallest error reached within a processor time, interpolated between time steps on logarithmic axes."""
     good = [p for p in points if np.isfinite(p.errors[what]) and p.seconds > 0.0]
     good.sort(key=lambda p: p.seconds)

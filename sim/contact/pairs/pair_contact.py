@@ -20,7 +20,7 @@ from sim.contact.pairs.active_features import choose_shapes
 from sim.contact.pairs.cylinder_pairs import collide_cylinders, on_cylinder
 from sim.contact.pairs.pair_pose import place_shapes
 from sim.contact.pairs.string import is_taut, pull_from_before, string_arm
-from sim.model.columns import Frame, Kin, Witness
+from sim.model.columns import Kin, PairFrame, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import FeatureChoice
@@ -112,19 +112,21 @@ def point_kinematics(model: Model, data: Data, h: float, j: int) -> None:
     F[0], F[1], F[2] = rotate(data.shape_rot, s, *three(g, Witness.NORMAL))
     F[3], F[4], F[5] = rotate(data.shape_rot, s, t1[0], t1[1], t1[2])
     F[6], F[7], F[8] = rotate(data.shape_rot, s, t2[0], t2[1], t2[2])
-    F[Frame.POINT], F[Frame.POINT + 1], F[Frame.POINT + 2] = rotate(data.shape_rot, s, *three(g, Witness.POINT))
+    F[PairFrame.POINT], F[PairFrame.POINT + 1], F[PairFrame.POINT + 2] = rotate(
+        data.shape_rot, s, *three(g, Witness.POINT)
+    )
     for k in range(3):
-        F[Frame.POINT + k] += data.shape_pos[s, k]
-    ax, ay, az = point_velocity(data, h, a, *three(F, Frame.POINT))
-    bx, by, bz = point_velocity(data, h, b, *three(F, Frame.POINT))
+        F[PairFrame.POINT + k] += data.shape_pos[s, k]
+    ax, ay, az = point_velocity(data, h, a, *three(F, PairFrame.POINT))
+    bx, by, bz = point_velocity(data, h, b, *three(F, PairFrame.POINT))
     x, y, z = ax - bx, ay - by, az - bz
     kin = data.contact_kin[model.contact_height.shape[0] + j]
     kin[Kin.GAP] = 1.0 if is_absent(data, j) else g[Witness.GAP]
     kin[Kin.SLIP1] = F[3] * x + F[4] * y + F[5] * z
     kin[Kin.SLIP2] = F[6] * x + F[7] * y + F[8] * z
-    kin[Kin.ARM] = F[Frame.POINT] - data.pos3[a, 0]
-    kin[Kin.ARM + 1] = F[Frame.POINT + 1] - data.pos3[a, 1]
-    kin[Kin.ARM + 2] = F[Frame.POINT + 2] - data.pos3[a, 2]
+    kin[Kin.ARM] = F[PairFrame.POINT] - data.pos3[a, 0]
+    kin[Kin.ARM + 1] = F[PairFrame.POINT + 1] - data.pos3[a, 1]
+    kin[Kin.ARM + 2] = F[PairFrame.POINT + 2] - data.pos3[a, 2]
     if is_taut(model, data, j):
         pull_from_before(model, data, j)
 
@@ -159,9 +161,9 @@ def pair_arm(model: Model, data: Data, j: int) -> Vec3:
     b = model.coupling_body[model.pair_coupling[j], 1]
     wa, wb = shares(model, j)
     F = data.pair_frame[j]
-    x = F[Frame.POINT] - data.origin[0] - wa * (data.pos3[a, 0] - data.pos2[a, 0])
-    y = F[Frame.POINT + 1] - data.origin[1] - wa * (data.pos3[a, 1] - data.pos2[a, 1])
-    z = F[Frame.POINT + 2] - data.origin[2] - wa * (data.pos3[a, 2] - data.pos2[a, 2])
+    x = F[PairFrame.POINT] - data.origin[0] - wa * (data.pos3[a, 0] - data.pos2[a, 0])
+    y = F[PairFrame.POINT + 1] - data.origin[1] - wa * (data.pos3[a, 1] - data.pos2[a, 1])
+    z = F[PairFrame.POINT + 2] - data.origin[2] - wa * (data.pos3[a, 2] - data.pos2[a, 2])
     if b >= 0:
         x -= wb * (data.pos3[b, 0] - data.pos2[b, 0])
         y -= wb * (data.pos3[b, 1] - data.pos2[b, 1])

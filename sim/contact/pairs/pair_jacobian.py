@@ -8,7 +8,7 @@ Everything moves with b, plus the effect of the motion of a relative to b:
 from __future__ import annotations
 
 from sim.contact.pairs.pair_contact import POLE, gap_normal, point_velocity, shape_b
-from sim.model.columns import Frame, Witness
+from sim.model.columns import PairFrame, Witness
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.slots import Slot
@@ -83,7 +83,7 @@ def _slip_rows(data: Data, h: float, i: int, sign: float, r: Vec3, t: Vec3, row:
 @kernel
 def _arm(data: Data, i: int, F: Vector) -> Vec3:
     """The contact point of a pair from the centre of mass of body i."""
-    p, x = three(F, Frame.POINT), data.pos3[i]
+    p, x = three(F, PairFrame.POINT), data.pos3[i]
     return p[0] - x[0], p[1] - x[1], p[2] - x[2]
 
 
@@ -102,7 +102,7 @@ def _pair_slip(data: Data, h: float, j: int, a: int, b: int, e: int, w: Vec3, v:
     if b >= 0:
         _slip_rows(data, h, b, -1.0, _arm(data, b, F), t, rows[1])
     gp = cross(t[0], t[1], t[2], w[0], w[1], w[2])
-    px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
+    px, py, pz = F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2]
     gm = cross(px, py, pz, gp[0], gp[1], gp[2])
     ge = cross(t[0], t[1], t[2], v[0], v[1], v[2])
     for k in range(6):
@@ -129,7 +129,7 @@ def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
     shape_to_world(data.pair_scratch, 0, data, s, x, y, z, data.pair_turn[j])
     shape_to_world(g, 25, data, s, x, y, z, data.pair_shift[j])
     F = data.pair_frame[j]
-    px, py, pz = F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2]
+    px, py, pz = F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2]
     Ca = data.pair_Ca[j]
     Cb = data.pair_Cb[j]
     n = gap_normal(model, data, j)
@@ -139,8 +139,8 @@ def pair_jacobian(model: Model, data: Data, h: float, j: int) -> None:
         Ca[3 + k] = m[k]
         Cb[k] = -n[k]
         Cb[3 + k] = -m[k]
-    va = point_velocity(data, h, a, *three(F, Frame.POINT))
-    vb = point_velocity(data, h, b, *three(F, Frame.POINT))
+    va = point_velocity(data, h, a, *three(F, PairFrame.POINT))
+    vb = point_velocity(data, h, b, *three(F, PairFrame.POINT))
     q = 2.0 / h
     wx, wy, wz = q * data.turn[a, 1], q * data.turn[a, 2], q * data.turn[a, 3]
     if b >= 0:

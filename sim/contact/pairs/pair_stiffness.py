@@ -14,7 +14,7 @@ from sim.contact.pairs.pair_jacobian import pair_jacobian
 from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.string_stiffness import add_string_stiffness, add_string_turn
 from sim.contact.pairs.wrench_columns import add_wrench_column, centre_shift, point_shift, unit_vector
-from sim.model.columns import Frame
+from sim.model.columns import PairFrame
 from sim.model.data import Data
 from sim.model.model import Model
 from sim.model.options import NewtonTarget
@@ -71,7 +71,7 @@ def add_pair_stiffness(model: Model, data: Data, j: int, share: float) -> None:
         e = pair_force(data, j, g[0], g[1], g[2])
         u = unit_vector(k - 3)
         r = cross(u[0] - turn[0], u[1] - turn[1], u[2] - turn[2], f[0], f[1], f[2])
-        p = point_shift(k, F[Frame.POINT] - o[0], F[Frame.POINT + 1] - o[1], F[Frame.POINT + 2] - o[2])
+        p = point_shift(k, F[PairFrame.POINT] - o[0], F[PairFrame.POINT + 1] - o[1], F[PairFrame.POINT + 2] - o[2])
         x = centre_shift(data, data.pos3, b, k)
         df = (e[0] + r[0], e[1] + r[1], e[2] + r[2])
         dP = (p[0] - shift[0] - wb * x[0], p[1] - shift[1] - wb * x[1], p[2] - shift[2] - wb * x[2])
@@ -145,9 +145,9 @@ def add_earlier_slip(model: Model, data: Data, h: float, j: int, K2: Matrix) -> 
         sign = 1.0 if side == 0 else -1.0
         w = data.turn[i]
         r = (
-            F[Frame.POINT] - data.pos3[i, 0],
-            F[Frame.POINT + 1] - data.pos3[i, 1],
-            F[Frame.POINT + 2] - data.pos3[i, 2],
+            F[PairFrame.POINT] - data.pos3[i, 0],
+            F[PairFrame.POINT + 1] - data.pos3[i, 1],
+            F[PairFrame.POINT + 2] - data.pos3[i, 2],
         )
         for k in range(6):
             x = centre_shift(data, data.pos2, i, k)

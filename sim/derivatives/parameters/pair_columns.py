@@ -9,7 +9,7 @@ from sim.contact.pairs.string import is_taut
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.contact_columns import add_pair, floor_change, impulse_change, is_active, turning
 from sim.derivatives.parameters.string_columns import add_moved_end
-from sim.model.columns import Frame
+from sim.model.columns import PairFrame
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -57,7 +57,7 @@ def _moved_frame(model: Model, data: Data, j: int, side: int, e: Vec3, turn: Vec
     )
     if side == 0:
         return dt, dp
-    p, o, n = row(F, Frame.POINT), data.origin, row(F, 0)
+    p, o, n = row(F, PairFrame.POINT), data.origin, row(F, 0)
     x = cross(turn[0], turn[1], turn[2], p[0] - o[0], p[1] - o[1], p[2] - o[2])
     a = rotate(data.shape_rot, shape_b(model, j), POLE[0], POLE[1], POLE[2])
     b = cross(n[0], n[1], n[2], a[0], a[1], a[2])

@@ -1,0 +1,1 @@
+"""Costs and constraints in task space: frames, centre of mass, momentum, contacts and their forces, distances."""
