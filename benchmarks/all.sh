@@ -60,8 +60,9 @@ measure mpc_suites "$python" "$here/benchmarks/mpc_suites.py" $quick spinner acr
 measure parameter_derivatives "$python" "$here/benchmarks/parameter_derivatives.py" $quick --out "$out"
 if "$python" -c 'import importlib.metadata as m; m.version("example-robot-data")' 2>/dev/null; then
     measure urdf_zoo "$python" "$here/benchmarks/urdf_zoo.py" $quick --out "$out"
+    measure robots "$python" "$here/benchmarks/robots.py" $quick --out "$out"
 else
-    echo "== urdf_zoo: left out, example-robot-data is not installed"
+    echo "== urdf_zoo, robots: left out, example-robot-data is not installed"
 fi
 measure hopper "$python" "$here/examples/hopper.py" $quick
 

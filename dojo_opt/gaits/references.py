@@ -326,8 +326,7 @@ def _periodic(
     places = ground[:, :2] - neutral[:2]
     if footholds is not None:
         places = checks.array(f"{call}(footholds=...)", footholds, places.shape)
-    middle = places.mean(axis=0)
-    offset = np.array([offsets[bool(x > middle[0]), bool(y > middle[1])] for x, y in places])
+    offset = _offsets(offsets, places)
     pattern = Footfall(
         offset, duty, period, step_height, complex(speed, lateral), heading_rate, places[:, 0] + 1j * places[:, 1]
     )
@@ -341,6 +340,18 @@ def _periodic(
     where, lift = pattern.feet(t)
     targets = np.stack([where.real + neutral[0], where.imag + neutral[1], lift + ground[:, 2]], axis=2)
     return assemble(sim, name, base, targets, pattern.contact(t), names=feet.names)
+
+
+def _offsets(offsets: dict[tuple[bool, bool], float], places: Array) -> Array:
+    """(k,) when each foot comes down: by front and left of four, in turn along each side of more."""
+    middle = places.mean(axis=0)
+    left = places[:, 1] > middle[1]
+    front = places[:, 0] > middle[0]
+    if len(places) > 4:
+        for side in (True, False):
+            order = np.argsort(-places[left == side, 0]).argsort()
+            front[left == side] = order % 2 == 0
+    return np.array([offsets[bool(x), bool(y)] for x, y in zip(front, left, strict=True)])
 
 
 def _attitude(yaw: Array, pitch: Array, roll: Array) -> Array:

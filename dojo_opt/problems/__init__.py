@@ -1,4 +1,4 @@
-"""Reference problems, ready to solve: a hop, a pushed block, swing-ups, and the gaits and leaps of a quadruped."""
+"""Problems, ready to solve: a hop, a pushed block, swing-ups, gaits and leaps of robots with legs, arms that reach."""
 
 from __future__ import annotations
 
@@ -6,10 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 from dojo_opt.problems.classics import block, hop, swingup
 from dojo_opt.problems.leaps import leap
-from dojo_opt.problems.locomotion import bound, follow, jump, pace, trot, turn, walk
+from dojo_opt.problems.legged import jump, stand_up, trot
+from dojo_opt.problems.locomotion import bound, follow, pace, turn, walk
+from dojo_opt.problems.reach import reach
 from sim.mechanism.checks import nearest
 
-__all__ = ["block", "bound", "follow", "hop", "jump", "leap", "pace", "swingup", "trot", "turn", "walk"]
+__all__ = [
+    "block",
+    "bound",
+    "follow",
+    "hop",
+    "jump",
+    "leap",
+    "pace",
+    "reach",
+    "stand_up",
+    "swingup",
+    "trot",
+    "turn",
+    "walk",
+]
 
 
 if not TYPE_CHECKING:

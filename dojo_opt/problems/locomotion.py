@@ -286,7 +286,22 @@ def jump(
         TypeError: for an unknown setting.
         ValueError: for an argument out of range, or a foot that cannot reach its place.
     """
-    problem = _quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height)
+    return with_apex(_quadruped(gaits.jump, time_step, damping, settings, distance=distance, height=height), refinement)
+
+
+def with_apex(problem: Problem, refinement: int) -> Problem:
+    """The problem of a jump with divided steps in its second half, where the height at the top is a constraint.
+
+    Args:
+        problem: the problem, which tracks a jump; it is changed.
+        refinement: number of parts of every time step; 1 for none.
+
+    Returns:
+        The problem.
+
+    Raises:
+        ValueError: `refinement` is not a whole number >= 1.
+    """
     tracking = problem.specs[0][0]
     assert isinstance(tracking, Tracking)
     path = np.asarray(tracking.reference)

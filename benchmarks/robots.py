@@ -1,0 +1,164 @@
+"""Robots of a package stand up, trot, jump and reach: problems from their files alone, solved and replayed.
+
+    pip install example-robot-data
+    python benchmarks/robots.py                      one line per robot and task
+    python benchmarks/robots.py --match go1
+
+Feet, stance and weights are found as `dojo_opt.problems.legs` does; only feet that a file has as meshes, or not at all,
+are named here. A plan is replayed under its gains at a fifth of its time step. It counts as done when it is solved, all
+steps of the replay are solved, and the robot ends within 2 cm of the plan and is upright all the time, or the hand of
+an arm ends within 5 mm of its target.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from importlib.metadata import files
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from command import deliver, number, parser, progress
+
+import dojo_opt as dojo
+from dojo_opt.report.result import Cell, Report, Row, Table
+
+UPRIGHT = 0.85  # least cosine between the z axis of the base and the vertical
+OFF = 0.02  # [m] of the base
+REACHED = 0.005  # [m] of a hand
+LEAST = 0.9  # share of the tasks that have to be done
+
+
+class Robot(NamedTuple):
+    """A file of the package, and what it does not say."""
+
+    path: str
+    feet: dict[str, float] | None = None  # radius of the ball about the origin of a link [m]
+    hand: str = ""
+    q: tuple[float, ...] = ()  # where an arm begins; its hand reaches from there
+
+
+def _four(names: str, radius: float) -> dict[str, float]:
+    return dict.fromkeys(names.split(), radius)
+
+
+ROBOTS = {
+    "Go1": Robot("go1_description/urdf/go1.urdf"),
+    "Go2": Robot("go2_description/urdf/go2.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.022)),
+    "A1": Robot("a1_description/urdf/a1.urdf"),
+    "B1": Robot("b1_description/urdf/b1.urdf"),
+    "Laikago": Robot("laikago_description/urdf/laikago.urdf", _four("FL_foot FR_foot RL_foot RR_foot", 0.026)),
+    "Solo12": Robot("solo_description/robots/solo12.urdf", _four("FL_FOOT FR_FOOT HL_FOOT HR_FOOT", 0.016)),
+    "ANYmal B": Robot("anymal_b_simple_description/robots/anymal.urdf"),
+    "ANYmal C": Robot("anymal_c_simple_description/urdf/anymal.urdf"),
+    "HyQ": Robot("hyq_description/robots/hyq_no_sensors.urdf"),
+    "Panda": Robot(
+        "panda_description/urdf/panda.urdf", None, "panda_hand", (0, -0.8, 0, -2.3, 0, 1.6, 0.8, 0.02, 0.02)
+    ),
+    "Z1": Robot("z1_description/urdf/z1.urdf", None, "gripperStator", (0, 1.5, -1.5, 0.5, 0, 0, -0.5)),
+    "UR5": Robot("ur_description/urdf/ur5_robot.urdf", None, "tool0", (0, -1.2, 1.2, -1.5, -1.5, 0)),
+}
+WAY = np.array([-0.1, 0.15, 0.1])  # of a hand [m]
+TASKS = ("stand_up", "trot", "jump")
+
+
+def path_of(robot: Robot) -> Path:
+    """The file of a robot."""
+    for file in files("example-robot-data") or ():
+        if str(file).endswith(f"robots/{robot.path}"):
+            return Path(str(file.locate()))
+    raise FileNotFoundError(f"example-robot-data has no {robot.path}")
+
+
+def loaded(robot: Robot) -> Any:
+    """Its mechanism."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dojo.UrdfWarning)
+        return dojo.load_urdf(path_of(robot), floating=not robot.hand)
+
+
+def replayed(plan: Any) -> Any:
+    """The plan under its gains at a fifth of its time step."""
+    sim, parts = plan.problem.sim, 5 * plan.problem.substeps
+    fine = sim.replace(time_step=sim.time_step / 5)
+    limits = plan.problem.control_limits
+    return fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=parts, limits=limits)
+
+
+def walked(robot: Robot, task: str) -> list[Cell]:
+    """A line of a robot with legs."""
+    begin = time.perf_counter()
+    plan = dojo.ilqr(getattr(dojo.problems, task)(loaded(robot), feet=robot.feet))
+    seconds, shot = time.perf_counter() - begin, replayed(plan)
+    x = shot.x
+    upright = float((1.0 - 2.0 * (x[:, 4] ** 2 + x[:, 5] ** 2)).min())
+    off = float(np.abs(x[-1, :3] - plan.x[-1, :3]).max())
+    done = bool(plan.success and shot.success and upright > UPRIGHT and off < OFF)
+    return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, upright, done]
+
+
+def reached(robot: Robot) -> list[Cell]:
+    """A line of an arm."""
+    mech = loaded(robot)
+    begin = time.perf_counter()
+    sim = dojo.Simulator(mech, time_step=0.02)
+    kin, q = dojo.Kinematics(sim), np.array(robot.q)
+    goal = kin.pose(robot.hand, q)[0] + WAY
+    plan = dojo.ilqr(dojo.problems.reach(sim, robot.hand, goal, start=q))
+    seconds, shot = time.perf_counter() - begin, replayed(plan)
+    off = float(np.linalg.norm(kin.pose(robot.hand, shot.x[-1, : sim.nq])[0] - goal))
+    done = bool(plan.success and shot.success and off < REACHED)
+    return [plan.status.name, plan.nit, seconds, float(np.abs(plan.u).max()), off, None, done]
+
+
+def cases(args: argparse.Namespace) -> list[tuple[str, Callable[[], list[Cell]]]]:
+    """What is tried, by name."""
+    out: list[tuple[str, Callable[[], list[Cell]]]] = []
+    for name, robot in ROBOTS.items():
+        if args.match.lower() not in name.lower():
+            continue
+        if robot.hand:
+            out.append((f"{name}: reach", lambda robot=robot: reached(robot)))
+        else:
+            out += [(f"{name}: {task}", lambda robot=robot, task=task: walked(robot, task)) for task in TASKS]
+    return [case for case in out if "Go1: stand" in case[0] or "UR5" in case[0]] if args.quick else out
+
+
+def run(args: argparse.Namespace) -> Report:
+    """The table."""
+    report = Report("Robots from their files", "")
+    lines: list[list[Cell]] = []
+    for name, case in progress()([(name, (name, case)) for name, case in cases(args)], "robots"):
+        try:
+            lines.append([name, *case()])
+        except (ValueError, dojo.SimulationError) as error:
+            report.notes.append(f"{name}: {error}")
+            lines.append([name, "refused", None, None, None, None, None, False])
+    header = ("", "planned", "iterations", "time [s]", "largest input", "off [m]", "upright", "done")
+    report.tables.append(
+        Table("Robots", header, lines, "time of the problem and its plan, kernels compiled on the way")
+    )
+    done = sum(bool(line[-1]) for line in lines)
+    iterations = [line[2] for line in lines if line[2] is not None]
+    bar = int(LEAST * len(lines))
+    report.rows += [
+        Row("tasks done, and replayed at a fifth of the step", done, f"of {len(lines)}", bar, at_least=True),
+        number("iterations, median", float(np.median(iterations)) if iterations else np.nan),
+        number("iterations, most", max(iterations, default=np.nan)),
+    ]
+    return report
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Print or write the report; exit status 1 if more than a tenth of the tasks were not done."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--match", default="", help="only robots with this in their names")
+    return deliver("robots", run, arguments, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

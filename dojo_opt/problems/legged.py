@@ -1,0 +1,209 @@
+"""Problems of any robot with legs: trot, jump and stand up, in units of its height, weight and time of a pendulum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt import gaits
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.gait import Gait, assemble
+from dojo_opt.planning.options import PLANNED
+from dojo_opt.planning.problem import Problem
+from dojo_opt.problems import locomotion
+from dojo_opt.problems.legs import Legs
+from dojo_opt.problems.locomotion import EFFORT, PLACE, follow
+from sim.mechanism import checks
+from sim.mechanism.checks import whole_number
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+# of a robot as high as the A1: lengths go with the height, times and speeds with its root
+_PERIOD, _SPEED, _LIFT = 0.6, 0.2, 0.04  # of a trot [s], [m/s], [m]
+_KNOTS = 20  # of a period
+_STEP = 0.02  # [s] of jumps and of standing up
+_LEAST = 1e-3  # [s] time steps are multiples of this
+
+
+def trot(
+    robot: Any = None,
+    *,
+    feet: Sequence[str] | Mapping[str, float] | None = None,
+    stance: Any = None,
+    **settings: Any,
+) -> Problem:
+    """A robot trots: the library's quadruped, or any one with two, four or six legs.
+
+    Without a robot, the quadruped of the A1's size trots for two periods of one second, 40 knots of 50 ms. The defaults
+    are the reference of Dojo's quadruped example, its weights (impulses .01 per (N m s)^2), friction of .8, and less
+    damping in the joints (5 N m s/rad there; with .5 here the robot falls over by itself). The pose of the base at the
+    end is a constraint. Torques are limited to 33.5 N m.
+
+    Of another robot feet and stance are found, see `dojo_opt.problems.legs.Legs`, and weights, times and lengths follow
+    from its weight and height h: two periods of 0.6 s at 0.2 m/s for h = 0.29 m, in proportion to the root of h, with
+    20 knots each. Torques keep within the limits of its inputs. Six legs move in two sets of three.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found).
+        stance: coordinates of the stance by joint (default None: found).
+        **settings: speed [m/s], step_height [m], damping (least damper of the joints [N m s/rad], 0.5 for the
+            quadruped, in proportion for others), further arguments of `gaits.trot` (period, duty, cycles, heading_rate,
+            height, footholds, ...) and of `follow` (guess, periodic, ...); of the quadruped also time_step, friction
+            and contacts. With periodic=True a plan is one period long, unless `cycles` is given.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
+    """
+    if robot is None:
+        return locomotion.trot(**_of_the_quadruped("problems.trot", feet, stance, settings))
+    legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
+    slow = legs.size**0.5
+    step = _rounded(settings.pop("period", _PERIOD * slow) / _KNOTS)
+    follows, rest = _shared_out(settings)
+    usual = {"speed": _SPEED * slow, "step_height": _LIFT * legs.size, "cycles": 1 if follows.get("periodic") else 2}
+    substeps = whole_number("problems.trot(substeps=...)", follows.get("substeps", 1))
+    gait = gaits.trot(legs.simulator(step / substeps, PLANNED), period=_KNOTS * step, **{**usual, **rest})
+    return _scaled(legs, gait, follows)
+
+
+def jump(
+    robot: Any = None,
+    *,
+    feet: Sequence[str] | Mapping[str, float] | None = None,
+    stance: Any = None,
+    **settings: Any,
+) -> Problem:
+    """A robot jumps forward, from standing to standing: the library's quadruped, or any one with legs.
+
+    Jumps planned with steps of 20 ms land up to 72 mm off at 1 ms; upward and backward jumps are the worst. As for
+    `leap`, `ilqr` therefore ends with divided steps, and jumps land within 4 mm. There the height at the top is a
+    constraint.
+
+    The quadruped jumps 0.3 m far and 0.2 m high. Others jump as far and high for their height h, that of the quadruped
+    being 0.29 m; times follow the root of h, weights the robot's weight and height.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator (default None: the quadruped).
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found, see `dojo_opt.problems.legs.Legs`).
+        stance: coordinates of the stance by joint (default None: found).
+        **settings: distance [m], height [m], damping (least damper of the joints [N m s/rad]), refinement (parts of
+            every time step in the second half of `ilqr`, 5; 1 for none), further arguments of `gaits.jump` (crouch,
+            clearance, before, after) and of `follow`; of the quadruped also time_step, friction and contacts.
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
+    """
+    if robot is None:
+        return locomotion.jump(**_of_the_quadruped("problems.jump", feet, stance, settings))
+    legs = Legs(robot, feet, damping=settings.pop("damping", None), stance=stance)
+    slow, size = legs.size**0.5, legs.size
+    refinement = settings.pop("refinement", 5)
+    follows, rest = _shared_out(settings)
+    step = _rounded(_STEP * slow) / whole_number("problems.jump(substeps=...)", follows.get("substeps", 1))
+    usual = {"distance": 0.3 * size, "height": 0.2 * size, "crouch": 0.1 * size, "clearance": 0.08 * size}
+    usual |= {"before": 0.3 * slow, "after": 0.4 * slow}
+    gait = gaits.jump(legs.simulator(step, PLANNED), **{**usual, **rest})
+    return locomotion.with_apex(_scaled(legs, gait, follows), refinement)
+
+
+def _of_the_quadruped(call: str, feet: Any, stance: Any, settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings of the problem of the library's quadruped."""
+    if feet is not None or stance is not None:
+        raise ValueError(f"{call}(feet=..., stance=...): expected a robot, {call}(robot, ...)")
+    return settings
+
+
+def stand_up(
+    robot: Any,
+    *,
+    feet: Sequence[str] | Mapping[str, float] | None = None,
+    low: float = 0.55,
+    duration: float | None = None,
+    damping: float | None = None,
+    stance: Any = None,
+    **settings: Any,
+) -> Problem:
+    """A robot with legs stands up from its folded legs, and stands still for a third of the time.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator.
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found, as `dojo_opt.problems.legs.Legs` says).
+        low: height of the base at the beginning over that of the stance, between 0 and 1.
+        duration: of the rise and the rest [s] (default None: 1 s for a robot as high as the A1, for others in
+            proportion to the root of the height).
+        damping: least damper of the joints, see `Legs` (default None: in proportion to weight and height).
+        stance: coordinates of the stance by joint (default None: found).
+        **settings: further arguments of `follow` (guess, substeps, control_limits, effort, ...).
+
+    Returns:
+        The problem.
+
+    Raises:
+        TypeError: for an unknown setting.
+        ValueError: for an argument out of range, a robot without legs, or a foot that cannot reach its place.
+    """
+    legs = Legs(robot, feet, damping=damping, stance=stance)
+    checks.number("problems.stand_up(low=...)", low, above=0.0)
+    if not low < 1.0:
+        raise ValueError(f"problems.stand_up(low=...): expected a share of the height below 1, got {low:g}")
+    follows, rest = _shared_out(settings)
+    checks.keywords("problems.stand_up(...)", rest, ())
+    slow = legs.size**0.5
+    length = slow if duration is None else checks.number("problems.stand_up(duration=...)", duration, above=0.0)
+    substeps = whole_number("problems.stand_up(substeps=...)", follows.get("substeps", 1))
+    step = _rounded(_STEP * slow) / substeps
+    sim = legs.simulator(step, PLANNED)
+    count = substeps * max(2, round(length / (step * substeps)))
+    return _scaled(legs, _rise(sim, count, (1.0 - low) * legs.height), follows)
+
+
+def _rise(sim: Simulator, steps: int, by: float) -> Gait:
+    """The base goes up by so much in two thirds of the steps, at rest at both ends; the feet stand."""
+    feet = Feet(sim)
+    x = sim.neutral()
+    places = feet.positions(x)
+    places[:, 2] -= feet.gaps(x)
+    share = np.clip(1.5 * np.arange(-1, steps + 1) / steps, 0.0, 1.0)
+    base = np.tile(x[:7], (steps + 2, 1))
+    base[:, 2] -= by * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
+    where = np.tile(places, (steps + 2, 1, 1))
+    return assemble(sim, "stand up", base, where, np.ones(where.shape[:2], dtype=bool), names=feet.names)
+
+
+_FOLLOW = ("guess", "periodic", "substeps", "control_limits", "place", "attitude", "effort")
+
+
+def _shared_out(settings: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments of `follow`, and those of the gait."""
+    follows = {key: value for key, value in settings.items() if key in _FOLLOW}
+    return follows, {key: value for key, value in settings.items() if key not in _FOLLOW}
+
+
+def _scaled(legs: Legs, gait: Gait, given: dict[str, Any]) -> Problem:
+    """The problem to follow a gait, its weights in units of the robot, its torques within the limits of the joints."""
+    place: ArrayLike = np.asarray(PLACE) / legs.size**2
+    limits = legs.mechanism.input_limits
+    bounded = None if limits is None or not np.isfinite(limits).any() else tuple(np.asarray(limits))
+    usual = {"place": place, "effort": EFFORT / legs.torque**2, "control_limits": bounded}
+    return follow(gait, **{**usual, **given})
+
+
+def _rounded(step: float) -> float:
+    """A time step as a whole number of milliseconds."""
+    return _LEAST * max(1, round(step / _LEAST))

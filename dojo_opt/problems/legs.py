@@ -1,0 +1,221 @@
+"""Legs: a robot of any make as its problems need it: on its feet, with bent knees, and with the scales of its costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dojo_opt.gaits.feet import Feet
+from sim.mechanism import checks
+from sim.mechanism.mechanism import Mechanism
+from sim.mechanism.parts import Contact, Joint
+from sim.simulator.inverse_kinematics import ik
+from sim.simulator.kinematics import Kinematics
+from sim.simulator.simulator import Simulator
+
+Array = NDArray[np.float64]
+
+__all__ = ["Legs"]
+
+_LOW = 0.3  # of the height of the base: contacts no higher than this above the lowest one may be feet
+_FLAT = 0.01  # [m] contacts this near to the lowest one of a foot carry together
+_STRETCH = 0.8  # length of a standing leg over that of a stretched one
+_BEND = 0.9  # [rad] of the knees where the search for a stance begins
+_PITCH = 0.7  # cosine between the axis of a hinge that bends a leg and y
+_TRIES = 4  # starts of each search
+_A1 = (0.29, 118.0)  # height [m] and weight [N] of the robot whose weights the problems have
+
+
+class Legs:
+    """A robot that stands on the feet at the ends of its legs.
+
+    The feet are found: the bodies at the ends of the tree that reach down to the ground, with their points that are
+    farthest from the knee, or lowest where there is an ankle. Points within 1 cm of such a one are one ball in their
+    middle, so that a foot from a mesh costs as much as a ball; two feet keep all these points, on which the robot
+    balances. The stance is found, too: hinges about y bend the legs to 0.8 of their length, with the feet below the
+    hips and the knees to the back where the joint limits allow it.
+
+    Args:
+        robot: the mechanism, on a floating base that looks along x, or its simulator.
+        feet: names of contacts, of bodies that have some, or of links, whose feet are balls about their origins, with
+            radii [m] in a table by name (default None: found).
+        damping: least damper of the joints, as of a motor's controller [N m s/rad] (default None: 0.5 for a robot of
+            the weight and height of the A1, in proportion for others; 0 leaves the joints as they are).
+        stance: coordinates by joint (default None: found).
+
+    Raises:
+        ValueError: the robot has no legs, no stance is found, or a name is unknown.
+    """
+
+    def __init__(
+        self,
+        robot: Any,
+        feet: Sequence[str] | Mapping[str, float] | None = None,
+        *,
+        damping: float | None = None,
+        stance: Any = None,
+    ) -> None:
+        mech: Mechanism = robot.mechanism if isinstance(robot, Simulator) else robot
+        if not isinstance(mech, Mechanism):
+            raise TypeError(f"Legs(robot): expected a Mechanism or a Simulator, got {robot!r}")
+        if mech.joints[0].kind != "floating" or mech.nv == 6:
+            raise ValueError(f"Legs(robot): expected a robot with legs on a floating base, got {mech!r}")
+        if stance is not None:
+            mech = replace(mech, neutral=stance)
+        mech = replace(mech, contacts=_feet_of(mech, feet), collisions=())
+        sim = Simulator(mech, time_step=0.01)
+        x = Feet(sim).put_down(sim.neutral() if stance is not None else _stance(sim))
+        self.mass = sum(body.mass for body in mech.bodies)
+        self.height = float(x[2] - Feet(sim).positions(x)[:, 2].min())
+        weight = self.mass * float(np.linalg.norm(np.asarray(mech.gravity)))
+        self.torque = weight * self.height / (_A1[0] * _A1[1])  # in units of that of the A1
+        self.size = self.height / _A1[0]
+        least = 0.5 * self.torque * self.size**0.5 if damping is None else damping
+        checks.number("Legs(damping=...)", least, at_least=0.0)
+        joints = [mech.joints[0], *(_damped(joint, least) for joint in mech.joints[1:])]
+        self.mechanism = replace(mech, joints=joints, neutral=x[: sim.nq])
+        self.feet = tuple(contact.name for contact in mech.contacts)
+
+    def simulator(self, time_step: float, kappa: float) -> Simulator:
+        """The simulator of the robot on its feet.
+
+        Args:
+            time_step: time step [s].
+            kappa: central-path parameter [N s m].
+
+        Returns:
+            The simulator, whose neutral state is the stance.
+        """
+        return Simulator(self.mechanism, time_step=time_step, kappa=kappa)
+
+
+def _damped(joint: Joint, least: float) -> Joint:
+    """The joint with a damper of at least this, where it has rotations."""
+    return replace(joint, damper=max(float(np.max(joint.damper)), least)) if joint.nrot and not joint.ntrans else joint
+
+
+def _feet_of(mech: Mechanism, given: Any) -> list[Contact]:
+    """Contacts of the feet."""
+    sim = Simulator(mech, time_step=0.01)
+    kin, x = Kinematics(sim), sim.neutral()
+    joints = {joint.child: joint for joint in mech.joints}
+    if given is not None:
+        return [contact for name in given for contact in _named(mech, kin, name, given)]
+    if not mech.contacts:
+        raise ValueError(f"Legs(robot): {mech.name!r} touches the ground with nothing; name its feet, feet=...")
+    ends = set(mech.body_names) - {joint.parent for joint in mech.joints}
+    everything = Feet(sim, mech.contact_names[: len(mech.contacts)]).positions(x)
+    low: dict[str, float] = {}
+    for contact, at in zip(mech.contacts, everything, strict=True):
+        if contact.body in ends:
+            low[contact.body] = min(low.get(contact.body, np.inf), float(at[2]) - contact.radius)
+    if not low:
+        raise ValueError(f"Legs(robot): no body at the end of the tree of {mech.name!r} has a contact; give feet=...")
+    floor, top = min(low.values()), float(sim.bodies(x[: sim.nq], np.zeros(sim.nv))[0, 2])
+    soles = [body for body, height in low.items() if height <= floor + _LOW * max(top - floor, 0.0)]
+    out: list[Contact] = []
+    for body in soles:
+        parts = [(c, at) for c, at in zip(mech.contacts, everything, strict=True) if c.body == body]
+        if len(_pitching(kin, joints, body, x[: sim.nq])) > 2:  # a foot on an ankle stands on its lowest points
+            far = [c.radius - float(at[2]) for c, at in parts]
+        else:  # a shank, on those that are farthest from the knee
+            knee = np.asarray(joints[body].child_point, dtype=float)
+            far = [float(np.linalg.norm(np.asarray(c.point) - knee)) + c.radius for c, _ in parts]
+        carrying = [c for (c, _), reach in zip(parts, far, strict=True) if reach >= max(far) - _FLAT]
+        if len(carrying) > 1 and len(soles) > 2:
+            middle = np.mean([np.asarray(c.point) for c in carrying], axis=0)
+            carrying = [replace(carrying[0], point=middle, radius=max(c.radius for c in carrying), name=body)]
+        out += carrying
+    return out
+
+
+def _named(mech: Mechanism, kin: Kinematics, name: str, given: Any) -> list[Contact]:
+    """Contacts of a name: one contact, those of a body, or a ball about the origin of a link."""
+    if name in {contact.name for contact in mech.contacts}:
+        return [contact for contact in mech.contacts if contact.name == name]
+    i, point, _ = kin.place(checks.one_of("Legs(feet)", name, [*mech.contact_names, *kin.frames]))
+    body = mech.body_names[i]
+    own = [contact for contact in mech.contacts if contact.body == body]
+    if name in mech.body_names and own:
+        return own
+    radius = given[name] if isinstance(given, Mapping) else 0.0
+    radius = checks.number(f"Legs(feet={{{name!r}: ...}})", radius, at_least=0.0)
+    return [Contact(body, point, radius, friction=own[0].friction if own else 0.8, name=name)]
+
+
+def _stance(sim: Simulator) -> Array:
+    """A state with bent legs, the feet below the hips."""
+    mech, x = sim.mechanism, sim.neutral()
+    feet = Feet(sim)
+    kin, bodies = Kinematics(sim), {joint.child: joint for joint in mech.joints}
+    at = feet.positions(x)
+    places, knees = {}, []
+    for k, contact in enumerate(feet.contacts):
+        hinges = _pitching(kin, bodies, contact.body, x[: sim.nq])
+        if len(hinges) < 2:
+            raise ValueError(
+                f"Legs(robot): the leg of {contact.name!r} has no two hinges about y, which bend it; give stance=..."
+            )
+        hip, knee = (_origin(sim, bodies[name], x) for name in hinges[:2])
+        foot = at[k] if len(hinges) == 2 else _origin(sim, bodies[hinges[2]], x)
+        length = np.linalg.norm((knee - hip)[[0, 2]]) + np.linalg.norm((foot - knee)[[0, 2]])
+        body, point, turn = kin.place(contact.body)
+        del body
+        kin.add(f"foot {k}", contact.body, turn.T @ (np.asarray(contact.point) - point))
+        sole = float(foot[2] - at[k, 2])
+        middle = hip[0] + (at[k, 0] - foot[0] if len(hinges) > 2 else 0.0)
+        places[f"foot {k}"] = np.array([middle, at[k, 1], hip[2] - _STRETCH * length - sole])
+        knees.append(hinges[1])
+    joints = [bodies[name] for name in dict.fromkeys(knees)]
+    found = [_bent(sim, kin, places, joints, x, sign) for sign in (1.0, -1.0)]
+    errors = [float(r.error) for r in found]
+    if min(errors) > 1e-4:
+        raise ValueError(f"Legs(robot): no stance of {mech.name!r} puts the feet below the hips; give stance=...")
+    good = [r for r in found if r.error <= 1e-4]
+    best = min(good, key=lambda r: _origin_of(sim, bodies, knees, r.q))
+    out = sim.neutral()
+    out[: sim.nq] = best.q
+    return out
+
+
+def _bent(sim: Simulator, kin: Kinematics, places: dict[str, Array], knees: list[Joint], x: Array, sign: float) -> Any:
+    """The search from knees that are bent to one side."""
+    start = x[: sim.nq].copy()
+    for joint in knees:
+        q = sim.mechanism.q_slice(joint.name)
+        low, high = joint.limits[0] if joint.limits else (-np.inf, np.inf)
+        start[q] = np.clip(start[q] + sign * _BEND, low, high)
+    base = sim.mechanism.joints[0].name
+    return ik(kin, places, start, fixed=(base,), tolerance=1e-6, attempts=_TRIES)
+
+
+def _origin_of(sim: Simulator, bodies: dict[str, Joint], knees: list[str], q: Array) -> float:
+    """Mean place of the knees along x [m]."""
+    x = np.concatenate([q, np.zeros(sim.nv)])
+    return float(np.mean([_origin(sim, bodies[name], x)[0] for name in knees]))
+
+
+def _pitching(kin: Kinematics, bodies: dict[str, Joint], body: str, q: Array) -> list[str]:
+    """Joints from the base to a body whose axis is nearly y, by the names of the bodies they carry."""
+    mech, out = kin.mechanism, []
+    J = kin.jacobian(body, q)[3:]
+    while body in bodies and bodies[body].kind != "floating":
+        joint = bodies[body]
+        if joint.nv == 1 and joint.nrot == 1 and abs(J[1, mech.v_slice(joint.name).start]) > _PITCH:
+            out.append(body)
+        body = joint.parent or ""
+    return out[::-1]
+
+
+def _origin(sim: Simulator, joint: Joint, x: Array) -> Array:
+    """Place of the joint point on the child of a joint."""
+    i = sim.mechanism.body_names.index(joint.child)
+    z = sim.bodies(x[: sim.nq], np.zeros(sim.nv))[i]
+    w, v = z[6], z[7:10]
+    point = np.asarray(joint.child_point, dtype=float)
+    side = np.cross(v, point)
+    return np.asarray(z[:3] + point + 2.0 * (w * side + np.cross(v, side)))

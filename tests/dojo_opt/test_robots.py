@@ -1,0 +1,91 @@
+"""Problems of any robot: feet, stance and weights are found; plans hold when they are replayed with shorter steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.gaits.feet import Feet
+from dojo_opt.gaits.references import _TROT, _offsets
+from dojo_opt.problems.legs import Legs
+from sim.mechanism.parts import Contact
+
+
+@pytest.fixture(scope="module")
+def straight():
+    """The quadruped as a file might have it: on straight legs, with contacts all over, and the feet among them."""
+    mech = dojo.models.quadruped(damper=0.0)
+    extra = [Contact(name, (0.0, 0.0, 0.05), name=f"{name}_point") for name in mech.body_names]
+    return replace(mech, contacts=[*mech.contacts, *extra], neutral=None)
+
+
+def test_a_robot_stands_on_its_feet_with_its_knees_to_the_back(straight):
+    legs = Legs(straight)
+    assert sorted(legs.feet) == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    sim = legs.simulator(0.01, 1e-6)
+    feet, kin, x = Feet(sim), dojo.Kinematics(sim), sim.neutral()
+    np.testing.assert_allclose(feet.gaps(x), 0.0, atol=1e-5)
+    for leg, at in zip(("FR", "FL", "RR", "RL"), feet.positions(x), strict=True):
+        joints = {joint.child: joint for joint in sim.mechanism.joints}
+        hip, knee = (
+            kin.pose(f"{leg}_{part}", x[: sim.nq])[0]
+            + kin.pose(f"{leg}_{part}", x[: sim.nq])[1] @ np.asarray(joints[f"{leg}_{part}"].child_point)
+            for part in ("thigh", "calf")
+        )
+        assert abs(hip[0] - at[0]) < 1e-3 and knee[0] < hip[0] - 0.05
+    assert (
+        legs.size == pytest.approx(legs.height / 0.29) and min(np.min(j.damper) for j in sim.mechanism.joints[1:]) > 0.3
+    )
+
+
+def test_a_robot_stands_up_and_the_plan_holds_at_a_fifth_of_the_step(straight):
+    problem = dojo.problems.stand_up(straight)
+    plan = dojo.ilqr(problem)
+    assert plan.success and plan.nit < 30, plan.message
+    assert plan.x[-1, 2] - plan.x[0, 2] > 0.1
+    fine = problem.sim.replace(time_step=problem.sim.time_step / 5)
+    shot = fine.closed_loop(plan.x[0], plan.u, xs=plan.x, Ks=plan.K, substeps=5, limits=problem.control_limits)
+    assert shot.success and np.abs(shot.x[-1, :3] - plan.x[-1, :3]).max() < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["trot", "jump"])
+def test_a_robot_trots_and_jumps(straight, task):
+    plan = dojo.ilqr(getattr(dojo.problems, task)(straight))
+    assert plan.success, plan.message
+    assert (1.0 - 2.0 * (plan.x[:, 4] ** 2 + plan.x[:, 5] ** 2)).min() > 0.9
+    assert plan.x[-1, 0] - plan.x[0, 0] > 0.1
+
+
+def test_six_legs_trot_in_two_sets_of_three():
+    places = np.array([(x, y) for x in (0.3, 0.0, -0.3) for y in (0.2, -0.2)])
+    down = _offsets(_TROT, places).reshape(3, 2)
+    np.testing.assert_array_equal(down, [[0.5, 0.0], [0.0, 0.5], [0.5, 0.0]])
+
+
+def test_an_arm_reaches_a_pose_within_its_limits():
+    arm = dojo.models.panda(gripper=False)
+    sim = dojo.Simulator(arm, time_step=0.05)
+    kin, q = dojo.Kinematics(sim), sim.neutral()[: sim.nq]
+    at, R = kin.pose("link7", q)
+    problem = dojo.problems.reach(arm, "link7", at + (0.1, 0.2, -0.1), duration=1.0, time_step=0.05)
+    plan = dojo.ilqr(problem)
+    assert plan.success, plan.message
+    np.testing.assert_allclose(kin.pose("link7", plan.x[-1, : sim.nq])[0], at + (0.1, 0.2, -0.1), atol=1e-3)
+    np.testing.assert_allclose(plan.x[-1, sim.nq :], 0.0, atol=1e-3)
+    assert plan.nit < 30 and R.shape == (3, 3)
+
+
+def test_what_no_robot_can_do_is_refused(straight):
+    arm = dojo.models.panda(gripper=False)
+    with pytest.raises(ValueError, match="out of reach"):
+        dojo.problems.reach(arm, "link7", (5.0, 0.0, 0.0))
+    with pytest.raises(ValueError, match="beyond its limits"):
+        dojo.problems.reach(arm, "link7", (0.4, 0.0, 0.5), start=np.full(7, 9.0))
+    with pytest.raises(ValueError, match="floating base"):
+        dojo.problems.trot(arm)
+    with pytest.raises(ValueError, match="expected a robot"):
+        dojo.problems.trot(feet=["FL_foot"])
+    with pytest.raises(ValueError, match="wing"):
+        dojo.problems.stand_up(straight, feet=["wing"])
