@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from dojo_opt.plots.axes import finish as _finish
-from dojo_opt.plots.axes import input_units, panel, units
+from dojo_opt.plots.axes import input_units, label_lines, panel, units
+from dojo_opt.plots.branches import Branch, branches, dof_limits, draw_limits, input_panel, joint_panel
 from dojo_opt.viewer.motion import Motion, motion
 from sim.mechanism.mechanism import Mechanism
 from sim.simulator.simulator import Simulator
@@ -15,6 +16,9 @@ from sim.simulator.simulator import Simulator
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
+
+
+_FEW_DOFS, _COLUMNS = 10, 6  # up to so many degrees of freedom share a panel; so many branches fit beside one another
 
 
 @overload
@@ -28,9 +32,10 @@ def trajectory(result: Any, figure: SubFigure, *, simulator: Simulator | None = 
 def trajectory(
     result: Any, figure: Figure | SubFigure | None = None, *, simulator: Simulator | None = None
 ) -> Figure | SubFigure:
-    """Four panels of a motion: state, controls, contact forces, path of body and feet.
+    """The panels of a motion: state, controls, contact forces, path of body and feet.
 
-    A mechanism without contacts shows its velocities instead of their forces.
+    A mechanism without contacts shows its velocities instead of their forces. A robot with legs or arms on a base shows
+    the base, then joints and inputs leg by leg: grey while the leg stands, with the limits that are near.
 
     Args:
         result: Trajectory, Plan or ClosedLoop.
@@ -45,11 +50,16 @@ def trajectory(
         ValueError: the result does not know its simulator.
         SimulationError: a step of a plan cannot be solved again, for its forces.
     """
+    m = motion(result, simulator)
+    parts = branches(m.mechanism)
+    several = m.mechanism.nv > _FEW_DOFS and 1 < len(parts) <= _COLUMNS
     if figure is None:
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(10, 7.5), layout="constrained")
-    m = motion(result, simulator)
+        figure = Figure(figsize=(3.4 * max(len(parts), 4), 9.0) if several else (10, 7.5), layout="constrained")
+    if several:
+        _by_branches(m, parts, figure)
+        return figure
     axes = np.ravel(figure.subplots(2, 2))
     state(m, axes[0])
     controls(m, axes[1])
@@ -58,15 +68,42 @@ def trajectory(
     return figure
 
 
+def _by_branches(m: Motion, parts: list[Branch], figure: Any) -> None:
+    """Base, forces and paths above; joints and inputs below, a column for each branch."""
+    above, below = figure.subfigures(2, 1, height_ratios=(1.0, 1.7))
+    place, attitude, forces, way = above.subplots(1, 4)
+    values, base = coordinates(m), m.mechanism.joints[0]
+    names = _labels(m.mechanism)
+    for ax, dofs, label in (
+        (place, range(base.ntrans), "base [m]"),
+        (attitude, range(base.ntrans, base.nv), "base, rotation vector [rad]"),
+    ):
+        for dof in dofs:
+            ax.plot(m.time, values[dof], label=names[dof].removeprefix(f"{base.name} "))
+        _finish(ax, label, "time [s]", at_lines=True)
+    (contact_forces if m.mechanism.contact_names else velocities)(m, forces)
+    paths(m, way)
+    rows = below.subplots(2, len(parts), sharex=True, sharey="row", squeeze=False)
+    for k, part in enumerate(parts):
+        joint_panel(m, part, values, rows[0, k])
+        input_panel(m, part, rows[1, k])
+    for ax in rows.flat:  # the scales are settled now
+        label_lines(ax)
+    rows[0, 0].set_ylabel(f"joints {units(m.mechanism, 'm', 'rad', range(base.nv, m.mechanism.nv))}")
+    rows[1, 0].set_ylabel(f"inputs {input_units(m.mechanism)}")
+
+
 @panel
 def state(m: Motion, ax: Axes) -> Axes:
     """Coordinates that change, over time; the orientation of a quaternion joint as its rotation vector."""
-    drawn = []
+    drawn: list[int] = []
     for dof, (label, values) in enumerate(zip(_labels(m.mechanism), coordinates(m), strict=True)):
         if np.ptp(values) > 1e-4 or m.mechanism.nv == 1:
             ax.plot(m.time, values, label=label)
             drawn.append(dof)
-    return _finish(ax, f"coordinates {units(m.mechanism, 'm', 'rad', drawn)}", "time [s]")
+    bounds = dof_limits(m.mechanism)
+    draw_limits(ax, [bounds[dof] for dof in drawn])
+    return _finish(ax, f"coordinates {units(m.mechanism, 'm', 'rad', drawn)}", "time [s]", at_lines=True)
 
 
 @panel
@@ -74,7 +111,7 @@ def velocities(m: Motion, ax: Axes) -> Axes:
     """Joint velocities over time, each the mean over the step that led to its knot."""
     for label, values in zip(_labels(m.mechanism), m.x[:, m.mechanism.nq :].T, strict=True):
         ax.plot(m.time, values, label=label)
-    return _finish(ax, f"velocities {units(m.mechanism, 'm/s', 'rad/s')}", "time [s]")
+    return _finish(ax, f"velocities {units(m.mechanism, 'm/s', 'rad/s')}", "time [s]", at_lines=True)
 
 
 @panel
@@ -82,7 +119,8 @@ def controls(m: Motion, ax: Axes) -> Axes:
     """Inputs over time, each held over its knot."""
     for k, name in enumerate(m.mechanism.input_names):
         ax.stairs(m.u[:, k], m.time, baseline=None, label=name)
-    return _finish(ax, f"inputs {input_units(m.mechanism)}", "time [s]")
+    draw_limits(ax, np.transpose(m.mechanism.input_limits))
+    return _finish(ax, f"inputs {input_units(m.mechanism)}", "time [s]", at_lines=True)
 
 
 @panel
@@ -90,12 +128,11 @@ def contact_forces(m: Motion, ax: Axes) -> Axes:
     """Mean normal force over each step of every loaded contact; the size of its friction force is dashed."""
     edges = np.concatenate([[0.0], m.contact_time])
     peak = m.normal_force.max(axis=0, initial=0.0)
-    for k in np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0)):
-        name = m.mechanism.contact_names[k]
-        line = ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name)
-        friction = ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle="--")
-        friction.set_edgecolor(line.get_edgecolor())
-    return _finish(ax, "contact forces [N] (dashed: friction)", "time [s]")
+    for i, k in enumerate(np.flatnonzero(peak > 1e-3 * peak.max(initial=0.0))):
+        name, colour = m.mechanism.contact_names[k], f"C{i % 10}"
+        ax.stairs(m.normal_force[:, k], edges, baseline=None, label=name, color=colour)
+        ax.stairs(m.friction_force[:, k], edges, baseline=None, linestyle=":", color=colour)
+    return _finish(ax, "contact forces [N] (dotted: friction)", "time [s]", at_lines=True)
 
 
 @panel

@@ -9,7 +9,8 @@ import dojo_opt as dojo
 
 
 def labels(axes):
-    return [text.get_text() for text in axes.get_legend().get_texts()] if axes.get_legend() else []
+    """Names of the curves, in the legend or at the lines."""
+    return [text.get_text() for text in (axes.get_legend().get_texts() if axes.get_legend() else axes.texts)]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,52 @@
+"""Panels: joints leg by leg, names at the lines, limits and stances; nothing covers anything else."""
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from dojo_opt.plots.branches import branches
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """A quadruped that stands, and is lifted off its right front foot by an input."""
+    sim = dojo.Simulator(dojo.models.quadruped(), time_step=0.02)
+    us = np.zeros((20, sim.nu))
+    us[10:, sim.mechanism.input_names.index("FR_calf")] = -20.0
+    return sim.rollout(sim.neutral(), us)
+
+
+def test_legs_and_arms_are_branches():
+    found = {branch.name: branch for branch in branches(dojo.models.quadruped())}
+    assert list(found) == ["FR", "FL", "RR", "RL"]
+    assert found["FR"].labels == ("hip", "thigh", "calf") and len(found["FR"].contacts) == 1
+    assert {"l_arm", "r_arm", "l_leg", "r_leg", "back"} <= {branch.name for branch in branches(dojo.models.atlas())}
+    (arm,) = branches(dojo.models.panda(gripper=False))
+    assert len(arm.dofs) == 7
+
+
+def test_a_robot_with_legs_is_drawn_leg_by_leg(motion):
+    figure = dojo.plots.trajectory(motion)
+    titled = [ax for ax in figure.axes if ax.get_title()]
+    assert [ax.get_title() for ax in titled] == ["FR", "FL", "RR", "RL"]
+    for ax in titled:
+        assert sorted(text.get_text() for text in ax.texts) == ["calf", "hip", "thigh"]
+        curves = [line for line in ax.lines if len(line.get_xdata()) == len(motion.time)]
+        assert len(curves) == 3 and len({line.get_color() for line in curves}) == 3
+        assert any(np.ptp(line.get_ydata()) == 0.0 and line not in curves for line in ax.lines)  # limits
+    assert any(len(ax.patches) for ax in titled)  # stances
+    assert not any(ax.get_legend() for ax in titled)
+
+
+def test_names_at_the_lines_do_not_touch(motion):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Text
+
+    figure = dojo.plots.trajectory(motion)
+    FigureCanvasAgg(figure).draw()
+    for ax in figure.axes:
+        boxes = sorted((Text.get_window_extent(text) for text in ax.texts), key=lambda box: box.y0)
+        for lower, upper in zip(boxes, boxes[1:], strict=False):
+            assert lower.y0 + 0.6 * lower.height < upper.y0
+        for box in boxes:
+            assert box.x0 >= ax.get_window_extent().x1  # beside the curves
