@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, touch
+from dojo_opt.models.links import Link, Mount, bodies, grounded, joints, padded, touch
 from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact, Input, Joint
@@ -106,6 +106,7 @@ def atlas(
     crouch: float = 0.2,
     friction: float = 0.8,
     law: str = "nonlinear",
+    contacts: str = "feet",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
     """Thirty-one links and thirty hinges, 174 kg; it stands on four balls under each foot.
@@ -124,8 +125,10 @@ def atlas(
         limits: whether the hinges have stops, 60 bounds.
         arms: whether the robot has arms; 17 links and 16 hinges without.
         crouch: half the bend of the knees in the neutral state [rad], at least 0.
-        friction: coefficient of friction of the eight contacts.
+        friction: coefficient of friction of the contacts.
         law: contact law, see `dojo.Contact`.
+        contacts: "feet", eight balls under the soles, or "all", also a ball on every other link: it then lies on
+            the ground when it falls.
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Returns:
@@ -135,6 +138,7 @@ def atlas(
         ValueError: for an argument out of range; the message names the part.
     """
     checks.number("atlas(crouch=...)", crouch, at_least=0.0)
+    checks.one_of("atlas(contacts=...)", contacts, ("feet", "all"))
     links = dict(TRUNK)
     mounts = [Mount(child, parent, at, axis, stops, name=name) for name, parent, child, at, axis, stops in BACK]
     for side, s in (("l", 1.0), ("r", -1.0)):
@@ -144,7 +148,9 @@ def atlas(
         links |= {f"{side}_{part}": link for part, link in ARM.items()}
         mounts += [_arm_mount(side, s, row) for row in ARM_JOINTS]
     made = joints(links, mounts, spring=spring, damper=damper, limits=limits)
-    contacts = _soles(links, friction=friction, law=law)
+    touching = _soles(links, friction=friction, law=law)
+    if contacts == "all":
+        touching = padded(links, touching, friction=friction, law=law)
     base = Joint("floating", None, "pelvis", name="base", child_point=-np.asarray(TRUNK["pelvis"].com))
     bend = {"leg_hpy": -crouch, "leg_kny": 2 * crouch, "leg_aky": -crouch}
     bend |= {"arm_ely": 0.1, "arm_elx": 0.1} if arms else {}
@@ -152,7 +158,7 @@ def atlas(
     if arms:
         neutral["r_arm_elx"] = -0.1
     inputs = [Input(j.name) for j in made]
-    mech = Mechanism(bodies(links), [base, *made], contacts, inputs, gravity=gravity, name="atlas", neutral=neutral)
+    mech = Mechanism(bodies(links), [base, *made], touching, inputs, gravity=gravity, name="atlas", neutral=neutral)
     return grounded(mech, 2)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dojo_opt.models.links import Link, Mount, bodies, from_z, grounded, joints, touch
+from dojo_opt.models.links import Link, Mount, bodies, from_z, grounded, joints, padded, touch
+from sim.mechanism import checks
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Input, Joint
 from sim.mechanism.shapes import Capsule, Shape
@@ -81,6 +82,7 @@ def humanoid(
     damper: float = 1.0,
     friction: float = 0.8,
     law: str = "nonlinear",
+    contacts: str = "feet",
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> Mechanism:
     """Thirteen links, 40.84 kg; it stands with the capsules of its feet on the ground z = 0.
@@ -95,8 +97,10 @@ def humanoid(
     Args:
         spring: spring constant of all joints [N m/rad], with its rest at zero.
         damper: damper of all joints [N m s/rad].
-        friction: coefficient of friction of the four contacts, a heel and a toe per foot.
+        friction: coefficient of friction of the contacts.
         law: contact law, see `dojo.Contact`.
+        contacts: "feet", four balls, a heel and a toe per foot, or "all", also a ball on every other link: it then lies
+            on the ground when it falls.
         gravity: (3,) acceleration of gravity [m/s^2].
 
     Returns:
@@ -107,12 +111,15 @@ def humanoid(
     """
     links = {**_trunk(), **_side(1.0), **_side(-1.0)}
     made = joints(links, _mounts(), spring=spring, damper=damper)
-    contacts = [
+    checks.one_of("humanoid(contacts=...)", contacts, ("feet", "all"))
+    touching = [
         touch(links, f"{side}_foot", point * (1, s, 1), FOOT_RADIUS, f"{side}_{end}", friction=friction, law=law)
         for side, s in (("right", 1.0), ("left", -1.0))
         for end, point in (("heel", HEEL), ("toe", TOE))
     ]
+    if contacts == "all":
+        touching = padded(links, touching, friction=friction, law=law)
     base = Joint("floating", None, "torso", name="base", child_point=-np.asarray(links["torso"].com))
     inputs = [Input(j.name, dof=d) for j in made for d in range(j.nv)]
-    mech = Mechanism(bodies(links), [base, *made], contacts, inputs, gravity=gravity, name="humanoid")
+    mech = Mechanism(bodies(links), [base, *made], touching, inputs, gravity=gravity, name="humanoid")
     return grounded(mech, 2)

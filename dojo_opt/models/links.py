@@ -18,6 +18,7 @@ from sim.mechanism.stance import gaps
 
 Floats = NDArray[np.float64]
 
+_PAD = 0.04  # [m] radius of a ball that stands for a link of 1 kg
 _CLEAR = 1e-9  # [m] of the lowest contact over the ground
 
 
@@ -137,3 +138,17 @@ def degrees(low: float, high: float) -> tuple[float, float]:
 def _shifted(shape: Shape, by: Floats) -> Shape:
     """The shape with its centre moved."""
     return replace(shape, center=np.asarray(shape.center) + by)
+
+
+def padded(links: Mapping[str, Link], contacts: Sequence[Contact], *, friction: float, law: str) -> list[Contact]:
+    """Contacts, and a ball about the centre of mass of every link that has none: of 4 cm for 1 kg, at equal density.
+
+    Such robots lie on the ground when they fall.
+    """
+    bare = {name: link for name, link in links.items() if name not in {contact.body for contact in contacts}}
+    balls = [
+        Contact(name, radius=_PAD * link.mass ** (1.0 / 3.0), friction=friction, law=law, name=f"{name}_pad")
+        for name, link in bare.items()
+        if link.mass > 0.0
+    ]
+    return [*contacts, *balls]

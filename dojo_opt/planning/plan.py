@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dojo_opt.planning.options import Options
-from sim.mechanism.brief import brief_table
+from sim.mechanism.brief import brief_table, drawn
 from sim.mechanism.checks import whole_number
+from sim.simulator.motion_file import archived, export, opened, restored
+from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
 Matrix = NDArray[np.float64]
@@ -70,6 +72,7 @@ class Plan:
         multipliers: one (m, d) array per constraint.
         penalties: likewise.
         problem: the Problem; not saved.
+        simulator: the simulator (default None: that of the problem).
     """
 
     success: bool
@@ -91,6 +94,11 @@ class Plan:
     multipliers: list[Matrix] = field(default_factory=list)
     penalties: list[Matrix] = field(default_factory=list)
     problem: Any = None
+    simulator: Any = None
+
+    def __post_init__(self) -> None:
+        if self.simulator is None and self.problem is not None:
+            self.simulator = self.problem.sim
 
     def __repr__(self) -> str:
         return (
@@ -99,7 +107,7 @@ class Plan:
 
     def _repr_html_(self) -> str:
         rows = [[r[name] for name in RECORDED] for r in self.history]
-        return brief_table(self.closing_line(), COLUMNS, rows)
+        return drawn(self) + brief_table(self.closing_line(), COLUMNS, rows)
 
     @property
     def time(self) -> Matrix:
@@ -119,10 +127,10 @@ class Plan:
             ValueError: the plan is not periodic, or was loaded from a file and has no simulator.
         """
         n = whole_number("Plan.repeated(count)", count)
-        if self.stride is None or self.problem is None:
-            lacking = "a periodic plan (Periodic)" if self.stride is None else "a plan with its problem"
+        if self.stride is None or self.simulator is None:
+            lacking = "a periodic plan (Periodic)" if self.stride is None else "a plan with its simulator"
             raise ValueError(f"Plan.repeated: expected {lacking}")
-        cycles = [self.problem.sim.integrate(self.x[min(i, 1) :], i * self.stride) for i in range(n)]
+        cycles = [self.simulator.integrate(self.x[min(i, 1) :], i * self.stride) for i in range(n)]
         u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
         x, fun = np.concatenate(cycles), n * self.fun
         return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
@@ -148,7 +156,7 @@ class Plan:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write all fields but the problem to a file.
+        """Write all fields but the problem to a file, with the simulator, in a format of dojo-opt without pickles.
 
         Args:
             path: path of the file; NumPy appends .npz to a name without it.
@@ -156,13 +164,14 @@ class Plan:
         Raises:
             OSError: the file cannot be written.
         """
-        arrays = {name: getattr(self, name) for name in ("x", "u", "K", "k")}
+        head, arrays = archived(self.simulator if isinstance(self.simulator, Simulator) else None, "plan")
+        arrays |= {name: getattr(self, name) for name in ("x", "u", "K", "k")}
         arrays |= {} if self.stride is None else {"stride": self.stride}
         arrays |= {f"multiplier_{i}": a for i, a in enumerate(self.multipliers)}
         arrays |= {f"penalty_{i}": a for i, a in enumerate(self.penalties)}
         scalars = ("message", "nit", "fun", "violation", "gap", "seconds", "time_step", "substeps", "history")
         meta = {name: getattr(self, name) for name in scalars} | {"status": int(self.status), "success": self.success}
-        np.savez(path, meta=json.dumps(meta), **arrays)
+        np.savez(path, allow_pickle=False, meta=json.dumps(head | meta), **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Plan:
@@ -172,19 +181,36 @@ class Plan:
             path: path of the file.
 
         Returns:
-            The plan, without a problem.
+            The plan with its simulator, without a problem.
 
         Raises:
             OSError: the file cannot be read.
+            ValueError: it is another file, or of a later version.
         """
-        with np.load(path) as data:
-            meta = json.loads(str(data["meta"]))
-            meta["status"] = Status(meta["status"])
-            count = sum(name.startswith("multiplier_") for name in data.files)
-            multipliers = [data[f"multiplier_{i}"] for i in range(count)]
-            penalties = [data[f"penalty_{i}"] for i in range(count)]
-            arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data.files}
-            return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties)
+        meta, data = opened("Plan.load", path, "plan")
+        meta["status"] = Status(meta["status"])
+        sim = restored(meta, data)
+        count = sum(name.startswith("multiplier_") for name in data)
+        multipliers = [data[f"multiplier_{i}"] for i in range(count)]
+        penalties = [data[f"penalty_{i}"] for i in range(count)]
+        arrays = {name: data[name] for name in ("x", "u", "K", "k", "stride") if name in data}
+        return cls(**meta, **arrays, multipliers=multipliers, penalties=penalties, simulator=sim)
+
+    def export(self, path: str | Path) -> None:
+        """Write the motion for other tools.
+
+        Args:
+            path: path of the file. With the suffix .csv a table with named columns, of times, coordinates, velocities
+                and inputs; .npz these as arrays; .json the motion of the hinges and slides by their names, as in
+                trajectory_msgs/JointTrajectory of ROS.
+
+        Raises:
+            OSError: the file cannot be written.
+            ValueError: for another suffix, or a plan without a simulator.
+        """
+        if self.simulator is None:
+            raise ValueError("Plan.export: expected a plan with its simulator")
+        export("Plan.export(path)", path, self.simulator, self.time, self.x, self.u)
 
 
 class History:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from dojo_opt.report.page import write_page
 from dojo_opt.report.study import STUDIES, Studies, run_reports
+from dojo_opt.viewer.show import touching
 from sim.io.urdf.load import load_urdf
-from sim.mechanism.parts import Contact
 
 CHECKOUT = "For reference scenes and other engines, run python benchmarks/compare.py --help from a checkout."
 MOVED = ("contact", "planning", "mechanics", "compile")  # studies that `dojo-opt report` had
@@ -61,7 +61,7 @@ def report(
     """
     mechanism = None
     if args.robot is not None:
-        mechanism = load_urdf(args.robot, floating=not args.fixed, contacts=_contacts(args.contacts))
+        mechanism = load_urdf(args.robot, floating=not args.fixed, contacts=touching(args.contacts))
     names = list(studies) if args.name == "all" else [args.name]
     reports = run_reports(names, quick=args.quick, mechanism=mechanism, verbose=True, studies=studies)
     for name, made in reports.items():
@@ -74,20 +74,6 @@ def report(
         write_page(reports, args.out, _command(args, args.name, program))
     missed = args.strict and not all(made.met() for made in reports.values())
     return 1 if missed or any("error" in made.details for made in reports.values()) else 0
-
-
-def _contacts(words: Sequence[str] | None) -> list[str | Contact] | None:
-    """Links, and balls about their origins.  ValueError: a radius is not a number."""
-    if words is None:
-        return None
-    found: list[str | Contact] = []
-    for word in words:
-        link, ball, radius = word.partition("=")
-        try:
-            found.append(Contact(link, (0.0, 0.0, 0.0), float(radius)) if ball else link)
-        except ValueError as error:
-            raise ValueError(f"--contacts {word}: expected LINK or LINK=RADIUS in metres: {error}") from None
-    return found
 
 
 def _command(args: argparse.Namespace, name: str, program: Sequence[str]) -> str:

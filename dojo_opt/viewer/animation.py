@@ -49,14 +49,26 @@ def save_html(result: Any, path: str | Path, *, simulator: Simulator | None = No
         SimulationError: a step of a plan cannot be solved again, for its forces.
         OSError: the file cannot be written.
     """
+    target = Path(path)
+    target.write_text(html_of(motion(result, simulator)), encoding="utf-8")
+    return target
+
+
+def html_of(m: Motion, *, moving: bool = True) -> str:
+    """The page of a motion.
+
+    Args:
+        m: the motion.
+        moving: whether it is played; otherwise the page has its first poses.
+
+    Returns:
+        The text of an HTML file.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # MeshCat loads its server, and that an old part of zmq
         import meshcat  # noqa: F401
 
-    m = motion(result, simulator)
-    target = Path(path)
-    target.write_text(page(m, [*_ground(m), *_scene(m), _animation(m)]), encoding="utf-8")
-    return target
+    return page(m, [*_ground(m), *_scene(m), *([_animation(m)] if moving else [])])
 
 
 def _ground(m: Motion) -> list[Any]:
@@ -125,7 +137,7 @@ def _scene(m: Motion) -> list[Any]:
 
     commands = []
     for k, body in enumerate(m.mechanism.bodies):
-        node = _node("bodies", k, body.name)
+        node = node_of("bodies", k, body.name)
         for part, piece in enumerate(m.pieces[body.name]):
             solid, paint, place = drawing.geometry(piece)
             commands.append(SetObject(solid, paint, node.append(f"part{part}")))
@@ -138,13 +150,13 @@ def _scene(m: Motion) -> list[Any]:
         commands.append(SetTransform(drawing.matrix(m.position[0, k], m.quaternion[0, k]), node))
     for part, piece in enumerate(m.pieces[WORLD]):
         solid, paint, place = drawing.geometry(piece)
-        node = _node("obstacles", part, WORLD)
+        node = node_of("obstacles", part, WORLD)
         commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     for k, collision in enumerate(m.mechanism.collisions):
         if collision.b != WORLD or collision.shape_b is None or isinstance(collision.shape_b, shapes.String):
             continue
         for part, piece in enumerate(drawing.of_solid(collision.shape_b, _EARTH)):
-            node = _node("obstacles", k, collision.name).append(f"part{part}")
+            node = node_of("obstacles", k, collision.name).append(f"part{part}")
             solid, paint, place = drawing.geometry(piece)
             commands += [SetObject(solid, paint, node), SetTransform(place, node)]
     return commands
@@ -158,7 +170,7 @@ def _shows(contact: Contact, body: Body) -> bool:
     return not any(np.allclose(np.asarray(s.center), np.asarray(contact.point)) for s in balls)
 
 
-def _node(kind: str, number: int, name: str) -> Any:
+def node_of(kind: str, number: int, name: str) -> Any:
     """Where a body or an obstacle is in MeshCat's scene."""
     from meshcat.path import Path as Node
 
@@ -186,5 +198,5 @@ def _animation(m: Motion) -> Any:
         for frame, position, quaternion in zip(frames, m.position[::every, k], m.quaternion[::every, k], strict=True):
             clip.set_property(frame, "position", "vector3", position.tolist())
             clip.set_property(frame, "quaternion", "quaternion", np.roll(quaternion, -1).tolist())
-        clips[_node("bodies", k, body.name)] = clip
+        clips[node_of("bodies", k, body.name)] = clip
     return SetAnimation(Animation(clips, default_framerate=FRAMES), play=True, repetitions=1000)

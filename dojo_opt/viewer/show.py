@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,19 @@ def add_show(commands: Any) -> None:
         "--repair", action="store_true", help="replace inertias of ROBOT.urdf that no rigid body can have"
     )
     parser.add_argument(
+        "--contacts",
+        nargs="+",
+        metavar="LINK",
+        help="links of ROBOT.urdf that touch the ground, LINK=RADIUS for a ball about a link's origin [m]; of a model, "
+        "feet or all (all is what --drop takes where a model has it)",
+    )
+    parser.add_argument(
+        "--meshes",
+        choices=("hull", "decompose", "sphere", "box", "capsule", "none"),
+        default="hull",
+        help="what stands for the collision meshes of ROBOT.urdf, hull by default",
+    )
+    parser.add_argument(
         "--seconds", type=float, default=2.0, metavar="S", help="length of the motion [s], 2 by default"
     )
     parser.add_argument("--time-step", type=float, default=0.005, metavar="H", help="time step [s], .005 by default")
@@ -41,15 +56,41 @@ def load(args: argparse.Namespace) -> dojo.Mechanism:
     """The mechanism of a file, or of a model by name."""
     suffix = Path(args.robot).suffix
     if suffix == ".urdf":
-        return dojo.load_urdf(args.robot, floating=not args.fixed, repair=args.repair)
+        contacts = touching(args.contacts)
+        return dojo.load_urdf(
+            args.robot, floating=not args.fixed, repair=args.repair, contacts=contacts, meshes=args.meshes
+        )
     if suffix == ".xml":
         return dojo.load_mjcf(args.robot)
     names = dojo.models.__all__
     if args.robot not in names:
         close = nearest(args.robot, names) or "; `dojo-opt models` lists them"
         raise ValueError(f"{args.robot!r} is neither a .urdf nor an .xml file, nor a model{close}")
-    found: dojo.Mechanism = getattr(dojo.models, args.robot)()
+    build = getattr(dojo.models, args.robot)
+    chosen: dict[str, Any] = {}
+    if args.contacts:
+        chosen["contacts"] = args.contacts[0] if len(args.contacts) == 1 else args.contacts
+    elif args.drop and "contacts" in signature(build).parameters:
+        chosen["contacts"] = "all"
+    try:
+        found: dojo.Mechanism = build(**chosen)
+    except TypeError as error:
+        raise ValueError(f"--contacts: {args.robot} has no choice of contacts") from error
     return found
+
+
+def touching(words: Sequence[str] | None) -> list[str | dojo.Contact] | None:
+    """Contacts of the command line: links, or links with a radius; None for all shapes of the file."""
+    if words is None:
+        return None
+    out: list[str | dojo.Contact] = []
+    for word in words:
+        link, given, radius = word.partition("=")
+        try:
+            out.append(dojo.Contact(link, radius=float(radius)) if given else link)
+        except ValueError as error:
+            raise ValueError(f"--contacts {word}: expected LINK or LINK=RADIUS in metres: {error}") from None
+    return out
 
 
 def _numbers(sim: dojo.Simulator, motion: dojo.Trajectory) -> dict[str, Any]:

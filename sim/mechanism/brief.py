@@ -5,11 +5,12 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-__all__ = ["brief_repr", "brief_table"]
+__all__ = ["brief_repr", "brief_table", "drawn"]
 
 _FEW = 6  # numbers of an array, and entries of a list, that are said one by one
 _LETTERS = 120  # of a part
@@ -44,6 +45,18 @@ def _plain(values: Iterable[Any]) -> bool:
     """Whether there are few, and all of them numbers or words."""
     listed = list(values)
     return len(listed) <= _FEW and all(isinstance(v, str | int | float | np.generic | None) for v in listed)
+
+
+def drawn(result: Any) -> str:
+    """HTML for a notebook: the animation of a motion; "" where the drawing is not installed, or has nothing to draw.
+
+    Drawing is looked up by name: what is simulated does not depend on it.
+    """
+    try:
+        inline = import_module("dojo_opt.viewer.inline")
+        return str(inline.inline_html(result))
+    except (ImportError, TypeError, ValueError, RuntimeError):
+        return ""
 
 
 def brief_table(title: str, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from sim.mechanism.contact_candidates import Touch
@@ -74,14 +76,24 @@ def _loop_lines(mech: Mechanism, rank: str) -> list[str]:
 
 
 def _contact_lines(mech: Mechanism) -> list[str]:
+    """One line per body that has contacts with the ground; those that are alike are counted."""
     lines = []
-    for c in mech.contacts:
-        law = c.law if c.friction > 0 else "impact"
-        shape = f"ball of {c.radius:g} m" if c.radius else "point"
-        more = f", restitution {c.restitution:g}" if c.restitution else ""
-        more += ", on terrain" if c.terrain is not None else ""
-        lines.append(f"  {c.name:<18}{shape} on {c.body}, law {law}, friction {c.friction:g}{more}")
+    for body in dict.fromkeys(c.body for c in mech.contacts):
+        kinds = Counter(_contact(c) for c in mech.contacts if c.body == body)
+        own = [c.name for c in mech.contacts if c.body == body]
+        name = own[0] if len(own) == 1 else body
+        parts = [kind if count == 1 else f"{count} x {kind}" for kind, count in kinds.items()]
+        lines.append(f"  {name:<18}{'; '.join(parts)}{f' on {body}' if name != body else ''}")
     return _titled("contacts", lines)
+
+
+def _contact(c: Contact) -> str:
+    """Shape and law of a contact."""
+    law = c.law if c.friction > 0 else "impact"
+    shape = f"ball of {c.radius:.4g} m" if c.radius else "point"
+    more = f", restitution {c.restitution:g}" if c.restitution else ""
+    more += ", on terrain" if c.terrain is not None else ""
+    return f"{shape}, law {law}, friction {c.friction:g}{more}"
 
 
 def _collision_lines(mech: Mechanism) -> list[str]:

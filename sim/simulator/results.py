@@ -6,9 +6,12 @@ an unsolved step are zero; taking them out of their result, by unpacking or by n
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
+from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,8 +19,9 @@ from numpy.typing import NDArray
 
 from sim.integrators.feedback import Path
 from sim.mechanism import checks
-from sim.mechanism.brief import brief_repr
+from sim.mechanism.brief import brief_repr, drawn
 from sim.mechanism.mechanism import Mechanism
+from sim.simulator.motion_file import archived, export, opened, restored
 from solvers.status import MESSAGES, Status
 from solvers.types import Integers
 
@@ -226,6 +230,63 @@ class Trajectory(Result):
         sim, shapes = self.simulator, f"x {self.x.shape}, u {self.u.shape}"
         steps = f"{self.knot} steps of {sim.time_step:g} s"
         return f"Trajectory({sim.mechanism.name}, {steps}, {self.status.name}, {shapes})"
+
+    def _repr_html_(self) -> str:
+        return drawn(self) + f"<p>{escape(repr(self))}</p>"
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the trajectory and its simulator to a file, in a format of dojo-opt without pickles.
+
+        Args:
+            path: path of the file; NumPy appends .npz to a name without it.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        head, arrays = archived(self.simulator, "trajectory")
+        plain = {"status": int(self.status), "knot": self.knot, "residual": self.residual, "detail": self.detail}
+        arrays |= {
+            name: getattr(self, name) for name in ("x", "u", "time", "iterations", "substeps", "shares", "errors")
+        }
+        rows = {name: getattr(self.contacts, name) for name in ("impulse", "point", "gap", "slip", "normals")}
+        arrays |= {f"contact_{name}": array for name, array in rows.items()}
+        arrays |= {} if self.wrenches is None else {"wrenches": self.wrenches}
+        np.savez(path, allow_pickle=False, meta=json.dumps(head | plain), **arrays)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Trajectory:
+        """Read a file that `save` wrote.
+
+        Args:
+            path: path of the file.
+
+        Returns:
+            The trajectory, with its simulator.
+
+        Raises:
+            OSError: the file cannot be read.
+            ValueError: it is another file, or of a later version.
+        """
+        head, arrays = opened("Trajectory.load", path, "trajectory")
+        sim = restored(head, arrays)
+        rows = {name.removeprefix("contact_"): arrays.pop(name) for name in list(arrays) if name.startswith("contact_")}
+        contacts = Contacts(sim.mechanism.contact_names, time_step=sim.time_step, **rows)
+        status = Status(head.pop("status"))
+        return cls(simulator=sim, status=status, contacts=contacts, **head, **arrays)
+
+    def export(self, path: str | PathLike[str]) -> None:
+        """Write the motion for other tools.
+
+        Args:
+            path: path of the file. With the suffix .csv a table with named columns, of times, coordinates, velocities
+                and inputs; .npz these as arrays; .json the motion of the hinges and slides by their names, as in
+                trajectory_msgs/JointTrajectory of ROS.
+
+        Raises:
+            OSError: the file cannot be written.
+            ValueError: for another suffix.
+        """
+        export("Trajectory.export(path)", path, self.simulator, self.time, self.x, self.u)
 
     def at(self, times: Any) -> Floats:
         """States at any times of a motion of a simulator with an accuracy, as exact as the motion is.

@@ -77,7 +77,7 @@ def test_a_periodic_plan_survives_a_file(tmp_path):
     plan.save(tmp_path / "plan.npz")
     loaded = Plan.load(tmp_path / "plan.npz")
     np.testing.assert_array_equal(loaded.stride, plan.stride)
-    with pytest.raises(ValueError, match="expected a plan with its problem"):
+    with pytest.raises(ValueError, match="expected a plan with its simulator"):
         loaded.repeated(2)
 
 

@@ -1,0 +1,111 @@
+"""Archive: mechanisms as plain data and arrays, in a format of its own with a version; nothing in it is code.
+
+A part is {"part": name of its class, field: value, ...}, with the fields that its constructor takes: loading an archive
+makes the parts anew and checks them as when a user does. Arrays are {"array": name}, in the npz file beside; a table is
+{"table": [[key, value], ...]}. Classes are looked up in PARTS and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Arrays = dict[str, NDArray[Any]]
+
+__all__ = ["VERSION", "packed_part", "part_of"]
+
+VERSION = 1
+PARTS = {
+    "Body": "sim.mechanism.parts",
+    "Box": "sim.mechanism.shapes",
+    "Capsule": "sim.mechanism.shapes",
+    "Collision": "sim.mechanism.collision",
+    "Contact": "sim.mechanism.parts",
+    "Cylinder": "sim.mechanism.shapes",
+    "Ellipsoid": "sim.mechanism.shapes",
+    "Gear": "sim.mechanism.gear",
+    "HalfSpace": "sim.mechanism.shapes",
+    "Input": "sim.mechanism.parts",
+    "Joint": "sim.mechanism.parts",
+    "LinkFrame": "sim.io.urdf.report",
+    "Mechanism": "sim.mechanism.mechanism",
+    "MjcfMechanism": "sim.io.mjcf.report",
+    "MjcfReport": "sim.io.mjcf.report",
+    "Note": "sim.io.urdf.report",
+    "Polytope": "sim.mechanism.polytope",
+    "Simulator": "sim.simulator.simulator",
+    "Sphere": "sim.mechanism.shapes",
+    "String": "sim.mechanism.shapes",
+    "Terrain": "sim.mechanism.terrain",
+    "UrdfMechanism": "sim.io.urdf.report",
+    "UrdfReport": "sim.io.urdf.report",
+    "Visual": "sim.mechanism.visual",
+}
+
+
+def packed_part(value: Any, arrays: Arrays) -> Any:
+    """A part, or a field of one, as plain data; its arrays are added to `arrays`.
+
+    Args:
+        value: a part of a mechanism, a number, a text, an array, or a list or table of these.
+        arrays: arrays by name, extended.
+
+    Returns:
+        Numbers, texts, lists and tables, as JSON has them.
+
+    Raises:
+        TypeError: the value is of another kind.
+    """
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        name = f"array_{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, list | tuple):
+        return [packed_part(item, arrays) for item in value]
+    if isinstance(value, Mapping):
+        return {"table": [[packed_part(k, arrays), packed_part(v, arrays)] for k, v in value.items()]}
+    kind = type(value).__name__
+    if is_dataclass(value) and PARTS.get(kind) == type(value).__module__:
+        return {"part": kind} | {f.name: packed_part(getattr(value, f.name), arrays) for f in fields(value) if f.init}
+    raise TypeError(f"expected a part of a mechanism, a number, a text or an array, got {value!r}")
+
+
+def part_of(data: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """What `packed_part` packed; lists come back as tuples.
+
+    Args:
+        data: numbers, texts, lists and tables.
+        arrays: arrays by name.
+
+    Returns:
+        The part, made anew.
+
+    Raises:
+        ValueError: the data name an unknown part, or one with values that it refuses.
+    """
+    if isinstance(data, list):
+        return tuple(part_of(item, arrays) for item in data)
+    if not isinstance(data, dict):
+        return data
+    if "array" in data:
+        return arrays[data["array"]]
+    if "table" in data:
+        return {part_of(key, arrays): part_of(value, arrays) for key, value in data["table"]}
+    kind = data.get("part")
+    if kind not in PARTS:
+        raise ValueError(f"expected one of {', '.join(PARTS)}, got {kind!r}")
+    made = getattr(import_module(PARTS[kind]), kind)
+    known = {f.name for f in fields(made) if f.init} if is_dataclass(made) else set(data)
+    given = {name: part_of(value, arrays) for name, value in data.items() if name != "part"}
+    if unknown := set(given) - known:
+        raise ValueError(f"{kind} has no field {', '.join(sorted(map(repr, unknown)))}")
+    return made(**given)

@@ -1,0 +1,184 @@
+"""Files of motions: archives that come back with their simulator, and tables and joint trajectories for other tools."""
+
+from __future__ import annotations
+
+import csv
+import json
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.mechanism import checks
+from sim.mechanism.archive import VERSION, Arrays, packed_part, part_of
+
+Floats = NDArray[np.float64]
+
+__all__ = ["archived", "export", "joint_trajectory", "opened", "restored"]
+
+_SETTINGS = (
+    "time_step",
+    "kappa",
+    "tolerance",
+    "max_iterations",
+    "order",
+    "divide",
+    "accuracy",
+)  # of Simulator(...), in order
+
+
+def archived(sim: Any, what: str) -> tuple[dict[str, Any], Arrays]:
+    """Head of an archive, and the arrays of its simulator.
+
+    Args:
+        sim: the simulator (None: none).
+        what: kind of the archive.
+
+    Returns:
+        (head as plain data, arrays by name).
+    """
+    arrays: Arrays = {}
+    head: dict[str, Any] = {"format": f"dojo-opt {what}", "version": VERSION}
+    if sim is not None:
+        mechanism, *settings = sim.__reduce__()[1]  # as given: kappa None for the default
+        head["simulator"] = {"part": "Simulator", "mechanism": packed_part(mechanism, arrays)}
+        head["simulator"] |= dict(zip(_SETTINGS, settings, strict=True))
+    return head, arrays
+
+
+def opened(call: str, path: str | PathLike[str], what: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Head and arrays of an archive.
+
+    Args:
+        call: the call that an error names.
+        path: path of the file.
+        what: kind of the archive.
+
+    Returns:
+        (head, arrays by name).
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is another file, or of a later version.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        head = json.loads(str(arrays.pop("meta")))
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{call}: {path} is no {what} of dojo-opt") from error
+    form = head.pop("format", f"dojo-opt {what}")
+    if form != f"dojo-opt {what}":
+        raise ValueError(f"{call}: {path} is a {form!r}, expected a {what}")
+    if head.pop("version", 0) > VERSION:
+        raise ValueError(f"{call}: {path} was written by a later version of dojo-opt")
+    return head, arrays
+
+
+def restored(head: dict[str, Any], arrays: dict[str, Any]) -> Any:
+    """The simulator of an archive.
+
+    Args:
+        head: head of the archive; the simulator is taken out of it.
+        arrays: arrays by name; those of the simulator are taken out.
+
+    Returns:
+        The simulator, None where there is none.
+
+    Raises:
+        ValueError: a part of its mechanism is refused.
+    """
+    given = head.pop("simulator", None)
+    if given is None:
+        return None
+    sim = part_of(given, arrays)
+    for name in [name for name in arrays if name.startswith("array_")]:
+        del arrays[name]
+    return sim
+
+
+def export(call: str, path: str | PathLike[str], sim: Any, time: Floats, x: Floats, u: Floats) -> None:
+    """Write a motion for other tools: .csv, .npz, or .json, a joint trajectory.
+
+    Args:
+        call: the call that an error names.
+        path: path of the file; its suffix decides.
+        sim: the simulator.
+        time: (T + 1,) times [s].
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+
+    Raises:
+        OSError: the file cannot be written.
+        ValueError: for another suffix.
+    """
+    target = Path(path)
+    kind = checks.one_of(f"{call}: suffix of the path", target.suffix, (".csv", ".npz", ".json"))
+    if kind == ".json":
+        target.write_text(json.dumps(joint_trajectory(sim, time, x, u)) + "\n", encoding="utf-8")
+        return
+    q, v = coordinate_names(sim)
+    inputs = list(sim.mechanism.input_names)
+    if kind == ".npz":
+        np.savez(
+            target, time=time, q=x[:, : sim.nq], v=x[:, sim.nq :], u=u, q_names=q, v_names=v, u_names=np.array(inputs)
+        )
+        return
+    held = np.full((len(x), sim.nu), np.nan)
+    held[: len(u)] = u
+    with target.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file)
+        rows.writerow(["time", *q, *(f"v {name}" for name in v), *(f"u {name}" for name in inputs)])
+        for row in np.concatenate([time[:, None], x, held], axis=1):
+            rows.writerow(["" if np.isnan(value) else repr(float(value)) for value in row])
+
+
+def coordinate_names(sim: Any) -> tuple[list[str], list[str]]:
+    """Names of the entries of q, and of v.
+
+    Args:
+        sim: the simulator.
+
+    Returns:
+        (nq names, nv names); the entries of a quaternion are "joint qw" to "joint qz".
+    """
+    v, q = list(sim.mechanism.dof_names), []
+    for joint in sim.mechanism.joints:
+        own = v[sim.mechanism.v_slice(joint.name)]
+        if joint.nrot == 3:
+            own = [*own[:-3], *(f"{joint.name} q{part}" for part in "wxyz")]
+        q += own
+    return q, v
+
+
+def joint_trajectory(sim: Any, time: Floats, x: Floats, u: Floats) -> dict[str, Any]:
+    """A motion as ROS has it in trajectory_msgs/JointTrajectory, of the hinges and slides by their names in the file.
+
+    Args:
+        sim: the simulator.
+        time: (T + 1,) times [s].
+        x: (T + 1, nx) states.
+        u: (T, nu) inputs [N, N m].
+
+    Returns:
+        {"joint_names": [...], "points": [{"positions", "velocities", "effort", "time_from_start"}, ...]}; the effort of
+        the last point is that of the one before, and a joint without an input has none, 0.
+    """
+    mech = sim.mechanism
+    joints = [joint for joint in mech.joints if joint.nv == 1 and joint.nq == 1]
+    q = [mech.q_slice(joint.name).start for joint in joints]
+    v = [mech.v_slice(joint.name).start for joint in joints]
+    driver = {part.joint: k for k, part in enumerate(mech.inputs or ()) if part.joint is not None}
+    held = np.concatenate([u, u[-1:]]) if len(u) else np.zeros((len(x), sim.nu))
+    points = [
+        {
+            "positions": x[t, q].tolist(),
+            "velocities": x[t, [sim.nq + i for i in v]].tolist(),
+            "effort": [float(held[t, driver[joint.name]]) if joint.name in driver else 0.0 for joint in joints],
+            "time_from_start": float(time[t]),
+        }
+        for t in range(len(x))
+    ]
+    return {"joint_names": [joint.name for joint in joints], "points": points}

@@ -1,0 +1,84 @@
+"""Archives of simulators, trajectories and plans: what is saved comes back, and nothing else does."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import dojo_opt as dojo
+from sim.mechanism.archive import packed_part, part_of
+from sim.simulator.simulator import Simulator
+
+HILL = dojo.Terrain(np.random.default_rng(0).random((4, 4)), spacing=(0.5, 0.5))
+
+
+def again(mechanism):
+    """The mechanism by way of plain data."""
+    arrays = {}
+    return part_of(json.loads(json.dumps(packed_part(mechanism, arrays))), arrays)
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in dojo.models.catalogue()])
+def test_every_model_comes_back_as_it_was(name):
+    build = next(entry.build for entry in dojo.models.catalogue() if entry.name == name)
+    given = Simulator(build())
+    found = Simulator(again(given.mechanism))
+    assert type(found.mechanism) is type(given.mechanism)
+    for field, a, b in zip(given.model._fields, given.model, found.model, strict=True):
+        if field != "optional":  # addresses of kernels
+            np.testing.assert_allclose(a, b, rtol=1e-14, err_msg=field)  # unit vectors are normalised again
+
+
+def test_terrain_and_collisions_come_back():
+    points = np.random.default_rng(1).random((8, 3))
+    given = dojo.models.block().on(HILL)
+    given = given.with_collisions(dojo.Collision(given.body_names[0], None, None, dojo.Polytope(points), friction=0.3))
+    found = again(given)
+    np.testing.assert_array_equal(found.contacts[0].terrain.heights, HILL.heights)
+    np.testing.assert_array_equal(found.collisions[0].shape_b.vertices, given.collisions[0].shape_b.vertices)
+
+
+def test_a_trajectory_comes_back_and_goes_on(tmp_path):
+    sim = Simulator(dojo.models.block(), time_step=0.02)
+    made = sim.rollout(sim.neutral(), steps=5)
+    made.save(tmp_path / "motion.npz")
+    found = dojo.Trajectory.load(tmp_path / "motion.npz")
+    for name in ("x", "u", "time", "iterations", "substeps"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(made, name))
+    np.testing.assert_array_equal(found.contacts.normal_force, made.contacts.normal_force)
+    assert found.simulator.kappa == sim.kappa and found.status == made.status
+    np.testing.assert_array_equal(found.simulator.step(found.x[-1]).x, sim.step(made.x[-1]).x)
+
+
+def test_a_trajectory_is_exported_by_names(tmp_path):
+    sim = Simulator(dojo.models.panda(gripper=False), time_step=0.02)
+    made = sim.rollout(sim.neutral(), steps=3)
+    for suffix in ("csv", "npz", "json"):
+        made.export(tmp_path / f"motion.{suffix}")
+    rows = list(csv.DictReader((tmp_path / "motion.csv").read_text().splitlines()))
+    assert [float(row["joint2"]) for row in rows] == made.x[:, 1].tolist()
+    assert float(rows[-1]["v joint7"]) == made.x[-1, 13] and rows[-1]["u joint1"] == ""
+    arrays = np.load(tmp_path / "motion.npz")
+    np.testing.assert_array_equal(arrays["v"], made.x[:, 7:])
+    ros = json.loads((tmp_path / "motion.json").read_text())
+    assert ros["joint_names"] == [f"joint{i}" for i in range(1, 8)]
+    assert ros["points"][2]["positions"] == made.x[2, :7].tolist() and ros["points"][3]["time_from_start"] == 0.06
+    with pytest.raises(ValueError, match="suffix"):
+        made.export(tmp_path / "motion.bag")
+
+
+def test_other_files_are_refused(tmp_path):
+    np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    with pytest.raises(ValueError, match="no trajectory of dojo-opt"):
+        dojo.Trajectory.load(tmp_path / "other.npz")
+    np.savez(tmp_path / "late.npz", meta=json.dumps({"format": "dojo-opt trajectory", "version": 99}))
+    with pytest.raises(ValueError, match="later version"):
+        dojo.Trajectory.load(tmp_path / "late.npz")
+    np.savez(tmp_path / "code.npz", meta=np.array([print], dtype=object), allow_pickle=True)
+    with pytest.raises(ValueError, match="no trajectory"):
+        dojo.Trajectory.load(tmp_path / "code.npz")
+    with pytest.raises(ValueError, match="expected one of Body"):
+        part_of({"part": "Popen", "args": "ls"}, {})
+    with pytest.raises(TypeError, match="expected a part"):
+        packed_part(print, {})
