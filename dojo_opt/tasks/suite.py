@@ -23,7 +23,7 @@ from sim.simulator.simulator import Simulator
 
 Vector = NDArray[np.float64]
 
-__all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort"]
+__all__ = ["TaskOutcome", "SuiteTask", "held", "lifted", "quadratic", "servo_effort", "timed"]
 
 _CLEAR = 1e-6  # [m] between a lifted start and what it was inside of
 _RAISED = 3  # times that a start is lifted: the coordinate may raise the deepest contact by less than its own change
@@ -140,6 +140,18 @@ class SuiteTask:
         times = (float(np.median(ms)), float(np.percentile(ms, 99))) if ms.size else (np.nan, np.nan)
         depth = max(0.0, -float(loop.contacts.gap.min(initial=np.inf)))
         return TaskOutcome(loop.survived and done, measures, *times, depth, sum(tick.fallback for tick in loop.log))
+
+
+def timed(rate: float) -> dict[str, Any]:
+    """Settings of `dojo.MPC` for a rate of plans that take one tick to compute.
+
+    Args:
+        rate: plans per second [Hz].
+
+    Returns:
+        `period` and `computation`.
+    """
+    return {"period": 1.0 / rate, "computation": 1.0 / rate}
 
 
 def quadratic(

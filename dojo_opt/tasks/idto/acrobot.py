@@ -10,7 +10,7 @@ from dojo_opt.cost import Effort
 from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
-from dojo_opt.tasks.suite import SuiteTask, held, quadratic
+from dojo_opt.tasks.suite import SuiteTask, held, quadratic, timed
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Input, Joint
 from sim.simulator.simulator import Simulator
@@ -64,7 +64,7 @@ def acrobot(**settings: Any) -> SuiteTask:
     goal = np.array([3.1415, 0.0, 0.0, 0.0])
     cost = [quadratic(goal, _KNOT, _HORIZON, ([1.0, 1.0], 1.0), ([100.0, 100.0], 1.0)), Effort(_KNOT * 0.1)]
     problem = Problem(sim, np.zeros(4), _HORIZON, cost=cost)
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": (100.0, 10.0)}
+    given = timed(_RATE) | {"servo": (100.0, 10.0)}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(mechanism(), time_step=1e-3)
     spread = np.array([0.1, 0.1, 0.1, 0.1])

@@ -13,7 +13,7 @@ from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
-from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort
+from dojo_opt.tasks.suite import SuiteTask, quadratic, servo_effort, timed
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Input, Joint
@@ -184,7 +184,7 @@ def allegro(**settings: Any) -> SuiteTask:
         servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=_SERVO[0] * start[:16])
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
+    given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-5, "first": Options(stages=(Stage(1e-4, 1e-4), Stage(1e-5, 1e-5)))}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)

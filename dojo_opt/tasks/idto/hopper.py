@@ -12,7 +12,7 @@ from dojo_opt.mpc.moving import Onward
 from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
-from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort
+from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort, timed
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
 from sim.simulator.simulator import Simulator
@@ -91,7 +91,7 @@ def hopper(**settings: Any) -> SuiteTask:
         servo_effort(sim, own, _KNOT * 0.1, _HORIZON),
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
+    given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"kappa": 1e-3, "first": Options(stages=(Stage(1e-3, 1e-3),))}
     mpc = MPC(problem, reference=target, **{**given, **settings})
     model = Simulator(own, time_step=1e-3, kappa=1e-8)

@@ -12,7 +12,7 @@ from dojo_opt.mpc.controller import MPC
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
-from dojo_opt.tasks.suite import SuiteTask, held, quadratic
+from dojo_opt.tasks.suite import SuiteTask, held, quadratic, timed
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Contact, Input, Joint
@@ -173,7 +173,7 @@ def jaco_ball(**settings: Any) -> SuiteTask:
     end = np.concatenate([free, np.full(3, 10.0), turn]), np.concatenate([np.ones(7), np.full(6, 0.1)])
     cost = [quadratic(goal, _KNOT, _HORIZON, running, end), Effort(_KNOT * 0.01)]
     problem = Problem(sim, start, _HORIZON, cost=cost, control_limits=(-np.inf, np.inf))
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "iterations": 2}
+    given = timed(_RATE) | {"iterations": 2}
     given |= {"servo": (_KP, _KD), "feedforward": False}
     mpc = MPC(problem, **{**given, **settings})
     model = Simulator(mechanism(0.5), time_step=1e-3, kappa=1e-8)

@@ -14,7 +14,7 @@ from dojo_opt.planning.options import Options, Stage
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
 from dojo_opt.tasks.idto.assembly import FileLink, assembled, from_com
-from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort
+from dojo_opt.tasks.suite import SuiteTask, lifted, quadratic, servo_effort, timed
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Contact, Input
 from sim.mechanism.terrain import Terrain
@@ -141,7 +141,7 @@ def mini_cheetah(*, speed: float = 0.4, terrain: Terrain | None = None, **settin
         servo_effort(sim, own, _KNOT * 0.01, _HORIZON),
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost, controls0=equilibrium(sim, start)[1])
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": own, "gain_scale": 0.0}
+    given = timed(_RATE) | {"servo": own, "gain_scale": 0.0}
     given |= {"kappa": _KAPPA, "iterations": 3}
     given |= {"first": Options(stages=(Stage(_KAPPA, _KAPPA),))}
     mpc = MPC(problem, reference=target, **{**given, **settings})

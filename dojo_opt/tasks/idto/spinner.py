@@ -11,7 +11,7 @@ from dojo_opt.mpc.controller import MPC
 from dojo_opt.mpc.moving import Onward
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.loop import ClosedLoop
-from dojo_opt.tasks.suite import SuiteTask, quadratic
+from dojo_opt.tasks.suite import SuiteTask, quadratic, timed
 from sim.mechanism.collision import Collision
 from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.parts import Body, Input, Joint
@@ -80,7 +80,7 @@ def spinner(**settings: Any) -> SuiteTask:
         Effort(_KNOT * 0.1),
     ]
     problem = Problem(sim, start, _HORIZON, cost=cost)
-    given: dict[str, Any] = {"period": 1.0 / _RATE, "computation": 1.0 / _RATE, "servo": (10.0, 1.0)}
+    given = timed(_RATE) | {"servo": (10.0, 1.0)}
     mpc = MPC(problem, reference=target, **{**given, **settings})
     model = Simulator(mechanism(1.0), time_step=1e-3, kappa=1e-8)
     spread = np.array([0.1, 0.1, np.pi, 0.1, 0.1, 0.5])

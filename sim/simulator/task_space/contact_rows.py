@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from sim.contact.contact_law import contact_impulse
 from sim.contact.ground_contact import contact_jacobian, contact_kinematics
+from sim.derivatives.parameters.contact_columns import is_active
 from sim.derivatives.step_gradient import gradient
 from sim.dynamics.displacements import tree_moves, turn_bodies
 from sim.dynamics.joints.motion import Increment
@@ -22,9 +23,10 @@ from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
 from sim.model.options import Guess
-from sim.simulator.task_space.rows import Rows, carried, clear_jacobian
+from sim.simulator.task_space.rows import Rows, carried
 from sim.step import step
 from solvers.compiler import Table, kernel
+from solvers.dense import clear
 from solvers.rotation import cross, left_jacobian, quat_exp, quat_matrix, three
 from solvers.status import Status
 from solvers.types import Integers, Matrix, Vector
@@ -85,8 +87,8 @@ def _rate(k: Vector, row: int, s: Vector) -> float:
 def contact_columns(model: Model, data: Data, h: float, c: int, by_q: Matrix, by_v: Matrix) -> None:
     """d(gap, slip) of contact c by dq2 and by dv25.   by_q, by_v: (3, nv), overwritten."""
     contact_jacobian(model, data, h, c)
-    clear_jacobian(by_q)
-    clear_jacobian(by_v)
+    clear(by_q)
+    clear(by_v)
     k = data.contact_kin[c]
     i = model.contact_body[c]
     b = i
@@ -139,7 +141,7 @@ def contact_gaps(model_at: Table, data_at: Table, h: float, contacts: Integers, 
         x = rows.xs[rows.knots[row]]
         interval_of(model, data, h, x)
         if rows.jacobians.shape[0] > 0:
-            clear_jacobian(rows.jacobians[row])
+            clear(rows.jacobians[row])
         for m in range(contacts.shape[0]):
             c = contacts[m]
             contact_kinematics(model, data, h, c)
@@ -155,21 +157,12 @@ def contact_gaps(model_at: Table, data_at: Table, h: float, contacts: Integers, 
 
 
 @kernel
-def is_active(data: Data, c: int) -> bool:
-    """Whether contact c is one of the active ones of the step in `data`."""
-    for m in range(data.active_count[0]):
-        if data.active[m] == c:
-            return True
-    return False
-
-
-@kernel
 def force_jacobian(model: Model, data: Data, h: float, c: int, scratch: Matrix, J: Matrix) -> None:
     """J = d(force of contact c)/d(dq, dv, du) of the step whose gradient is in `data`: zero of an inactive contact.
 
     scratch: (6, nv); J: (3, 2 nv + nu), overwritten.
     """
-    clear_jacobian(J)
+    clear(J)
     if not is_active(data, c):
         return
     by_q, by_v = scratch[:3], scratch[3:]
@@ -215,4 +208,4 @@ def contact_forces(
                 if status == _SOLVED:
                     force_jacobian(model, data, h, contacts[m], scratch, J)
                 else:
-                    clear_jacobian(J)
+                    clear(J)

@@ -18,8 +18,9 @@ from sim.model.columns import Witness
 from sim.model.data import Data
 from sim.model.layout import data_view, model_view
 from sim.model.model import Model
-from sim.simulator.task_space.rows import Rows, carried, clear_jacobian
+from sim.simulator.task_space.rows import Rows, carried
 from solvers.compiler import Table, kernel
+from solvers.dense import clear
 from solvers.rotation import Vec3, rotate, three
 from solvers.types import Vector
 
@@ -56,7 +57,7 @@ def distances(model_at: Table, data_at: Table, rows: Rows) -> None:
     for row in range(rows.knots.shape[0]):
         tree_poses(model, data, rows.xs[rows.knots[row], : data.theta1.shape[0]])
         if rows.jacobians.shape[0] > 0:
-            clear_jacobian(rows.jacobians[row])
+            clear(rows.jacobians[row])
         first = 0
         for j in range(model.pair_kind.shape[0]):
             if model.pair_feature[j] == 0:

@@ -17,7 +17,6 @@ from sim.simulator.task_space.rows import (
     Rows,
     body_rotation,
     carried,
-    clear_jacobian,
     move_rates,
     place_of,
     point_at,
@@ -26,6 +25,7 @@ from sim.simulator.task_space.rows import (
     rotation_rates,
 )
 from solvers.compiler import Table, kernel
+from solvers.dense import clear
 from solvers.rotation import (
     Quat,
     inverse_right_jacobian,
@@ -79,7 +79,7 @@ def frame_poses(model_at: Table, data_at: Table, h: float, body: int, place: Vec
         node_poses(model, data, h, rows.xs[rows.knots[row]])
         frame_pose(data, body, place, aims[row], rows.values[row])
         if rows.jacobians.shape[0] > 0:
-            clear_jacobian(rows.jacobians[row])
+            clear(rows.jacobians[row])
             frame_pose_jacobian(model, data, body, place, rows.values[row], rows.jacobians[row])
 
 
@@ -122,5 +122,5 @@ def frame_velocities(model_at: Table, data_at: Table, h: float, body: int, place
         frame_velocity(data, h, body, place, rows.values[row])
         if rows.jacobians.shape[0] > 0:
             velocity_columns(model, data.S1, x[nq:], -h, data.S3nu)
-            clear_jacobian(rows.jacobians[row])
+            clear(rows.jacobians[row])
             frame_velocity_jacobian(model, data, h, body, place, rows.jacobians[row])

@@ -17,12 +17,12 @@ from sim.simulator.task_space.rows import (
     add_column,
     body_rotation,
     carried,
-    clear_jacobian,
     move_rates,
     point_at,
     rotation_rates,
 )
 from solvers.compiler import Table, kernel
+from solvers.dense import clear
 from solvers.rotation import Vec3, cross, rows_of, times, transposed_times
 from solvers.types import Matrix, Vector
 
@@ -119,5 +119,5 @@ def momenta(model_at: Table, data_at: Table, h: float, rows: Rows) -> None:
         momentum(model, data, h, rows.values[row])
         if rows.jacobians.shape[0] > 0:
             velocity_columns(model, data.S1, x[nq:], -h, data.S3nu)
-            clear_jacobian(rows.jacobians[row])
+            clear(rows.jacobians[row])
             momentum_jacobian(model, data, h, rows.values[row], rows.jacobians[row])

@@ -25,14 +25,6 @@ class Rows(NamedTuple):
 
 
 @kernel
-def clear_jacobian(J: Matrix) -> None:
-    """J = 0."""
-    for r in range(J.shape[0]):
-        for c in range(J.shape[1]):
-            J[r, c] = 0.0
-
-
-@kernel
 def carried(S: Matrix, d: int, x: Vec3) -> Vec3:
     """Velocity of the point x under column d, a twist about the origin of the world: v + a x x."""
     u, v, w = cross(S[d, 3], S[d, 4], S[d, 5], x[0], x[1], x[2])
