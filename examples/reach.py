@@ -39,15 +39,16 @@ print(f"{plan.nit} iterations; the hand ends {1e3 * off:.2f} mm off, {1e3 * clea
 
 figure, (front, time) = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
 front.plot(at[:, 1], at[:, 2], marker=".")
-front.add_patch(plt.Circle(ball.center[1:], 0.17, color="0.85"))
+front.add_patch(plt.Circle(ball.center[1:], 0.12, color="0.85"))
+front.add_patch(plt.Circle(at[clear.argmin(), 1:], 0.05, fill=False, ls=":"))  # the hand where it is nearest
 front.plot(*goal[1:], "kx")
 front.annotate("goal", goal[1:], xytext=(-10, 10), textcoords="offset points")
-front.annotate("ball and hand", ball.center[1:], ha="center", va="center")
+front.annotate("ball", ball.center[1:], ha="center", va="center")
 front.set(xlabel="y [m]", ylabel="z [m]", aspect="equal", ylim=(0.1, 0.65), title="the hand from the front")
 front.margins(x=0.15)
 time.plot(plan.time, 1e3 * clear)
 time.axhline(0.0, color="k", lw=0.8)
-time.set(xlabel="time [s]", ylabel="distance from the ball [mm]", title="clearance")
+time.set(xlabel="time [s]", ylabel="hand to ball [mm]", title="clearance")
 finish(figure, __file__)
 
 assert plan.success, plan.message
