@@ -37,10 +37,10 @@ timed() {
 
 if [ -n "$quick" ]; then  # study by study; those whose bars do not depend on the clock are judged
     for study in contact mechanics gradients stability; do
-        measure "$study" "$python" "$here/benchmarks/compare.py" "$study" --quick --strict --out "$out/$study"
+        measure "study_$study" "$python" "$here/benchmarks/compare.py" "$study" --quick --strict --out "$out/$study"
     done
     for study in accuracy planning lean timing compile; do
-        measure "$study" "$python" "$here/benchmarks/compare.py" "$study" --quick --out "$out/$study"
+        measure "study_$study" "$python" "$here/benchmarks/compare.py" "$study" --quick --out "$out/$study"
     done
 else
     measure report "$python" "$here/benchmarks/compare.py" all --out "$out"
