@@ -41,13 +41,11 @@ from solvers.types import Cube, Integers, Vector
 
 SHORTEST = 1e-7  # [s]
 _IMPACT = 1e-6  # [kg s] shortest length of an impact, times a mass: kappa is the least one there, and not to be felt
-_SETTLED = (
-    10.0  # (h w)^2 of the shortest step h, w^2 = m g^2 h/kappa the stiffness over m of a contact that carries m g
-)
+# (h w)^2 of the shortest step h, where w^2 = m g^2 h/kappa is the stiffness over m of a contact that carries m g
+_SETTLED = 10.0
 _LEAST_PRESSING = 1e-6  # [m/s, rad/s] accuracy: shorter impacts would round velocities
 _LEAST_KAPPA = 1e-13  # [N s m]
 _ROWS = 256  # sub-steps between two pauses
-
 
 Held = tuple[Vector, Cube]  # input (nu,) and external wrenches (1 or 0, nbody, 6) of a step
 
