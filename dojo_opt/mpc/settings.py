@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from dojo_opt.planning.options import Options, Stage
 from sim.mechanism import checks
+from sim.mechanism.brief import brief_repr
 from sim.mechanism.checks import whole_number
 from sim.mechanism.mechanism import Mechanism
 
@@ -67,6 +68,8 @@ class MPCSettings:
     options: Options | None = None
     first: Options | None = None
     log: int | None = 10_000
+
+    __repr__ = brief_repr
 
     def __post_init__(self) -> None:
         if self.guess not in GUESSES:

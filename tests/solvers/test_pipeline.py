@@ -16,7 +16,7 @@ import json, numpy as np, dojo_opt as dojo
 from solvers.compiler.pipeline import FAST
 sim = dojo.Simulator(dojo.models.pendulum(), 0.02)
 x = sim.neutral() + 0.3
-print(json.dumps([FAST, *sim.rollout(x, np.ones((20, sim.nu))).x.ravel()]))
+print(json.dumps([FAST, sim.energy(x), sim.kinetic_energy(x), *sim.momentum(x)[0], *sim.maximal(x).ravel()]))
 """
 
 
