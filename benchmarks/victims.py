@@ -29,7 +29,8 @@ LONG = {
 }
 # one process per call: it says when a call begins, gets a signal, and says when it has heard it
 VICTIM = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background jobs, and in CI
 import numpy as np
 import dojo_opt as dojo
 sim = dojo.Simulator(dojo.models.raiberthopper(), 0.02)
