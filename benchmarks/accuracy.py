@@ -19,7 +19,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +28,6 @@ from numpy.typing import NDArray
 import dojo_opt as dojo
 from dojo_opt.report.result import Report, Table
 from support.scenes import ball, block
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # for the package of the other engines
 
 Vector = NDArray[np.float64]
 Points = list[tuple[float, float, str]]  # (error, processor time [s], order and step)

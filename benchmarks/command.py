@@ -17,7 +17,9 @@ from pathlib import Path
 from dojo_opt.report.result import Report, Row
 from dojo_opt.report.study import Progress
 
-# scenes that tests and benchmarks share; behind what is installed, so that an installed dojo_opt is the one measured
+# the package of the other engines, and scenes that tests and benchmarks share; behind what is installed, so that an
+# installed dojo_opt is the one measured
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 __all__ = ["deliver", "number", "parser", "progress"]

@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,8 +22,6 @@ from command import deliver, number, parser, progress
 import dojo_opt as dojo
 from dojo_opt.plant.tick import milliseconds
 from dojo_opt.report.result import Cell, Report, Row, Table
-
-sys.path.append(str(Path(__file__).resolve().parents[1]))  # for the package of the other engines
 
 TASKS = tuple(dojo.tasks.idto.__all__)
 OURS, MUJOCO = "ours, 1 ms, kappa 1e-8", "MuJoCo, default contacts"
