@@ -388,11 +388,11 @@ class Engine:
         """(states, status and number of solved steps of every rollout), in parallel."""
         n, steps = us.shape[:2]
         xs, reports, knots = np.zeros((n, steps + 1, self.nx)), np.zeros((n, 1, REPORT)), np.zeros(n, dtype=np.int64)
-        xs[:, 0] = x0s
         motions = rollout.BatchBuffers(xs, us, reports, knots, self.no_wrenches, self._no_contacts, *self.unknown[:2])
         model, works, settings = self.linked(link_step), self._scratch.chunks(n), self.settings.array()
         status = reports[:, 0, 0]
         try:
+            xs[:, 0] = x0s  # the first touch of much memory takes its time
             for _ in pieces(settings, n * steps):
                 rollout.roll_batch(model, works, settings, motions)
                 if np.all((knots == steps) | (status != Status.SOLVED)):

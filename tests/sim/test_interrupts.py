@@ -118,22 +118,16 @@ STATES = {
 }
 
 
-def stopped(call: Callable[[int], Any], enough: int) -> Any:
+def stopped(call: Callable[[int], Any], enough: int, *, in_loop: bool = False) -> Any:
     """What Ctrl-C leaves of a call that is long enough; what it needs is compiled before."""
     call(2_000)
-    return heard(lambda: call(enough))
-
-
-def kept(call: Callable[[int], Any], enough: int) -> Any:
-    """What Ctrl-C leaves of a call that keeps it; on a busy machine the signal may come while arguments are made."""
-    found = stopped(call, enough)
-    return heard(lambda: call(4 * enough), 1.2) if found is None else found
+    return heard(lambda: call(enough), in_loop=in_loop)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ROLLOUTS)
 def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
-    found = kept(*ROLLOUTS[name])
+    found = stopped(*ROLLOUTS[name], in_loop=name != "under a policy")
     assert found.status == dojo.Status.INTERRUPTED
     assert found.knot > 0
     assert found.x.shape[0] == found.knot + 1 == len(found.u) + 1
@@ -143,7 +137,7 @@ def test_rollouts_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BATCHES)
 def test_batches_hear_ctrl_c_and_keep_what_they_have(name: str) -> None:
-    found = kept(*BATCHES[name])
+    found = stopped(*BATCHES[name], in_loop=True)
     steps = found.x.shape[1] - 1
     done = found.knot == steps
     assert 0 < found.knot.sum() < done.size * steps

@@ -6,8 +6,11 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from typing import Any, NamedTuple
+
+from sim.model import pace
 
 HEARD = 0.2  # [s] of processor time of each thread within which a call has to answer
 _THREADS = os.cpu_count() or 1  # whose processor times are added
@@ -20,8 +23,24 @@ class Heard(NamedTuple):
     seconds: float  # of processor time, of all threads, from the signal to the exception
 
 
-def interrupt(call: Callable[[], Any], after: float) -> Heard:
-    """Send SIGINT to this process so many seconds after `call` has begun."""
+@contextmanager
+def at_first_piece(start: Callable[[], None]) -> Iterator[None]:
+    """Call `start` when the loop over steps begins, whatever time its arguments took before."""
+    before = pace._pieces
+
+    def begun(settings: Any) -> Iterator[None]:
+        start()
+        yield from before(settings)
+
+    pace._pieces = begun
+    try:
+        yield
+    finally:
+        pace._pieces = before
+
+
+def interrupt(call: Callable[[], Any], after: float, *, in_loop: bool = False) -> Heard:
+    """Send SIGINT to this process so many seconds after `call` has begun, or after its first loop over steps has."""
     sent: list[float] = []
 
     def send() -> None:
@@ -29,11 +48,16 @@ def interrupt(call: Callable[[], Any], after: float) -> Heard:
         os.kill(os.getpid(), signal.SIGINT)
 
     timer = threading.Timer(after, send)
+
+    def start() -> None:
+        if timer.ident is None:  # later pieces do not start it again
+            timer.start()
+
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     stop = None
     try:
-        timer.start()
-        call()
+        with at_first_piece(start) if in_loop else nullcontext(start()):
+            call()
         timer.cancel()
         timer.join()
         time.sleep(0.01)  # a signal that came this late is heard here
@@ -45,9 +69,9 @@ def interrupt(call: Callable[[], Any], after: float) -> Heard:
     return Heard(stop, end - sent[0] if stop else 0.0)
 
 
-def heard(call: Callable[[], Any], after: float = 0.3) -> Any:
-    """What the exception carries that Ctrl-C ends the call with, which has to come soon."""
-    found = interrupt(call, after)
+def heard(call: Callable[[], Any], after: float = 0.3, *, in_loop: bool = False) -> Any:
+    """What the exception carries that Ctrl-C ends the call with, which has to come soon; see `interrupt`."""
+    found = interrupt(call, after, in_loop=in_loop)
     assert found.stop is not None, f"the call took less than {after:g} s"
     assert found.seconds < (1 + _THREADS) * HEARD, f"heard after {found.seconds:.2f} s"
     return getattr(found.stop, "result", None)
