@@ -14,7 +14,7 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks import compare
-from dojo_opt import cli
+from dojo_opt import __main__ as cli
 from dojo_opt.report.command import MOVED
 from dojo_opt.report.result import Report, Row
 from support.programs import HOME

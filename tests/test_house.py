@@ -20,7 +20,7 @@ import pytest
 
 import dojo_opt as dojo
 from benchmarks import compare
-from dojo_opt import cli
+from dojo_opt import __main__ as cli
 from dojo_opt.gaits.feet import Feet
 from dojo_opt.models.catalogue import Entry
 from dojo_opt.mpc.moving import References
@@ -68,7 +68,9 @@ def test_every_public_name_exists() -> None:
 
 
 def test_ilqr_stays_a_function_after_its_module_was_imported() -> None:
-    assert python("import dojo_opt as d, dojo_opt.problems, dojo_opt.cli; print(callable(d.ilqr))").strip() == "True"
+    assert (
+        python("import dojo_opt as d, dojo_opt.problems, dojo_opt.__main__; print(callable(d.ilqr))").strip() == "True"
+    )
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones() -> None:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from sim.derivatives.momentum_gradient import momentum_jacobian
 from sim.integrators import runge_kutta
 from sim.integrators.adaptive import go_on
-from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton_gradient import Slopes
 from sim.integrators.landing import BEGINS
 from sim.integrators.node_slopes import node_slopes
@@ -30,8 +29,8 @@ from sim.integrators.tableau import embedded
 from sim.mechanism.mechanism import Mechanism
 from sim.model.model import Model
 from sim.model.pace import pieces
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, refuse
-from sim.simulator.high_order_engine import HighOrderEngine
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, knot_inputs, refuse
+from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_gradient, link_smooth, link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -63,7 +62,7 @@ class Substeps(NamedTuple):
     error: float  # estimated, over the one allowed
 
 
-class AdaptiveEngine(HighOrderEngine):
+class AdaptiveEngine(KnotEngine):
     """The kernels of one packed mechanism, with steps of the accuracy of its settings."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
@@ -316,50 +315,10 @@ class AdaptiveEngine(HighOrderEngine):
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         for t in range(n):
-            held = np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(external[t : t + 1], substeps, axis=0)
-            rolled = self.roll(xs[t], *held, kappa=kappa, derivatives=True)
-            reports[t] = rolled.reports[min(rolled.knot, substeps - 1)]
-            if rolled.knot == substeps:
-                A[t] = np.eye(self.ndx)
-                for dx, du in zip(rolled.A, rolled.B, strict=True):
-                    A[t], B[t] = dx @ A[t], dx @ B[t] + du
-                x_next[t], reports[t, 5] = rolled.xs[-1], rolled.reports[:, 5].max()
+            A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
+                xs[t], knot_inputs(us, external, t, substeps), kappa
+            )
         return A, B, x_next, reports
-
-    def closed_loop(
-        self,
-        x: Vector,
-        policy: FeedbackLaw,
-        alpha: float,
-        limits: tuple[Floats, Floats],
-        substeps: int,
-        kappa: float | None,
-        *,
-        keep: bool = False,
-    ) -> tuple[int, Path]:
-        """As Engine.closed_loop; the warm starts of the policy are not used."""
-        knots = len(policy.us)
-        path = self._path(knots, keep=keep, cones=False)
-        path.xs[0], total = x, 0.0
-        for t in range(knots):
-            try:
-                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
-                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
-                us = np.repeat(path.us[t : t + 1], substeps, axis=0)
-                external = np.repeat(policy.wrenches[t : t + 1], substeps, axis=0)
-                rolled = self.roll(path.xs[t], us, external, kappa=kappa)
-            except KeyboardInterrupt:
-                interrupted(path.report[None], 0)
-                raise Interrupted((t, path)) from None
-            path.report[:REPORT] = rolled.reports[min(rolled.knot, substeps - 1)]
-            if rolled.knot < substeps:
-                return t, path
-            total += rolled.reports[:, 1].sum()
-            path.xs[t + 1] = rolled.xs[-1]
-            if alpha < 1.0:
-                path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
-        path.report[1] = total
-        return knots, path
 
     def nodes_at(self, motion: tuple[Floats, Floats, Floats | None], times: Vector) -> Floats:
         """(n, nx) nodes of a motion (states, inputs, external wrenches) at times since its beginning, in any order [s].

@@ -21,7 +21,7 @@ from sim.integrators.rollout import MotionBuffers
 from sim.model.data import Data
 from sim.model.layout import CARRY
 from sim.model.model import Model
-from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, Rolled
+from sim.simulator.engine import DIVISIBLE, REPORT, Divided, Division, Engine, Floats, chained, knot_inputs
 from sim.simulator.intervals import Intervals
 from sim.simulator.link import link_step
 from sim.simulator.results import Interrupted
@@ -53,14 +53,6 @@ def _rows(motion: MotionBuffers, first: int, count: int) -> MotionBuffers:
         motion.A[first:last],
         motion.B[first:last],
     )
-
-
-def _chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
-    """Derivatives by state and held input of the end of a rollout, whose first state has the derivative A."""
-    B = np.zeros((len(A), rolled.B.shape[2]))
-    for dx, du in zip(rolled.A, rolled.B, strict=True):
-        A, B = dx @ A, dx @ B + du
-    return A, B
 
 
 class DividingEngine(Engine):
@@ -141,7 +133,7 @@ class DividingEngine(Engine):
     def slopes(self, x: Vector, divided: Divided) -> tuple[Floats, Floats]:
         """(A, B) of a divided step from x: the product of the derivatives of its parts and of both conversions."""
         ahead, back = self.conversions(x, divided)
-        A, B = _chained(ahead, divided.rolled)
+        A, B = chained(ahead, divided.rolled)
         return back @ A, back @ B
 
     def last(self) -> Data:
@@ -258,14 +250,10 @@ class DividingEngine(Engine):
         """As Engine.linearize, with division."""
         A, B, x_next, reports = super().linearize(xs, us, substeps, kappa, guess, wrenches)
         external = self.external(wrenches)
-        for t in np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE))):
-            held = np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(external[t : t + 1], substeps, axis=0)
-            rolled = self.roll(xs[t], *held, kappa=kappa, derivatives=True)
-            reports[t] = rolled.reports[min(rolled.knot, substeps - 1)]
-            if rolled.knot < substeps:
-                continue
-            (A[t], B[t]), x_next[t] = _chained(np.eye(self.ndx), rolled), rolled.xs[-1]
-            reports[t, 5] = rolled.reports[:, 5].max()
+        for t in map(int, np.flatnonzero(np.isin(reports[:, 0], list(DIVISIBLE)))):
+            A[t], B[t], x_next[t], reports[t] = self.linearize_knot(
+                xs[t], knot_inputs(us, external, t, substeps), kappa
+            )
         return A, B, x_next, reports
 
     # -- single states -------------------------------------------------------------------------------------------------

@@ -159,6 +159,19 @@ def follow(go_on: Callable[[int], int], settings: Vector, path: Path, substeps: 
     return done // substeps
 
 
+def knot_inputs(us: Floats, wrenches: Cube, t: int, substeps: int) -> tuple[Floats, Cube]:
+    """Inputs and external wrenches of the steps of knot t."""
+    return np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(wrenches[t : t + 1], substeps, axis=0)
+
+
+def chained(A: Floats, rolled: Rolled) -> tuple[Floats, Floats]:
+    """Derivatives by state and held input of the end of a rollout, whose first state has the derivative A."""
+    B = np.zeros((len(A), rolled.B.shape[2]))
+    for dx, du in zip(rolled.A, rolled.B, strict=True):
+        A, B = dx @ A, dx @ B + du
+    return A, B
+
+
 class Engine:
     """The kernels of one packed mechanism, their scratch, and the arrays that cross the border."""
 
@@ -376,6 +389,21 @@ class Engine:
             for array in (A, B, x_next):
                 array[unsolved] = 0.0
         return A, B, x_next, reports
+
+    def linearize_knot(
+        self, x: Vector, given: tuple[Floats, Cube], kappa: float | None
+    ) -> tuple[Floats, Floats, Vector, Vector]:
+        """(A, B, next state, report) of a knot: products of the derivatives of its steps, in a rollout from x.
+
+        given: inputs and external wrenches of the steps; see `knot_inputs`.
+        """
+        us, wrenches = given
+        rolled = self.roll(x, us, wrenches, kappa=kappa, derivatives=True)
+        report = rolled.reports[min(rolled.knot, len(us) - 1)]
+        if rolled.knot < len(us):
+            return np.zeros((self.ndx, self.ndx)), np.zeros((self.ndx, self.nu)), np.zeros(self.nx), report
+        report[5] = rolled.reports[:, 5].max()
+        return *chained(np.eye(self.ndx), rolled), rolled.xs[-1], report
 
     def linearize_one(
         self, x: Vector, u: Vector, kappa: float | None, wrenches: Cube | None = None

@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.integrators import legendre, phases, rollout
-from sim.integrators.feedback import FeedbackLaw, Path
 from sim.integrators.hamilton_gradient import Slopes
 from sim.model.model import Model
 from sim.model.pace import pieces
 from sim.simulator.dividing_engine import DividingEngine
-from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted
-from sim.simulator.high_order_engine import HighOrderEngine
+from sim.simulator.engine import CONTACT, REPORT, Division, Engine, Floats, Rolled, interrupted, knot_inputs
+from sim.simulator.knot_engine import KnotEngine
 from sim.simulator.link import link_smooth, link_step
 from sim.simulator.results import Interrupted
 from sim.simulator.settings import Settings
@@ -44,12 +43,7 @@ class March(NamedTuple):
     near: NDArray[np.bool_]  # (T,) which those are
 
 
-def _held(us: Floats, wrenches: Cube, t: int, substeps: int) -> tuple[Floats, Cube]:
-    """Inputs and external wrenches of the steps of knot t."""
-    return np.repeat(us[t : t + 1], substeps, axis=0), np.repeat(wrenches[t : t + 1], substeps, axis=0)
-
-
-class PhasedEngine(HighOrderEngine):
+class PhasedEngine(KnotEngine):
     """The kernels of one packed mechanism with contacts or limits."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
@@ -170,40 +164,6 @@ class PhasedEngine(HighOrderEngine):
         """As Engine.far; all of them where the step was of higher order."""
         return self._second.far() if self._last.near else np.ones(self.sizes.ncontact, dtype=bool)
 
-    def closed_loop(
-        self,
-        x: Vector,
-        policy: FeedbackLaw,
-        alpha: float,
-        limits: tuple[Floats, Floats],
-        substeps: int,
-        kappa: float | None,
-        *,
-        keep: bool = False,
-    ) -> tuple[int, Path]:
-        """As Engine.closed_loop; the warm starts of the policy are not used."""
-        knots = len(policy.us)
-        path = self._path(knots, keep=keep, cones=False)
-        path.xs[0] = x
-        total = 0.0
-        for t in range(knots):
-            try:
-                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
-                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
-                m = self.march(path.xs[t], *_held(path.us, policy.wrenches, t, substeps), kappa)
-            except KeyboardInterrupt:
-                interrupted(path.report[None], 0)
-                raise Interrupted((t, path)) from None
-            path.report[:REPORT] = m.reports[min(m.knot, substeps - 1)]
-            if m.knot < substeps:
-                return t, path
-            total += m.reports[:, 1].sum()
-            path.xs[t + 1] = m.xs[-1]
-            if alpha < 1.0:
-                path.xs[t + 1] = self.integrate(m.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
-        path.report[1] = total
-        return knots, path
-
     def linearize(
         self,
         xs: Floats,
@@ -220,7 +180,7 @@ class PhasedEngine(HighOrderEngine):
         A, B = np.zeros((n, self.ndx, self.ndx)), np.zeros((n, self.ndx, self.nu))
         x_next, reports = np.zeros((n, self.nx)), np.zeros((n, REPORT))
         for t in range(n):
-            m = self.march(xs[t], *_held(us, external, t, substeps), kappa)
+            m = self.march(xs[t], *knot_inputs(us, external, t, substeps), kappa)
             reports[t] = m.reports[min(m.knot, substeps - 1)]
             steps = (
                 (self._step_slopes(m, s, (us[t], external[t : t + 1]), kappa) for s in range(substeps))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dojo_opt as dojo
-from dojo_opt.cli import main
+from dojo_opt.__main__ import main
 from dojo_opt.plant.monte_carlo import MonteCarlo, MonteCarloRun
 
 

@@ -240,7 +240,7 @@ def test_names_of_a_user_are_text_in_the_page(page, tmp_path, names):
 def test_names_of_a_file_are_text_in_the_page_of_show(page, tmp_path):
     from xml.sax.saxutils import quoteattr
 
-    from dojo_opt.cli import main
+    from dojo_opt.__main__ import main
 
     link = """<link name={}><inertial><mass value="1"/>
     <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -1,0 +1,48 @@
+"""Engines whose closed loops are rollouts of one knot after another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.integrators.feedback import FeedbackLaw, Path
+from sim.simulator.engine import REPORT, Floats, interrupted, knot_inputs
+from sim.simulator.high_order_engine import HighOrderEngine
+from sim.simulator.results import Interrupted
+from solvers.types import Vector
+
+
+class KnotEngine(HighOrderEngine):
+    """A HighOrderEngine whose `roll` is made of calls of several kernels."""
+
+    def closed_loop(
+        self,
+        x: Vector,
+        policy: FeedbackLaw,
+        alpha: float,
+        limits: tuple[Floats, Floats],
+        substeps: int,
+        kappa: float | None,
+        *,
+        keep: bool = False,
+    ) -> tuple[int, Path]:
+        """As Engine.closed_loop; the warm starts of the policy are not used."""
+        knots = len(policy.us)
+        path = self._path(knots, keep=keep, cones=False)
+        path.xs[0], total = x, 0.0
+        for t in range(knots):
+            try:
+                dx = self.difference(policy.xs[t : t + 1], path.xs[t : t + 1])[0]
+                path.us[t] = np.clip(policy.us[t] + alpha * policy.ks[t] + policy.Ks[t] @ dx, *limits)
+                rolled = self.roll(path.xs[t], *knot_inputs(path.us, policy.wrenches, t, substeps), kappa=kappa)
+            except KeyboardInterrupt:
+                interrupted(path.report[None], 0)
+                raise Interrupted((t, path)) from None
+            path.report[:REPORT] = rolled.reports[min(rolled.knot, substeps - 1)]
+            if rolled.knot < substeps:
+                return t, path
+            total += rolled.reports[:, 1].sum()
+            path.xs[t + 1] = rolled.xs[-1]
+            if alpha < 1.0:
+                path.xs[t + 1] = self.integrate(rolled.xs[-1:], (alpha - 1.0) * policy.gaps[t + 1 : t + 2])[0]
+        path.report[1] = total
+        return knots, path
