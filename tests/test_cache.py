@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from sim.model.shape_kinds import Pair
 from support.programs import HOME, PACKAGES, python
 
 # -- the kernel cache --------------------------------------------------------------------------------------------------
@@ -342,6 +343,19 @@ FEATURES = (  # of few scenes: rooms and files with kernels of their own
     "sim.integrators.runge_kutta",
 )  # fmt: skip
 
+COLLIDING = (
+    "sim.contact.collision.",
+    "sim.contact.pairs.",
+    "sim.contact.restitution",
+    "sim.dynamics.loops.",
+)  # in part
+OTHER_PAIRS = (
+    *(f"sim.contact.collision.pair_kernels.{name}" for name in ("arrange", "choose", "sides", "face")),
+    *(f"sim.contact.collision.pair_kernels._{name.lower()}" for name in Pair.__members__ if name != "SPHERE_SPHERE"),
+    "sim.contact.collision.cylinder", *(f"sim.contact.pairs.{name}" for name in ("cylinder_pairs.choose", "string")),
+    "sim.contact.restitution.find", "sim.dynamics.loops.gears", "sim.dynamics.loops.closure", "sim.derivatives.loop_stiffness",
+)  # fmt: skip
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -360,8 +374,15 @@ FEATURES = (  # of few scenes: rooms and files with kernels of their own
             "sim.rollout(sim.neutral(), np.ones((3, sim.nu)))\nsim.linearize(sim.neutral())",
             (*FEATURES, "sim.contact.", "sim.solve.loop_branch"),
         ),
+        (
+            "balls = [dojo.Body(name, 1.0, shape=dojo.Sphere(0.1)) for name in 'ab']\n"
+            "joints = [dojo.Joint('floating', None, name) for name in 'ab']\n"
+            "sim = dojo.Simulator(dojo.Mechanism(bodies=balls, joints=joints, collisions=[dojo.Collision('a', 'b')]))\n"
+            "sim.rollout(sim.neutral(), np.zeros((3, 0)))\nsim.linearize(sim.neutral())",
+            (*(name for name in FEATURES if name not in COLLIDING), *OTHER_PAIRS),
+        ),
     ],
-    ids=["hop", "pendulum", "limit"],
+    ids=["hop", "pendulum", "limit", "two balls"],
 )
 def test_features_of_few_scenes_are_not_compiled(program: str, foreign: tuple[str, ...]) -> None:
     text = f"""

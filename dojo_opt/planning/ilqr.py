@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dojo_opt.planning.damping import Damping
 from dojo_opt.planning.ilqr_search import Direction, Iterate, Search
 from dojo_opt.planning.ilqr_start import FreeStart, at_rest, fitting_stage, periodic_gains
 from dojo_opt.planning.objective import Objective
@@ -52,8 +53,6 @@ _CREEPING = 15  # short or rejected steps in a row: of 116 planned gaits and hop
 _FIRM = 10.0  # regularisation above which short steps no longer raise it while gaps are open
 _FALLEN = 3.0  # times the merit: a rollout that closes gaps at this price has lost the trajectory
 _SMALL = 1e-9  # merit below which changes are judged absolutely
-_FACTOR = 2.0  # of the schedule, growing geometrically with repeated use: Tassa 2012, section II.F
-_USEFUL = 1.0  # a raise starts here and a lowering below it switches off: less changes next to nothing
 
 
 def ilqr(
@@ -136,29 +135,6 @@ class Iteration(NamedTuple):
         return self.now.gaps is None or any(record["alpha"] > 0.0 for record in self.history)
 
 
-class _Damping:
-    """Schedule of the regularisation, in units of the mean control weight."""
-
-    def __init__(self, options: Options) -> None:
-        self._options = options
-        self.reset()
-
-    def reset(self, mu: float | None = None) -> None:
-        """Back to the first value, or to mu."""
-        self.mu = self._options.regularization if mu is None else mu
-        self._growth = 1.0
-
-    def increase(self) -> None:
-        """After a failure: faster with every failure in a row."""
-        self._growth = max(_FACTOR, self._growth * _FACTOR)
-        self.mu = min(max(_USEFUL, self.mu * self._growth), self._options.regularization_max)
-
-    def decrease(self) -> None:
-        """After a good step: faster with every good step in a row."""
-        self._growth = min(1.0 / _FACTOR, self._growth / _FACTOR)
-        self.mu = self.mu * self._growth if self.mu * self._growth >= _USEFUL else 0.0
-
-
 class _Attempt(NamedTuple):
     """Where an attempt ended, with the gains, multipliers and half penalties that belong to it."""
 
@@ -191,7 +167,7 @@ class Solver:
         self._search = Search(problem, self._horizon, self.objective, self.options)
         self._start = None if problem.free_start is None else FreeStart(problem)
         self._history = History(self.options)
-        self._damping = _Damping(self.options)
+        self._damping = Damping(self.options)
         self._begun = False  # whether `now` belongs to the present solve
         self._detail = ""  # place and cause of a failure, in addition to the status
         self._K, self._k = np.zeros((T, sim.nu, sim.ndx)), np.zeros((T, sim.nu))

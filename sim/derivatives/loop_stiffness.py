@@ -6,12 +6,13 @@ from sim.contact.pairs.wrench_columns import add_wrench_column, point_shift, uni
 from sim.dynamics.loops.closure import child_point, loop_frame, relative_rotation
 from sim.model.data import Data
 from sim.model.model import Model
-from solvers.compiler import kernel
+from sim.model.slots import Slot
+from solvers.compiler import kernel, optional
 from solvers.rotation import Vec3, cross, rotate, times
 from solvers.types import Matrix
 
 
-@kernel
+@optional(Slot.LOOP_STIFFNESS)
 def loop_stiffness(model: Model, data: Data, m: int, K2: Matrix) -> Vec3:
     """K2 (2, 36) += d(G2^T f) by the twists of a and b at configuration 2; returns the force on a."""
     k = model.coupling_body.shape[0] - model.loop_ntrans.shape[0] + m

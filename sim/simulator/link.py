@@ -27,6 +27,7 @@ from sim.contact.active_contacts import (
     slip_error,
     start_contacts,
 )
+from sim.contact.collision.pair_kernels import KERNELS
 from sim.contact.contact_law import slip_noise
 from sim.contact.contact_report import report_contacts, worst_contact
 from sim.contact.inactive import choose_active, has_activated, sunk_contact
@@ -55,6 +56,7 @@ from sim.contact.pyramid import (
 from sim.contact.restitution import find_impacts, impacts_gained, subtract_floors
 from sim.contact.terrain_contact import add_frame_matrix, place_on_terrain, terrain_gap, turn_on_terrain
 from sim.derivatives.coupling_gradient import add_coupling_composites, add_coupling_derivatives
+from sim.derivatives.loop_stiffness import loop_stiffness
 from sim.derivatives.parameters.height_columns import add_height_gradient
 from sim.derivatives.parameters.string_columns import add_moved_end
 from sim.derivatives.parameters.surface import add_surface_radius
@@ -75,7 +77,13 @@ from sim.dynamics.loops.branch_motion import (
 )
 from sim.dynamics.loops.closure import apply_loops, keep_loops, move_loops, start_loops
 from sim.dynamics.loops.coupling_system import factor_coupling, solve_coupling, solve_coupling_panel
-from sim.dynamics.loops.gears import apply_gears
+from sim.dynamics.loops.gears import (
+    add_gear_columns,
+    apply_gears,
+    gear_derivatives,
+    gear_response,
+    unit_gear_impulse,
+)
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.loops.loop_work import loop_slack, loops_gained
 from sim.model.model import Law, Model
@@ -114,9 +122,8 @@ _CONTACTS = (
     report_contacts,
 )
 _PREDICTION = (has_pyramids, contact_rates, contact_answers, choose_contacts, take_contacts)
+_COUPLING = (factor_coupling, solve_coupling)
 _LOOPS = (
-    factor_coupling,
-    solve_coupling,
     start_loops,
     apply_loops,
     keep_loops,
@@ -205,13 +212,21 @@ def link_poses(model: Model) -> None:
 def link_nodes(model: Model) -> None:
     """Link the kernels of velocities and energies at nodes: those of loops follow from their constraints."""
     if len(model.loop_ntrans) + len(model.gear_dof):
-        link(model.optional, factor_coupling, solve_coupling, close_velocity)
+        link(model.optional, *_COUPLING, close_velocity)
+    if len(model.gear_dof):
+        link(model.optional, unit_gear_impulse, gear_response)
 
 
 def link_smooth(model: Model) -> None:
     """Link the kernels of steps of higher order."""
     if np.any(model.joint_nrot == 2):
         link(model.optional, swing_curvature)
+
+
+def link_pairs(model: Model) -> None:
+    """Link the kernels of each kind of pair of shapes."""
+    for kind in np.unique(model.pair_kind % SWAPPED):
+        link(model.optional, *KERNELS.get(Pair(kind), ()))  # those of cylinders have kernels for all points at once
 
 
 def link_step(model: Model) -> None:
@@ -231,14 +246,15 @@ def link_step(model: Model) -> None:
     if np.any(model.contact_law == int(Law.LINEAR)):
         link(model.optional, *_PYRAMIDS)
     if len(model.coupling_body) + len(model.gear_dof):
-        link(model.optional, *_LOOPS)
+        link(model.optional, *_COUPLING)
         link_nodes(model)
     if len(model.loop_ntrans):
         link(model.optional, *_MOTION_OF_LOOPS)
     if len(model.loop_ntrans) + len(model.gear_dof):
-        link(model.optional, apply_gears)
+        link(model.optional, *_LOOPS, apply_gears)
     if len(model.pair_kind):
         link(model.optional, *_PAIRS)
+        link_pairs(model)
     if np.any(model.pair_kind % SWAPPED >= int(Pair.POLYTOPE_CYLINDER)):
         link(model.optional, *_CYLINDERS)
     if _has_strings(model):
@@ -268,6 +284,10 @@ def link_gradient(model: Model) -> None:
         link(model.optional, add_ball_spring_derivatives)
     if len(model.coupling_body) + len(model.gear_dof):
         link(model.optional, *_COUPLING_GRADIENT)
+    if len(model.loop_ntrans):
+        link(model.optional, loop_stiffness)
+    if len(model.gear_dof):
+        link(model.optional, add_gear_columns, gear_derivatives)
     if len(model.pair_kind):
         link(model.optional, all_near)
     if _has_strings(model):

@@ -291,7 +291,7 @@ print((rss() - first) / COUNT)
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads the memory of a process as Linux says it")
 def test_memory_of_new_residuals_is_bounded():
     """Numba frees no code: a residual with a value of its own keeps some; one that was there before, nothing."""
-    again = float(python(MEMORY.replace("COUNT", "30").replace("VALUE", "1.0")))
-    anew = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "10.0 + i")))
+    again = float(python(MEMORY.replace("COUNT", "10").replace("VALUE", "1.0")))
+    anew = float(python(MEMORY.replace("COUNT", "5").replace("VALUE", "10.0 + i")))
     assert again < 0.1
     assert anew < 3.0

@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from sim.contact.collision.collide import arrange, choose, collide, collide_chosen, open_sides
 from sim.contact.collision.edge_axes import OPEN
 from sim.mechanism.shapes import Box, Capsule, HalfSpace, Solid, Sphere, String
 from sim.model.shape_kinds import OUT, SIZES, SWAPPED, Pair, Shape, count, pair
+from support.collide import arrange, choose, collide, collide_chosen, open_sides
 from support.jacobians import differences
 from support.shape_pairs import CORE, NAMES, NO_HULL, SIMPLE, deepest, random_pose, shapes, touch
 
@@ -196,7 +196,7 @@ def test_the_side_that_separates_stays_open_and_the_others_are_closed(kind: Pair
     for _ in range(50):
         sizes = rng.uniform(0.15, 0.5, 2 * SIZES)
         R, r = random_pose(rng, kind, sizes, -0.05)
-        sides = open_sides(int(kind), sizes, R.ravel(), r)
+        sides = open_sides(int(kind), sizes, NO_HULL, R.ravel(), r)
         assert arrange(int(kind), sizes, NO_HULL, R.ravel(), r, sides) == arrange(
             int(kind), sizes, NO_HULL, R.ravel(), r, OPEN
         )

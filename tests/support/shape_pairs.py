@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.contact.collision.collide import collide
 from sim.model.shape_kinds import OUT, Pair, Shape, count
+from support.collide import collide
 
 Array = np.ndarray
 NO_HULL = np.zeros((1, 4))

@@ -124,7 +124,7 @@ def _edge_axis(
 @inner_kernel
 def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement:
     """Of the normals of faces and of pairs of edges, the one along which the two are farthest apart, or overlap least:
-    (row of the face, or -1 for edges; -1; distance along it; 1; 1).
+    (row of the face, or -1 for edges; the same again; distance along it; 1; 1).
     """
     oa, ob = int(sizes[0]), int(sizes[4])
     na, nb = int(hull[oa, 0]), int(hull[ob, 0])
@@ -148,7 +148,7 @@ def separation(sizes: Vector, hull: Matrix, R: Vector, r: Vector) -> Arrangement
             code, d, _ = _edge_axis(i, j, 0.0, sizes, hull, R, r)
             if code != 0 and d > best + TIE * abs(best):
                 best, face = d, -1
-    return face, -1, best, 1.0, 1.0
+    return face, face, best, 1.0, 1.0
 
 
 @inner_kernel

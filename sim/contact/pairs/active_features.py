@@ -53,7 +53,9 @@ def open_pairs(model: Model, data: Data, j: int) -> float:
     for k in range(12):
         data.pair_before[j, k] = data.pair_relative[j, k]
     pose = data.pair_before[j]
-    data.pair_sides[j] = open_sides(model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP])
+    data.pair_sides[j] = open_sides(
+        model, model.pair_kind[j], model.pair_sizes[j], pose[:9], pose[9 : RelativePose.GAP]
+    )
     apart = distance(model, data, j)
     data.pair_before[j, RelativePose.GAP] = min(apart, 0.0) - overlap_before(model, j)
     return apart
@@ -66,12 +68,12 @@ def distance(model: Model, data: Data, first: int) -> float:
     if on_cylinder(kind):
         return cylinder_distance(model, data, first)
     pose = data.pair_relative[first]
-    faces = arrange(kind, model.pair_sizes[first], model.hull, pose[:9], pose[9:], OPEN)
+    faces = arrange(model, kind, model.pair_sizes[first], pose[:9], pose[9:], OPEN)
     g = data.pair_trial[0]
     least = 1e300
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        choose(kind, j - first, faces, model.pair_sizes[j], model.hull, pose[:9], pose[9:], g)
+        choose(model, kind, j - first, faces, model.pair_sizes[j], pose[:9], pose[9:], g)
         least = min(least, g[Witness.GAP])
         j += 1
     return least
@@ -88,28 +90,28 @@ def choose_shapes(model: Model, data: Data, first: int) -> None:
         return
     pose = data.pair_relative[first]
     before = data.pair_before[first]
-    faces = arrange(kind, model.pair_sizes[first], model.hull, pose[:9], pose[9:], data.pair_sides[first])
+    faces = arrange(model, kind, model.pair_sizes[first], pose[:9], pose[9:], data.pair_sides[first])
     g = data.pair_trial[0]
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
         sizes = model.pair_sizes[j]
-        code = choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], data.pair_out[j])
+        code = choose(model, kind, j - first, faces, sizes, pose[:9], pose[9:], data.pair_out[j])
         if code > 1 or code < 0:  # a choice
-            collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+            collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
             if g[Witness.GAP] < before[RelativePose.GAP] and left_behind(
                 data, kind, data.pair_out[j], pose, before, before[RelativePose.GAP]
             ):
-                code = instead(kind, j - first, sizes, model.hull, before[:9], before[9 : RelativePose.GAP])
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+                code = instead(model, kind, j - first, sizes, before[:9], before[9 : RelativePose.GAP])
+                collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
                 code = code if g[Witness.GAP] >= before[RelativePose.GAP] else 0
-                collide_chosen(kind, j - first, code, sizes, model.hull, pose[:9], pose[9:], data.pair_out[j])
+                collide_chosen(model, kind, j - first, code, sizes, pose[:9], pose[9:], data.pair_out[j])
         data.pair_code[j] = code
         j += 1
     if data.feature_choice[0] == FeatureChoice.WITH_PREVIOUS:
         keep(model, data, first)
         for k in range(first, j):
             sizes = model.pair_sizes[k]
-            collide_chosen(kind, k - first, data.pair_code[k], sizes, model.hull, pose[:9], pose[9:], data.pair_out[k])
+            collide_chosen(model, kind, k - first, data.pair_code[k], sizes, pose[:9], pose[9:], data.pair_out[k])
 
 
 @optional(Slot.CHOOSE_PAIRS)
@@ -141,7 +143,7 @@ def passed_through(model: Model, data: Data, first: int) -> bool:
                 cylinder_before(model, data, first, j)
             else:
                 sizes = model.pair_sizes[first]
-                collide_chosen(kind, j - first, code, sizes, model.hull, before[:9], before[9 : RelativePose.GAP], g)
+                collide_chosen(model, kind, j - first, code, sizes, before[:9], before[9 : RelativePose.GAP], g)
             now = data.pair_out[j]
             turned = (
                 now[Witness.NORMAL] * g[Witness.NORMAL]

@@ -77,9 +77,7 @@ def collide_shapes(model: Model, data: Data, first: int) -> None:
     end = first
     while end < model.pair_kind.shape[0] and (end == first or model.pair_feature[end] > 0):
         if data.feature_choice[0] != FeatureChoice.EVERY_POSE:
-            collide_chosen(
-                kind, end - first, data.pair_code[end], sizes, model.hull, pose[:9], pose[9:], data.pair_out[end]
-            )
+            collide_chosen(model, kind, end - first, data.pair_code[end], sizes, pose[:9], pose[9:], data.pair_out[end])
         end += 1
 
 

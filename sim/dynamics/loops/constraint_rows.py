@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.dynamics.loops.gears import add_gear_columns, gear_response, gear_row, unit_gear_impulse
+from sim.dynamics.loops.gears import add_gear_columns, gear_response, unit_gear_impulse
 from sim.model.data import Data
 from sim.model.model import Model
 from solvers.compiler import kernel
@@ -118,7 +118,7 @@ def enlist(model: Model, data: Data) -> int:
                 data.couple_live[n, 1] = k
                 n += 1
     for k in range(model.gear_dof.shape[0]):
-        data.couple_live[n, 0] = gear_row(model, k)
+        data.couple_live[n, 0] = model.coupling_row[count] + k
         data.couple_live[n, 1] = count + k
         n += 1
     return n

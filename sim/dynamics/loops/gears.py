@@ -45,7 +45,7 @@ def apply_gears(model: Model, data: Data, h: float) -> float:
     return error
 
 
-@kernel
+@optional(Slot.UNIT_GEAR_IMPULSE)
 def unit_gear_impulse(model: Model, k: int, out: Vector) -> None:
     """out (nv,) = the generalized impulse of gear k, of size one."""
     for d in range(out.shape[0]):
@@ -54,13 +54,13 @@ def unit_gear_impulse(model: Model, k: int, out: Vector) -> None:
     out[model.gear_dof[k, 1]] -= model.gear_ratio[k]
 
 
-@kernel
+@optional(Slot.GEAR_RESPONSE, default=0.0)
 def gear_response(model: Model, data: Data, k: int, y: Vector) -> float:
     """d(gap of gear k)/d(v25) y."""
     return data.gear_rate[k, 0] * y[model.gear_dof[k, 0]] + data.gear_rate[k, 1] * y[model.gear_dof[k, 1]]
 
 
-@kernel
+@optional(Slot.ADD_GEAR_COLUMNS)
 def add_gear_columns(model: Model, data: Data, k: int, x: Vector) -> None:
     """x += d(gap of gear k)/d(v25) of the columns."""
     a = data.columns[model.gear_dof[k, 0]]
@@ -69,7 +69,7 @@ def add_gear_columns(model: Model, data: Data, k: int, x: Vector) -> None:
         x[m] += data.gear_rate[k, 0] * a[m] + data.gear_rate[k, 1] * b[m]
 
 
-@kernel
+@optional(Slot.GEAR_DERIVATIVES)
 def gear_derivatives(model: Model, X: Matrix) -> None:
     """X[row of gear] = d(gap)/d(q2)."""
     for k in range(model.gear_dof.shape[0]):

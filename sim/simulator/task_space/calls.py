@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from sim.model.pace import rows as parts_of
 from sim.simulator.engine import Engine
-from sim.simulator.link import link_gradient, link_step
+from sim.simulator.link import link_gradient, link_pairs, link_step
 from sim.simulator.task_space import contact_rows, distances, frames, momenta
 from sim.simulator.task_space.rows import Rows
 from solvers.compiler import Table
@@ -96,7 +96,7 @@ class TaskSpace:
 
     def distances(self, xs: Floats, us: Floats, out: Buffers, *, derivatives: bool) -> None:
         """Distance [m] of every pair of shapes."""
-        model, data = self._tables()
+        model, data = self._engine.linked(link_pairs), self._engine.table()
         for part in parts_of(len(out.knots)):
             distances.distances(model, data, out.rows(xs, us, part, derivatives=derivatives))
 

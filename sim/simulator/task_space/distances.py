@@ -30,10 +30,10 @@ def find_points(model: Model, data: Data, first: int) -> None:
     """pair_out of all points of the collision that begins at pair `first`, at configuration 2."""
     place_shapes(model, data, first, data.pos2, data.rot2)
     kind, sizes, pose = model.pair_kind[first], model.pair_sizes[first], data.pair_relative[first]
-    faces = arrange(kind, sizes, model.hull, pose[:9], pose[9:], OPEN)
+    faces = arrange(model, kind, sizes, pose[:9], pose[9:], OPEN)
     j = first
     while j < model.pair_kind.shape[0] and (j == first or model.pair_feature[j] > 0):
-        choose(kind, j - first, faces, sizes, model.hull, pose[:9], pose[9:], data.pair_out[j])
+        choose(model, kind, j - first, faces, sizes, pose[:9], pose[9:], data.pair_out[j])
         j += 1
 
 
