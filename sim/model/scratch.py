@@ -35,7 +35,10 @@ class Scratch:
 
     def table(self) -> Table:
         """Table of the first Data."""
-        return self.tables(1)[0]
+        first: Table | None = getattr(self._kept, "first", None)
+        if first is None:
+            first = self._kept.first = self.tables(1)[0]
+        return first
 
     def chunks(self, count: int) -> Table:
         """Tables for a parallel call over `count` items, one per chunk."""

@@ -169,11 +169,11 @@ class Simulator(RowStepping):
             check.state("step", x)
             check.inputs("step", "u", control, (self.nu,))
         scene, end = (self.mechanism, self.time_step, rolled.contacts[0]), rolled.xs[1 if rolled.knot else 0]
-        parts, share, error = rolled.division
-        detail = missed(error) if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], end)
+        (parts, share, error), worst = rolled.division, float(rolled.division.errors[0])
         solved = STATUSES[int(status)], int(iterations), residual, violation
-        found = StepResult(end, *solved, scene, int(parts[0]), float(share[0]), float(error[0]), detail)
-        return ended(found, throw) if throw else found
+        detail = "" if rolled.knot else self._sentence("Simulator.step", rolled.reports[0], end)
+        division = int(parts[0]), float(share[0]), worst, missed(error) if worst > 1.0 else detail
+        return ended(StepResult(end, *solved, scene, *division), throw)
 
     def rollout(
         self,

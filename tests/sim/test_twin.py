@@ -148,9 +148,8 @@ def quadruped(law="nonlinear", friction=0.8):
     return dojo.Mechanism(bodies, joints, contacts)
 
 
-@pytest.mark.sweep(12)
-@pytest.mark.parametrize("time_step", [0.01, 0.05])
-@pytest.mark.parametrize("height", [1.0, 0.01])
+@pytest.mark.sweep(6)
+@pytest.mark.parametrize(("height", "time_step"), [(1.0, 0.05), (0.01, 0.01)])
 @pytest.mark.parametrize("law", LAWS)
 def test_floating_tree_in_flight_and_in_contact(law, height, time_step, rng):
     """Twice: limits slack, and one joint thrown against its limit."""
