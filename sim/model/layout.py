@@ -44,7 +44,7 @@ MODEL_FLOATS = _shapes(
     """
     body_mass nbody, body_weight nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_lead nbody, joint_swing_axes nbody 6,
-    dof_spring nv, dof_damper nv, dof_armature nv, dof_rest nv,
+    dof_spring nv, dof_damper nv, dof_seen nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,

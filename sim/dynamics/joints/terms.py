@@ -2,13 +2,15 @@
 
 A spring is integrated at the midpoint of each interval, V_d = (h/2) k |(r(2) + r(3))/2|^2: as implicit as the
 trapezoidal rule, so stable for every k, and as conservative, so that a vibration keeps its amplitude. A damper acts on
-the unknown velocity, implicit and dissipative for every coefficient. An armature adds I (q2 - q1)^2/(2 h) to the
-discrete Lagrangian, the energy of a rotor that turns with the coordinate and carries no momentum elsewhere.
+the mean of both velocities where it is not stiff, on the unknown one where it is, and is dissipative for every
+coefficient (damper.py). An armature adds I (q2 - q1)^2/(2 h) to the discrete Lagrangian, the energy of a rotor that
+turns with the coordinate and carries no momentum elsewhere.
 """
 
 from __future__ import annotations
 
 from sim.dynamics.joints.ball_spring import add_ball_spring_derivatives, add_spring_block, spring_impulse
+from sim.dynamics.joints.damper import damper_impulse, damper_lag
 from sim.dynamics.joints.swing import swing_curvature
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
@@ -18,7 +20,7 @@ from solvers.types import Vector
 
 @kernel
 def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> None:
-    """residual += I (nu - v) + h d nu + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints."""
+    """residual += I (nu - v) + h k (q + h (nu - v)/4 - rest) - h u + damper, and the analogue of quaternion joints."""
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         end = model.body_vadr[i + 1]
@@ -29,9 +31,9 @@ def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: 
                 for k in range(3):
                     data.residual[end + k] += t[k]
             for k in range(end, end + 3):
-                data.residual[k] += h * model.dof_damper[k] * data.nu[k]
+                data.residual[k] += damper_impulse(model, h, k, data.nu[k], v[k])
         for e in range(d, end):
-            r = h * model.dof_damper[e] * data.nu[e] + model.dof_armature[e] * (data.nu[e] - v[e])
+            r = damper_impulse(model, h, e, data.nu[e], v[e]) + model.dof_armature[e] * (data.nu[e] - v[e])
             if model.dof_spring[e] > 0.0:
                 mid = q[model.dof_qadr[e]] + 0.25 * h * (data.nu[e] - v[e]) - model.dof_rest[e]
                 r += h * model.dof_spring[e] * mid
@@ -45,7 +47,7 @@ def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: 
 def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """joint_block[i] = d(joint impulses)/d(nu), n x n row-major.
 
-    I + h d + h^2 k/4 on the diagonal, and the springs of quaternion joints.
+    I + h d - lag + h^2 k/4 on the diagonal, and the springs of quaternion joints.
     """
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
@@ -54,7 +56,7 @@ def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> No
         for k in range(n * n):
             B[k] = 0.0
         for k in range(n):
-            B[k * n + k] = h * model.dof_damper[d + k] + model.dof_armature[d + k]
+            B[k * n + k] = h * model.dof_damper[d + k] - damper_lag(model, h, d + k) + model.dof_armature[d + k]
             if model.joint_nrot[i] < 3 or k < n - 3:
                 B[k * n + k] += 0.25 * h * h * model.dof_spring[d + k]
         if model.joint_nrot[i] == 3 and model.dof_spring[d + n - 3] > 0.0:
