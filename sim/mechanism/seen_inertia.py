@@ -24,7 +24,7 @@ from sim.model.model import Model
 Floats = NDArray[np.float64]
 
 BEND = 0.5  # [rad]
-_SINGULAR = 1e-13  # of the largest eigenvalue of M: those below count as that
+_SINGULAR = 1e-13  # of the largest eigenvalue of a singular M: those below count as that
 
 
 class Bent(NamedTuple):
@@ -56,7 +56,7 @@ def bent(model: Model) -> Bent:
         dofs = slice(int(model.body_vadr[i]), int(model.body_vadr[i + 1]))
         local = joint_columns(model, i)
         columns[dofs, 3:] = local[:, 3:] @ frame[i].T
-        columns[dofs, :3] = local[:, :3] @ frame[i].T + np.cross(joint[i], columns[dofs, 3:])
+        columns[dofs, :3] = local[:, :3] @ frame[i].T - columns[dofs, 3:] @ _skew(joint[i])
         J = rotation[i] @ model.body_inertia[i].reshape(3, 3) @ rotation[i].T
         inertia[i] = _about_origin(float(model.body_mass[i]), J, centre[i])
     return Bent(rotation, centre, joint, frame, columns, inertia)
@@ -76,8 +76,15 @@ def joint_columns(model: Model, i: int) -> Floats:
 
 def _about_origin(m: float, J: Floats, c: Floats) -> Floats:
     """6 x 6 spatial inertia of a body with its centre of mass at c."""
-    cross = np.array([[0.0, -c[2], c[1]], [c[2], 0.0, -c[0]], [-c[1], c[0], 0.0]])
-    return np.block([[m * np.eye(3), -m * cross], [m * cross, J - m * cross @ cross]])
+    out, cross = np.empty((6, 6)), _skew(c)
+    out[:3, :3], out[:3, 3:] = m * np.eye(3), -m * cross
+    out[3:, :3], out[3:, 3:] = m * cross, J - m * cross @ cross
+    return out
+
+
+def _skew(a: Floats) -> Floats:
+    """[a], [a] b = a x b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def seen_inertias(model: Model) -> Floats:
@@ -89,25 +96,28 @@ def seen_inertias(model: Model) -> Floats:
 
 def seen_motions(model: Model, at: Bent) -> tuple[Floats, Floats]:
     """(I_d (nv,), motions x_d as columns (nv, nv))."""
-    values, vectors = np.linalg.eigh(_mass_matrix(model, at))
-    inverse = (vectors / np.maximum(values, _SINGULAR * values[-1])) @ vectors.T
+    M = _mass_matrix(model, at)
+    try:
+        root = np.linalg.inv(np.linalg.cholesky(M))
+        inverse = root.T @ root
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(M)
+        inverse = (vectors / np.maximum(values, _SINGULAR * values[-1])) @ vectors.T
     seen = 1.0 / np.diag(inverse)
     return seen, inverse * seen
 
 
 def _mass_matrix(model: Model, at: Bent) -> Floats:
     """M = sum of J^T inertia J + armature, (nv, nv), from the composite inertias of the branches."""
-    composite, M = at.inertia.copy(), np.diag(model.dof_armature)
-    for i in range(len(composite) - 1, -1, -1):
-        p = int(model.body_parent[i])
+    composite, n = at.inertia.copy(), len(at.inertia)
+    for i in range(n - 1, -1, -1):
+        if model.body_parent[i] >= 0:
+            composite[model.body_parent[i]] += composite[i]
+    branch = np.eye(n, dtype=bool)  # bodies from the root to each of them
+    for i, p in enumerate(model.body_parent):
         if p >= 0:
-            composite[p] += composite[i]
-        own = slice(int(model.body_vadr[i]), int(model.body_vadr[i + 1]))
-        momentum = at.columns[own] @ composite[i]
-        M[own, own] += momentum @ at.columns[own].T
-        while p >= 0:
-            above = slice(int(model.body_vadr[p]), int(model.body_vadr[p + 1]))
-            M[own, above] = momentum @ at.columns[above].T
-            M[above, own] = M[own, above].T
-            p = int(model.body_parent[p])
-    return np.asarray(M)
+            branch[i] |= branch[p]
+    momentum = np.einsum("dj,djk->dk", at.columns, composite[model.dof_body])
+    lower = np.where(branch[model.dof_body][:, model.dof_body], momentum @ at.columns.T, 0.0)
+    full = np.where(lower != 0.0, lower, lower.T)
+    return np.asarray(full + np.diag(model.dof_armature))

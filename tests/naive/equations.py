@@ -16,14 +16,16 @@ from naive.lagrangian import (
     armatures,
     arriving_momentum,
     constraints,
+    dampers,
     displacements,
+    lag,
     leaving_momentum,
     separation,
     spring_impulse,
     varied,
 )
 from naive.rotation import Array
-from naive.scene import BODY, IMPACT, JOINT, LINEAR, Contact, Joint, Limit, Scene, advance, poses
+from naive.scene import BODY, IMPACT, JOINT, LINEAR, Contact, Limit, Scene, advance, poses
 
 
 def bilinear(x: Array, y: Array, kappa: float) -> Array:
@@ -66,9 +68,7 @@ class Step:
         self.G = np.imag(constraints(scene, varied(self.z2))).T / TINY  # (nlambda, 6 nbody)
         self.B = np.imag(displacements(scene, varied(self.z2), self.z2)).T / TINY  # (nv, 6 nbody)
         self.armature, self.v1 = armatures(scene), v
-        self.damper = np.concatenate([np.broadcast_to(joint.damper, joint.nv) for joint in scene.joints])
-        z = h * self.damper / seen_inertia(scene) if self.damper.any() else self.damper
-        self.lag = h * self.damper * (3.0 + z) / (6.0 + 3.0 * z + z * z)
+        self.damper, self.lag = dampers(scene), lag(scene, h)
         self.inertia = np.array([body.inertia for body in scene.bodies])
         self.mass = np.array([body.mass for body in scene.bodies])
         self.incoming = np.concatenate(
@@ -221,26 +221,6 @@ class Step:
             s = max(gap, np.sqrt(kappa))
             y.append(np.array([s, kappa / s]))
         return np.concatenate(y)
-
-
-def seen_inertia(scene: Scene) -> Array:
-    """1/(M^-1)_dd with all hinges at half a radian, M by central differences of the poses."""
-    q = np.concatenate([bent(joint) for joint in scene.joints])
-    quat = poses(scene, q)[1]
-    M, small = np.diag(armatures(scene)), 1e-5
-    ends = [[poses(scene, advance(scene, q, s * e, small)) for s in (1.0, -1.0)] for e in np.eye(scene.nv)]
-    for i, body in enumerate(scene.bodies):
-        v = np.array([(ahead[0][i] - behind[0][i]) / (2.0 * small) for ahead, behind in ends])
-        turned = [[rot.log(rot.mul(rot.conj(quat[i]), z[1][i])) for z in pair] for pair in ends]
-        w = np.array([(ahead - behind) / (2.0 * small) for ahead, behind in turned])
-        M = M + body.mass * v @ v.T + w @ body.inertia @ w.T
-    return 1.0 / np.diag(np.linalg.inv(M))
-
-
-def bent(joint: Joint) -> Array:
-    """Coordinates of a joint at zero, but for a hinge at half a radian."""
-    turn = {0: [], 1: [0.5], 2: [0.0, 0.0], 3: [1.0, 0.0, 0.0, 0.0]}[joint.nrot]
-    return np.array([0.0] * (joint.nq - len(turn)) + turn)
 
 
 def frictional(contact: Contact) -> bool:

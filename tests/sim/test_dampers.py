@@ -82,7 +82,7 @@ def test_no_energy_in_passive_motion(kind: str) -> None:
 def test_derivatives_from_loose_to_stiff(strength: float) -> None:
     """By state, input and all that the weights depend on: dampers, masses, geometry, the time step."""
     rng = np.random.default_rng(3)
-    mech = chain("screw", 2, gravity=(0.0, 0.0, -9.81), damper=strength, spring=3.0)
+    mech = chain("screw", 2, gravity=(0.0, 0.0, -9.81), base=None, damper=strength, spring=3.0)
     sim = dojo.Simulator(mech, time_step=0.02, tolerance=1e-13)
     x = sim.integrate(sim.neutral(), np.r_[0.3 * rng.normal(size=sim.nv), rng.normal(size=sim.nv)])
     u = rng.normal(size=sim.nu)
