@@ -16,7 +16,7 @@ from dojo_opt.report.accuracy.smooth_scene import SAMPLES, SmoothScene, smooth
 from dojo_opt.report.engine import Run
 from dojo_opt.report.result import Cell, Report, Row, Table
 
-_STEPS = (0.02, 0.01, 0.005, 0.0025, 0.00125)  # [s]
+_STEPS = (0.02, 0.01, 0.005, 0.0025, 0.00125, 0.000625)  # [s]
 _PEER = "MuJoCo Euler"
 
 
