@@ -14,27 +14,11 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from benchmarks.engines import mujoco_scene
-from benchmarks.engines.mujoco_warnings import quiet
+from benchmarks.engines import mujoco_motions
 
 DURATION, STEPS = (3, (0.05, 0.02, 0.01)) if QUICK else (11, (0.05, 0.02, 0.01, 0.005, 0.002))  # [s]
 robot = replace(dojo.models.humanoid(damper=0.0, gravity=(0.0, 0.0, 0.0)), contacts=())
 drawn = np.random.default_rng(0).uniform(-0.5, 0.5, (10, 19))  # [N m] one row after the other, 0.1 s each
-
-
-@quiet()
-def mujoco_drift(sim, us, integrator):
-    """Largest |momentum|, range of the energy after the torques over it."""
-    import mujoco
-
-    model = mujoco_scene.load(sim.model, sim.time_step, hinges=True, integrator=integrator)
-    data, seen = mujoco_scene.state(model, sim.neutral()), np.empty((len(us), 2))
-    for k, u in enumerate(us):
-        data.ctrl[:] = u
-        for derive in (mujoco.mj_step, mujoco.mj_forward, mujoco.mj_subtreeVel, mujoco.mj_energyVel):
-            derive(model, data)
-        seen[k] = np.abs(data.subtree_angmom[0]).max(), data.energy[1]
-    return seen[:, 0].max(), np.ptp(seen[len(us) // DURATION :, 1]) / seen[len(us) // DURATION, 1]
 
 
 SETTINGS = {"dojo-opt": {"tolerance": 1e-13}}
@@ -49,7 +33,7 @@ for h in STEPS:
         energy = sim.energy(t.x)[round(1.0 / h) :]
         lines[name].append((np.abs(sim.momentum(t.x)[1]).max(), np.ptp(energy) / energy[0]))
     for name in list(lines)[len(SETTINGS) :]:
-        lines[name].append(mujoco_drift(sim, torques, name.removeprefix("MuJoCo ")))
+        lines[name].append(mujoco_motions.drift(sim, torques, name.removeprefix("MuJoCo "), round(1.0 / h)))
     print(f"{h:6.3f} s  " + ", ".join(f"{n}: L {v[-1][0]:.1e} N m s, E {v[-1][1]:.1e}" for n, v in lines.items()))
 figure = Figure(figsize=(9, 4.5), layout="constrained")
 for k, ax in enumerate(figure.subplots(1, 2)):
@@ -60,6 +44,7 @@ for k, ax in enumerate(figure.subplots(1, 2)):
     ax.set(
         xlabel="time step [ms]", title=["largest angular momentum [N m s]", "change of energy"][k], ylim=(None, 10.0)
     )
-    ax.legend(fontsize=8)
+    if k == 0:
+        ax.legend(fontsize=8)
 finish(figure, __file__)
 assert max(v[0] for v in lines["dojo-opt"]) < 1e-9

@@ -2,8 +2,7 @@
 
 python examples/friction_cones.py        prints the distances, writes friction_cones.png
 
-A pyramid pulls the block sideways, out of its direction. With MuJoCo installed, its pyramid and its cone beside ours:
-the soft contact of the cone pulls sideways as well.
+A pyramid pulls the block sideways, out of its direction. With MuJoCo installed, its pyramid and its cone beside ours.
 """
 
 from importlib.util import find_spec
@@ -13,73 +12,49 @@ from _common import QUICK, finish
 from matplotlib.figure import Figure
 
 import dojo_opt as dojo
-from benchmarks.engines import mujoco_scene
+from benchmarks.engines import mujoco_motions
 
 SPEED, FRICTION = 2.0, 0.5  # [m/s]
 EXPECTED = SPEED**2 / (2.0 * FRICTION * 9.81)  # [m] for Coulomb's law in every direction
-H = 0.01 if QUICK else 0.005
-STEPS = round(0.8 / H)
-angles = np.arange(8) * np.pi / 4 + np.pi / 16  # off the axes of the pyramid
-
-
-def block(law):
-    """The simulator of a block of 20 cm."""
-    return dojo.Simulator(dojo.models.block(edge=0.2, friction=FRICTION, law=law), time_step=H, kappa=1e-8)
+H, STEPS = (0.01, 80) if QUICK else (0.005, 160)
+angles = np.arange(8) * np.pi / 4 + np.pi / 16
 
 
 def ours(law, velocity):
-    """Path of the block on the ground, (n, 2) [m], and its speed in the end."""
-    sim = block(law)
+    """Path of the block on the ground, (n, 2) [m]; at the end it is at rest."""
+    sim = dojo.Simulator(dojo.models.block(edge=0.2, friction=FRICTION, law=law), time_step=H, kappa=1e-8)
     t = sim.rollout(sim.start(sim.neutral()[:7], velocity), np.zeros((STEPS, sim.nu)), throw=True)
-    return t.x[:, :2], np.linalg.norm(t.x[-1, 7:9])
+    assert np.linalg.norm(t.x[-1, 7:9]) < 1e-3
+    return t.x[:, :2]
 
 
 def theirs(cone, velocity):
-    """The same of MuJoCo, from where the block has come to rest on the ground."""
-    import mujoco
-
-    sim = block("nonlinear")
-    model = mujoco_scene.load(sim.model, H, integrator="implicitfast", cone=cone)
-    data = mujoco_scene.state(model, sim.neutral())
-    mujoco.mj_step(model, data, 200)
-    begin, path = data.qpos[:2].copy(), np.zeros((STEPS + 1, 2))
-    data.qvel[:] = velocity
-    for k in range(STEPS):
-        mujoco.mj_step(model, data)
-        path[k + 1] = data.qpos[:2] - begin
-    return path, np.linalg.norm(data.qvel[:2])
+    """That of MuJoCo."""
+    sim = dojo.Simulator(dojo.models.block(edge=0.2, friction=FRICTION), time_step=H)
+    return mujoco_motions.slide(sim, cone, velocity, STEPS)
 
 
-panels = {"linear": (ours, "linear"), "nonlinear": (ours, "nonlinear")}
+panels = {"dojo-opt, pyramid": (ours, "linear"), "dojo-opt, cone": (ours, "nonlinear")}
 if find_spec("mujoco"):
-    panels |= {"MuJoCo, pyramidal": (theirs, "pyramidal"), "MuJoCo, elliptic": (theirs, "elliptic")}
-figure = Figure(figsize=(4.5 * len(panels), 4.8), layout="constrained")
-errors = {}
+    panels |= {"MuJoCo, pyramid": (theirs, "pyramidal"), "MuJoCo, cone": (theirs, "elliptic")}
+figure, off = Figure(figsize=(4.5 * len(panels), 4.8), layout="constrained"), {}
 for ax, (name, (run, law)) in zip(figure.subplots(1, len(panels)), panels.items(), strict=True):
     ends, slips = [], []
-    for angle in angles:
+    for angle in angles:  # off the axes of the pyramid
         way, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-        path, speed = run(law, np.concatenate([SPEED * way, np.zeros(4)]))
-        ends.append(path[-1])
-        slips.append(np.abs(path @ across).max())
+        path = run(law, np.r_[SPEED * way, np.zeros(4)])
+        ends, slips = [*ends, path[-1]], [*slips, np.abs(path @ across).max()]
         ax.plot(*path.T, color="C0")
-        ax.plot(*(1.4 * EXPECTED * way), ".", color="0.7")
-        assert run is theirs or speed < 1e-3
     distance = np.linalg.norm(ends, axis=1)
-    errors[name] = (np.abs(distance / EXPECTED - 1.0).max(), max(slips))
-    print(f"{name}: {distance.min():.4f} to {distance.max():.4f} m, Coulomb {EXPECTED:.4f} m; ", end="")
-    print(f"sideways by up to {max(slips):.5f} m")
-    circle = np.linspace(0.0, 2.0 * np.pi, 100)
-    ax.plot(EXPECTED * np.cos(circle), EXPECTED * np.sin(circle), "k--", linewidth=0.8)
-    ax.plot(*np.array(ends).T, "o", color="C3")
-    label = name if run is theirs else f"dojo-opt, {name}"
-    ax.set_title(
-        f"{label}: way off by up to {100 * errors[name][0]:.1f} %,\nsideways by up to {1e3 * max(slips):.1f} mm"
+    off[name] = np.abs(distance / EXPECTED - 1.0).max(), max(slips)
+    print(
+        f"{name}: {distance.min():.4f} to {distance.max():.4f} m, Coulomb {EXPECTED:.4f}; sideways {max(slips):.4f} m"
     )
-    ax.set_aspect("equal")
-    ax.set_xlabel("x [m]")
-    ax.set_ylabel("y [m]")
-
+    circle = np.exp(2.0j * np.pi * np.linspace(0.0, 1.0, 100))
+    ax.plot(EXPECTED * circle.real, EXPECTED * circle.imag, "k--", linewidth=0.8)
+    ax.plot(*np.array(ends).T, "o", color="C3")
+    ax.set_title(f"{name}: way off by up to {100 * off[name][0]:.1f} %,\nsideways by up to {1e3 * max(slips):.1f} mm")
+    ax.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 finish(figure, __file__)
-assert errors["nonlinear"][0] < 0.02 and errors["nonlinear"][1] < 1e-3, errors
-assert errors["linear"][0] > 0.1 and errors["linear"][1] > 0.01, errors
+cone, pyramid = off["dojo-opt, cone"], off["dojo-opt, pyramid"]
+assert cone[0] < 0.02 and cone[1] < 1e-3 and pyramid[0] > 0.1 and pyramid[1] > 0.01, off
