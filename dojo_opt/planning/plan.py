@@ -6,7 +6,7 @@ import json
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from dojo_opt.planning.options import Options
 from sim.mechanism.brief import brief_table, drawn
 from sim.mechanism.checks import whole_number
 from sim.simulator.motion_file import archived, export, opened, restored
+from sim.simulator.results import Shot
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
 
@@ -134,6 +135,32 @@ class Plan:
         u, K, k = (np.concatenate([part] * n) for part in (self.u, self.K, self.k))
         x, fun = np.concatenate(cycles), n * self.fun
         return replace(self, x=x, u=u, K=K, k=k, stride=n * self.stride, fun=fun, multipliers=[], penalties=[])
+
+    def replay(self, *, accuracy: float = 1e-5, kappa: float | None = None) -> Shot:
+        """The plan under its own gains, each knot simulated to an accuracy, its input held.
+
+        Impacts happen at their own times, not at those of the plan's steps. States of such a simulator have the
+        velocities of nodes, so those of the plan are converted.
+
+        Args:
+            accuracy: error of the joint coordinates per second of motion [m/s, rad/s], see `Simulator`.
+            kappa: central-path parameter [N s m] (default None: that of the plan's simulator, or less if the accuracy
+                needs it).
+
+        Returns:
+            Shot with the solved knots, one state per knot, with velocities at the nodes.
+
+        Raises:
+            ValueError: for a plan without a simulator, or an accuracy that its mechanism does not have.
+        """
+        sim, problem = self.simulator, self.problem
+        if sim is None:
+            raise ValueError("Plan.replay: expected a plan with its simulator")
+        smoothing = {} if kappa is None else {"kappa": kappa}
+        exact = sim.replace(time_step=self.time_step * self.substeps, order=2, accuracy=accuracy, **smoothing)
+        nodes = np.concatenate([self.x[:, : sim.nq], sim.velocity(self.x)], axis=1)
+        limits = sim.mechanism.input_limits if problem is None else problem.control_limits
+        return cast(Shot, exact.closed_loop(nodes[0], self.u, xs=nodes, Ks=self.K, limits=limits))
 
     def summary(self) -> str:
         """The table of iterations and a closing line.

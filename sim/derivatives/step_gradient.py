@@ -64,7 +64,8 @@ def gradient(model: Model, data: Data, h: float, kappa: float, q: Vector, v: Vec
 def _joint_columns(model: Model, data: Data, h: float, v: Vector) -> None:
     """columns[:, :2 nv] = -(dR_dq, dR_dv): limits added, dR_dv from unit columns to velocities (-h, -h J(h w)^T).
 
-    Lanes of dR_dq and dR_dv write beyond their columns, into the places of dR_dv and of the inputs.
+    To those of quaternions come the lags of their dampers. Lanes of dR_dq and dR_dv write beyond their columns, into
+    the places of dR_dv and of the inputs.
     """
     nv = v.shape[0]
     add_limit_derivatives(model, data, h)
@@ -82,6 +83,8 @@ def _joint_columns(model: Model, data: Data, h: float, v: Vector) -> None:
                 a, b, c = x[0], x[1], x[2]
                 for r in range(3):
                     x[r] = a * J[3 * r] + b * J[3 * r + 1] + c * J[3 * r + 2]
+            for r in range(e, e + 3):
+                data.columns[r, nv + r] += data.rotor[r]
 
 
 @kernel

@@ -2,8 +2,8 @@
 
     p2 = d L_d(1, 2) / d(configuration 2)
 
-Momentum is then conserved exactly, and the energy p.M^-1 p / 2 + V keeps an error of second order for all times.
-Contacts, dampers and inputs act between nodes and are not part of it.
+Momentum is then conserved exactly, and the energy v.M v/2 + V, M v = p, keeps an error of second order for all times.
+Contacts and inputs act between nodes and are not part of it; half the impulse of a damper is (joints/damper.py).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from sim.dynamics.angular_momentum import angular_momentum
 from sim.dynamics.coordinates import node_poses
 from sim.dynamics.elimination import factor, project, solve, subtree_sums
 from sim.dynamics.joints.ball_spring import relative_to_rest
+from sim.dynamics.joints.damper import node_damping
 from sim.dynamics.loops.loop_velocity import close_velocity
 from sim.dynamics.momentum_balance import world_inertia
 from sim.model.data import Data
@@ -117,35 +118,38 @@ def spatial_inertia(model: Model, origin: Vector, pos: Matrix, inertia: Matrix, 
 
 
 @kernel
-def armature_blocks(model: Model, sign: float, out: Matrix) -> None:
-    """out[i] = sign diag(I), n x n row-major, I the armatures of joint i.   out: (nbody, 36)."""
+def armature_blocks(model: Model, sign: float, h: float, out: Matrix) -> None:
+    """out[i] = sign diag(I + C), n x n row-major, I the armatures of joint i, C its dampers' for h; (nbody, 36)."""
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d
         for k in range(n * n):
             out[i, k] = 0.0
         for k in range(n):
-            out[i, k * n + k] = sign * model.dof_armature[d + k]
+            out[i, k * n + k] = sign * (model.dof_armature[d + k] + node_damping(model, h, d + k))
 
 
 @kernel
-def factor_mass_matrix(model: Model, data: Data) -> bool:
-    """M = S2^T (inertia) S2 + armature at configuration 2 in `data`, factored for `solve`; False when singular."""
+def factor_mass_matrix(model: Model, data: Data, h: float) -> bool:
+    """M + C, M = S2^T (inertia) S2 + armature at configuration 2 in `data`, factored for `solve`; False when singular.
+
+    h: length of the interval before the node, 0 for M alone.
+    """
     spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
     for d in range(data.S2.shape[0]):
         for k in range(6):
             data.S3nu[d, k] = data.S2[d, k]
-    armature_blocks(model, 1.0, data.joint_block)
+    armature_blocks(model, 1.0, h, data.joint_block)
     return factor(model, data) != 0
 
 
 @kernel
-def solve_mass_matrix(model: Model, data: Data, p: Vector, out: Vector) -> bool:
-    """out = M^-1 p at configuration 2 in `data`.
+def solve_mass_matrix(model: Model, data: Data, h: float, p: Vector, out: Vector) -> bool:
+    """out = (M + C)^-1 p at configuration 2 in `data`.
 
     Leaves the twists of the bodies in data.twist; False when M is singular.   p, out: (nv,).
     """
-    if not factor_mass_matrix(model, data):
+    if not factor_mass_matrix(model, data, h):
         return False
     solve(model, data, p, out)
     return True
@@ -153,7 +157,7 @@ def solve_mass_matrix(model: Model, data: Data, p: Vector, out: Vector) -> bool:
 
 @kernel
 def node_velocity(model: Model, data: Data, h: float, x: Vector) -> bool:
-    """data.dnu = P M^-1 p, P: loops/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in data.residual.
+    """data.dnu = P (M + C)^-1 p, P: loops/loop_velocity.py; p = S2^T (momenta of bodies) + springs, in data.residual.
 
     NaN, and False, when M is singular.
     """
@@ -162,7 +166,7 @@ def node_velocity(model: Model, data: Data, h: float, x: Vector) -> bool:
     project(model, data.S2, data.subtree, data.residual)
     nq = data.theta1.shape[0]
     add_spring_momentum(model, h, x[:nq], x[nq:], data.residual)
-    if not solve_mass_matrix(model, data, data.residual, data.dnu):
+    if not solve_mass_matrix(model, data, h, data.residual, data.dnu):
         for d in range(data.dnu.shape[0]):
             data.dnu[d] = nan
         return False
@@ -172,11 +176,12 @@ def node_velocity(model: Model, data: Data, h: float, x: Vector) -> bool:
 
 @kernel
 def kinetic_energy(model: Model, data: Data, h: float, x: Vector) -> float:
-    """p.M^-1 p / 2."""
+    """v.M v/2 = (p - C v).v/2 at the node."""
     node_velocity(model, data, h, x)
     energy = 0.0
     for d in range(data.dnu.shape[0]):
-        energy += 0.5 * data.residual[d] * data.dnu[d]
+        v = data.dnu[d]
+        energy += 0.5 * (data.residual[d] - node_damping(model, h, d) * v) * v
     return energy
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from sim.dynamics.angular_momentum import angular_momentum, angular_momentum_jacobian
 from sim.dynamics.carry_over import advance, follows_on
 from sim.dynamics.displacements import move_back, tree_moves
+from sim.dynamics.joints.damper import damper_lag
 from sim.dynamics.joints.motion import Increment
 from sim.dynamics.kinematics import tree_poses
 from sim.model.data import Data
@@ -80,6 +81,8 @@ def begin_step(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vect
     representable = turns_below_half(model, data, h, v)
     for j in range(u.shape[0]):
         _apply_input(model, data, h, j, u[j])
+    for d in range(v.shape[0]):
+        data.rotor[d] = model.dof_armature[d] - damper_lag(model, h, d)
     return representable
 
 

@@ -14,7 +14,10 @@ from solvers.types import Matrix, Vector
 
 @kernel
 def node_velocities(model_at: Table, data_at: Table, h: float, xs: Matrix, out: Matrix) -> None:
-    """out[t] = M(q)^-1 p of state t, p its momentum by the discrete Legendre transform.   xs: (n, nx); out: (n, nv)."""
+    """out[t] = (M(q) + C)^-1 p of state t, p its momentum by the discrete Legendre transform, C: joints/damper.py.
+
+    xs: (n, nx); out: (n, nv).
+    """
     model = model_view(model_at)
     data = data_view(data_at)
     for t in range(xs.shape[0]):

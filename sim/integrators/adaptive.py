@@ -202,7 +202,7 @@ def go_on(
 ) -> int:  # fmt: skip
     """Sub-steps until the end of the stretch, a full list of them or the deadline; the Status.
 
-    models: tables of the Model and of that with half the dampers; works: of two Data.
+    models: tables of the Model for order 8 and for order 2; works: of two Data.
     """
     data, clock = data_view(works[0]), line.clock
     start_pace(data, settings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sim.contact.contact_report import report_contacts
 from sim.dynamics.state import configuration_difference
 from sim.integrators.landing import landing
-from sim.integrators.node_step import begin_part, is_damped, mean_of_node, node_of_mean, part_of, step_mean
+from sim.integrators.node_step import begin_part, mean_of_node, node_of_mean, part_of, step_mean
 from sim.integrators.slip_stop import stopping_error
 from sim.integrators.stretch import Clock, Embedded, Stretch
 from sim.model.layout import data_view, model_view
@@ -44,12 +44,6 @@ def _two_halves(model_at: Table, data_at: Table, options: StepOptions, line: Str
             one, other = (line.mean, line.half) if part == 0 else (line.half, line.mean)
             status = step_mean(model, data, options, line.u, one, other, line.report)
             report_contacts(model, data, h, line.parts[part])
-        if status == _SOLVED and part == 0 and is_damped(model):
-            status = node_of_mean(model, data, h, line.u, line.half, line.trial)
-            if status == _SOLVED:
-                begin_part(data, line.wrench)
-                status = mean_of_node(model_at, data_at, h, line.u, line.trial, line.half)
-                begin_part(data, line.wrench)
     return node_of_mean(model, data, h, line.u, line.mean, line.trial) if status == _SOLVED else status
 
 

@@ -173,7 +173,7 @@ def slopes_at(model: Model, data: Data, free: Integers, u: Vector, out: Slopes) 
     for d in range(data.nu.shape[0]):
         for k in range(6):
             data.S3nu[d, k] = data.S2[d, k]
-    armature_blocks(model, 1.0, data.joint_block)
+    armature_blocks(model, 1.0, 0.0, data.joint_block)
     return factor(model, data) != 0
 
 

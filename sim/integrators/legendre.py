@@ -1,6 +1,6 @@
 """Derivatives of the velocity that the node's momentum of a state means.
 
-M(q2) v = p(q2, v15),    p: sim/derivatives/momentum_gradient.py
+(M(q2) + C) v = p(q2, v15),    C: of dampers (dynamics/joints/damper.py), p: sim/derivatives/momentum_gradient.py
 """
 
 from __future__ import annotations

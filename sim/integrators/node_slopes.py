@@ -1,6 +1,6 @@
 """Derivatives of the conversions at both ends of a step from node to node (node_step.py).
 
-    M(q) v = p(q, v'; h) + s h/2 (f(q, u) - D v')       s = -1 where a step begins, without D; s = 1 where it ends
+    (M(q) + C) v = p(q, v'; h) + s h/2 f(q, u)       s = -1 where a step begins, 1 where it ends; C: of dampers
 
 v': mean velocity of the state, f: generalized forces of inputs and external wrenches. Derivatives of p:
 sim/derivatives/momentum_gradient.py.

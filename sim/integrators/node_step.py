@@ -1,12 +1,12 @@
 """Steps of order 2 from node to node: states x = [q; v] with v = M(q)^-1 p of the node, for steps of any length.
 
-    p(q2, v15; h) = M(q2) v2 - h/2 f(q2)                  p: momentum of a state with its mean velocity v15
-    v25           = that of a step (step.py) from (q2, v15), with half the dampers
-    M(q3) v3      = p(q3, v25; h) + h/2 (f(q3) - D v25)
+    p(q2, v15; h)  = (M(q2) + C) v2 - h/2 f(q2)            p: momentum of a state with its mean velocity v15
+    v25            = that of a step (step.py) from (q2, v15)
+    (M(q3) + C) v3 = p(q3, v25; h) + h/2 f(q3)            C: of dampers (dynamics/joints/damper.py)
 
 f: generalized forces of inputs and external wrenches. The step lets all their impulse h f act at its first node; half
-of it belongs to its last. Half the damping implicit in v25, the other half explicit, is the trapezoidal rule. So steps
-of different lengths follow one another at second order, and without these forces momentum is handed on as it is.
+of it belongs to its last, as of the impulse of dampers. So steps of different lengths follow one another at second
+order, and without these forces momentum is handed on as it is.
 
 Impulses of contacts are not shared: p(q3, v25; h) is the momentum before the ground acts at the node. The step that
 begins there makes up for the gravity of both its halves, whatever their lengths.
@@ -77,7 +77,7 @@ def mean_of_node(model_at: Table, data_at: Table, h: float, u: Vector, x: Vector
     nq = data.theta1.shape[0]
     copy_vector(x, mean)
     momentum_error(model, data, h, x, x[nq:], data.residual)  # for the poses
-    momentum_of_velocity(model, data, x[nq:], data.nu)
+    momentum_of_velocity(model, data, h, x[nq:], data.nu)
     add_forces(model, data, -0.5 * h, u, data.nu)
     return state_of_momentum(model_at, data_at, h, data.nu, mean)
 
@@ -90,24 +90,13 @@ def node_of_mean(model: Model, data: Data, h: float, u: Vector, mean: Vector, x:
         data.rhs[d] = 0.0
     momentum_error(model, data, h, mean, data.rhs, data.residual)
     add_forces(model, data, 0.5 * h, u, data.residual)
-    for d in range(data.dnu.shape[0]):
-        data.residual[d] -= h * model.dof_damper[d] * mean[nq + d]  # half the dampers are in the model
-    if not solve_mass_matrix(model, data, data.residual, data.dnu):
+    if not solve_mass_matrix(model, data, h, data.residual, data.dnu):
         return _SINGULAR
     for k in range(nq):
         x[k] = mean[k]
     for d in range(data.dnu.shape[0]):
         x[nq + d] = data.dnu[d]
     return _SOLVED
-
-
-@kernel
-def is_damped(model: Model) -> bool:
-    """Whether joints have dampers: then half of their impulse acts at the node between two steps, else nothing does."""
-    for d in range(model.dof_damper.shape[0]):
-        if model.dof_damper[d] != 0.0:
-            return True
-    return False
 
 
 @kernel

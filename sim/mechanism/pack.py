@@ -13,6 +13,7 @@ from sim.mechanism.mechanism import Mechanism
 from sim.mechanism.pack_clusters import pack_clusters
 from sim.mechanism.pack_collisions import pack_collisions
 from sim.mechanism.parts import WORLD, Contact, Joint
+from sim.mechanism.seen_inertia import seen_inertias
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.model.layout import Sizes, allocate_model
@@ -52,6 +53,7 @@ def pack(mech: Mechanism) -> Model:
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
     _pack_joints(mech.joints, model)
+    model.dof_seen[:] = seen_inertias(model)
     _pack_branches(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)

@@ -69,6 +69,7 @@ class Data(NamedTuple):
     L: Matrix  # (nv, 8) rows D^-1 S2^T A, six numbers, and scratch
     D: Matrix  # (nbody, 37) LU factors of the joint blocks S2^T A S3nu + joint_block, and their row exchanges
     joint_block: Matrix  # (nbody, 36) joint-space terms: dampers, springs, limits
+    rotor: Vector  # (nv,) armature, less the lag of the damper (joints/damper.py)
     z: Vector  # (nv,)
     twist: Matrix  # (nbody, 6) body twists of the last solve
     # active contacts, part of the equations, and inactive ones, whose impulses are evaluated

@@ -44,7 +44,7 @@ MODEL_FLOATS = _shapes(
     """
     body_mass nbody, body_weight nbody, body_inertia nbody 9, joint_parent_point nbody 3, joint_child_point nbody 3,
     joint_offset nbody 4, joint_trans_axes nbody 9, joint_axis nbody 3, joint_lead nbody, joint_swing_axes nbody 6,
-    dof_spring nv, dof_damper nv, dof_armature nv, dof_rest nv,
+    dof_spring nv, dof_damper nv, dof_seen nv, dof_armature nv, dof_rest nv,
     contact_point nground 3, contact_radius nground, contact_friction ncontact, contact_restitution ncontact,
     contact_frame nground 9, terrain_place nterrain 8, terrain_heights nheight, terrain_rates nheight,
     contact_height nground, cluster nground 8, pair_sizes npair 8, pair_place 2npair 12, pair_far npair 7,
@@ -82,7 +82,7 @@ DATA_FLOATS = CARRY_FLOATS | _shapes(
     balance nbody 6, node_inertia nbody 9, node_momentum nbody 6, node_p nv, node_share nv,
     wrench nbody 6, subtree nbody 6, residual nv, rhs nv, A nbody 36,
     articulated 6nbody 8, U nv 6, L nv 8, D nbody 37,
-    joint_block nbody 36, z nv, twist nbody 6, cone ncontact 12, cone_trial ncontact 12,
+    joint_block nbody 36, rotor nv, z nv, twist nbody 6, cone ncontact 12, cone_trial ncontact 12,
     contact_kin ncontact 27, contact_frame nground 9,
     contact_turn nground 18, bounce ncontact 22, bounce_share 1,
     contact_W ncontact 9, contact_hard 1, contact_w ncontact 3, contact_scale ncontact 16, bound nlimit 2,

@@ -86,6 +86,7 @@ class Model(NamedTuple):
     joint_swing_axes: Matrix  # (nbody, 6) the two directions across the axis of a swing, joint frame
     dof_spring: Vector  # (nv,) [N/m, N m/rad]
     dof_damper: Vector  # (nv,) [N s/m, N m s/rad]
+    dof_seen: Vector  # (nv,) inertia that a damper sees, weighs its velocities [kg, kg m^2] (joints/damper.py)
     dof_armature: Vector  # (nv,) inertia that moves with a scalar dof alone, a rotor's [kg, kg m^2]
     dof_rest: Vector  # (nv,) spring rest of a scalar dof; of a quaternion dof, component of its rotation vector
     contact_point: Matrix  # (nground, 3) sphere centre in the body, from its centre of mass [m]

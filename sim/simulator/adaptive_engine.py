@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.derivatives.momentum_gradient import momentum_jacobian
+from sim.dynamics.joints.damper import node_dampings
 from sim.integrators import runge_kutta
 from sim.integrators.adaptive import go_on
 from sim.integrators.hamilton_gradient import Slopes
@@ -67,8 +68,7 @@ class AdaptiveEngine(KnotEngine):
 
     def __init__(self, model: Model, settings: Settings) -> None:
         super().__init__(model, settings)
-        halved = model._replace(dof_damper=0.5 * model.dof_damper)
-        self._second = Engine(halved, settings._replace(order=2))
+        self._second = Engine(model, settings._replace(order=2))
         coupled = len(model.pair_kind) + len(model.loop_ntrans) + len(model.gear_dof)
         self._is_tree = coupled == 0
         g = float(np.linalg.norm(model.gravity)) or 9.81
@@ -234,23 +234,30 @@ class AdaptiveEngine(KnotEngine):
         momentum_jacobian(self._second.linked(link_step, link_gradient), self._scratch.table(), h, mean, by_q, by_v)
         return by_q, by_v
 
+    def _damping(self, h: float) -> Floats:
+        """C of the dampers for a step of length h, (nv, nv)."""
+        out = np.zeros(self.sizes.nv)
+        node_dampings(self._second.linked(link_step), h, out)
+        return np.diag(out)
+
     def _mean_slopes(self, x: Vector, held: Held, h: float, mean: Vector) -> tuple[Floats, Floats]:
-        """d(mean)/d(x, u):  p_v dv' = M dv + ((M v)_q - h/2 f_q - p_q) dq - h/2 f_u du."""
+        """d(mean)/d(x, u):  p_v dv' = (M + C) dv + ((M v)_q - h/2 f_q - p_q) dq - h/2 f_u du."""
         nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
         by_q, by_v = self._momentum_slopes(h, mean)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
-        A[nv:] = np.linalg.solve(by_v, np.hstack([slopes.p_q - 0.5 * h * force - by_q, slopes.p_v]))
+        damped = slopes.p_v + self._damping(h)
+        A[nv:] = np.linalg.solve(by_v, np.hstack([slopes.p_q - 0.5 * h * force - by_q, damped]))
         B[nv:] = np.linalg.solve(by_v, -0.5 * h * slopes.f_u)
         return A, B
 
     def _end_slopes(self, mean: Vector, held: Held, h: float, x: Vector) -> tuple[Floats, Floats]:
-        """d(x)/d(mean, u):  M dv = (p_v - h/2 D) dv' + (p_q + h/2 f_q - (M v)_q) dq + h/2 f_u du."""
+        """d(x)/d(mean, u):  (M + C) dv = p_v dv' + (p_q + h/2 f_q - (M v)_q) dq + h/2 f_u du."""
         nv, (slopes, force) = self.sizes.nv, self._node_terms(x, held)
         by_q, by_v = self._momentum_slopes(h, mean)
-        by_v -= 0.5 * h * np.diag(self.model.dof_damper)
         A, B = np.eye(self.ndx), np.zeros((self.ndx, self.nu))
-        A[nv:] = np.linalg.solve(slopes.p_v, np.hstack([by_q + 0.5 * h * force - slopes.p_q, by_v]))
-        B[nv:] = np.linalg.solve(slopes.p_v, 0.5 * h * slopes.f_u)
+        damped = slopes.p_v + self._damping(h)
+        A[nv:] = np.linalg.solve(damped, np.hstack([by_q + 0.5 * h * force - slopes.p_q, by_v]))
+        B[nv:] = np.linalg.solve(damped, 0.5 * h * slopes.f_u)
         return A, B
 
     def slopes(self, path: Substeps, held: Held, kappa: float | None = None) -> tuple[Floats, Floats, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.derivatives.parameters.parameters import KINDS, ParameterPlan, Parameters, all_parameters
+from sim.derivatives.parameters.seen_terms import with_seen
 from sim.derivatives.parameters.selection import select, with_values
 from sim.integrators.adjoint import Sweep
 from sim.mechanism import checks
@@ -24,7 +25,7 @@ _VARIABLES = ("state", "input")
 _NUDGE, _LEAST = 1e-5, 1e-2  # relative size of the differences of parameters, of values of at least that size
 _OF_MOMENTUM = frozenset(  # kinds on which the momentum of a state depends
     ("mass", "inertia", "com", "parent_point", "child_point", "orientation", "axis", "spring", "rest", "armature")
-    + ("gravity", "time_step")
+    + ("pitch", "gravity", "time_step")
 )
 
 
@@ -33,7 +34,7 @@ class ParameterEngine:
 
     def __init__(self, engine: Engine, mechanism: Mechanism, time_step: float) -> None:
         self._engine, self._mechanism, self._time_step = engine, mechanism, time_step
-        self._known = all_parameters(mechanism, time_step)
+        self._known = with_seen(engine.model, all_parameters(mechanism, time_step))
         # those made so far: finding parameters by name takes longer than their derivatives
         self._selections: dict[tuple[str, ...], tuple[Parameters, ParameterPlan]] = {}
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.dynamics.joints.damper import node_dampings
 from sim.integrators import legendre, phases, rollout
 from sim.integrators.hamilton_gradient import Slopes
 from sim.model.model import Model
@@ -209,14 +210,14 @@ class PhasedEngine(KnotEngine):
         return after @ A[0] @ np.linalg.inv(self._node_slopes(m.means[s])), after @ B[0], report[0]
 
     def _node_slopes(self, mean: Vector) -> Floats:
-        """d(q, v of the node)/d(q, mean velocity) of a state of order 2:  p_v dv = dp - p_q dq,  (ndx, ndx)."""
+        """d(q, v of the node)/d(q, mean velocity) of a state of order 2:  (p_v + C) dv = dp - p_q dq,  (ndx, ndx)."""
         nv = self.sizes.nv
         slopes = Slopes(*(np.zeros((nv, k)) for k in (nv, nv, nv, nv, self.nu, 42)))
         by_q, by_mean = np.zeros((nv, nv)), np.zeros((nv, nv))
         none: Integers = np.zeros(self.sizes.nbody, dtype=np.int64)
         out = np.eye(self.ndx)
-        legendre.legendre_slopes(
-            self._model, self._scratch.table(), self._second.interval(mean), none, mean, slopes, by_q, by_mean
-        )
-        out[nv:] = np.linalg.solve(slopes.p_v, np.hstack([by_q - slopes.p_q, by_mean]))
+        h, damping = self._second.interval(mean), np.zeros(nv)
+        legendre.legendre_slopes(self._model, self._scratch.table(), h, none, mean, slopes, by_q, by_mean)
+        node_dampings(self._model, h, damping)
+        out[nv:] = np.linalg.solve(slopes.p_v + np.diag(damping), np.hstack([by_q - slopes.p_q, by_mean]))
         return out

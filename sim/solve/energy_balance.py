@@ -41,6 +41,7 @@ from sim.dynamics.energy import (
     momentum_velocity,
     spatial_inertia,
 )
+from sim.dynamics.joints.damper import damper_impulse
 from sim.dynamics.joints.terms import add_limit_impulse
 from sim.dynamics.loops.loop_work import loop_slack
 from sim.dynamics.mass import eliminate_mass
@@ -153,7 +154,7 @@ def work_at_node(model: Model, data: Data, h: float, v: Vector, u: Vector) -> tu
     f = data.node_p
     for d in range(v.shape[0]):
         f[d] = dot_six(data.S2[d], data.subtree[model.dof_body[d]]) + model.dof_armature[d] * (data.nu[d] - v[d])
-        f[d] += h * model.dof_damper[d] * data.nu[d]
+        f[d] += damper_impulse(model, h, d, data.nu[d], v[d])
     for k in range(model.limit_dof.shape[0]):
         add_limit_impulse(model, data, k, -data.bound[k, Bound.IMPULSE], f)
     for d in range(v.shape[0]):
@@ -202,7 +203,7 @@ def damping_loss(model: Model, data: Data, h: float, v: Vector) -> float:
     """Energy that dampers take in the step [J]."""
     total = 0.0
     for d in range(v.shape[0]):
-        total += 0.5 * h * model.dof_damper[d] * data.nu[d] * (v[d] + data.nu[d])
+        total += 0.5 * damper_impulse(model, h, d, data.nu[d], v[d]) * (v[d] + data.nu[d])
     return total
 
 

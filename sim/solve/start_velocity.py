@@ -1,7 +1,7 @@
 """States from a velocity at a node: the mean velocity of the interval before it that has the node's momentum.
 
 Where a body turns by half a turn or more in a step, poses cannot tell a mean velocity: velocities of such states are
-those of the node, M(q)^-1 p, means over next to no time.
+those of the node, means over next to no time.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from sim.dynamics.coordinates import node_poses
 from sim.dynamics.elimination import factor, project, solve, subtree_sums
 from sim.dynamics.energy import add_spring_momentum, armature_blocks, node_momentum, spatial_inertia
+from sim.dynamics.joints.damper import node_damping
 from sim.dynamics.kinematics import velocity_columns
 from sim.dynamics.momentum_balance import momentum_balance_jacobian, turns_below_half, world_inertia
 from sim.dynamics.velocity import joint_twists
@@ -25,8 +26,11 @@ SHORTEST = 1e-6  # interval of velocities of nodes, in steps
 
 
 @kernel
-def momentum_of_velocity(model: Model, data: Data, v: Vector, out: Vector) -> None:
-    """out = M(q) v = S2^T (inertia (S2 v)) + I v, at the poses of configuration 2 in `data`.   out: (nv,)."""
+def momentum_of_velocity(model: Model, data: Data, h: float, v: Vector, out: Vector) -> None:
+    """out = (M(q) + C) v, M v = S2^T (inertia (S2 v)) + I v, at the poses of configuration 2 in `data`.
+
+    C: of dampers in an interval h (joints/damper.py), none for 0.   out: (nv,).
+    """
     spatial_inertia(model, data.origin, data.pos2, data.inertia_world, data.A)
     joint_twists(model, data, v)
     for i in range(model.body_parent.shape[0]):
@@ -38,7 +42,7 @@ def momentum_of_velocity(model: Model, data: Data, v: Vector, out: Vector) -> No
     subtree_sums(model, data.wrench, data.subtree)
     project(model, data.S2, data.subtree, out)
     for d in range(out.shape[0]):
-        out[d] += model.dof_armature[d] * v[d]
+        out[d] += (model.dof_armature[d] + node_damping(model, h, d)) * v[d]
 
 
 @kernel
@@ -77,7 +81,7 @@ def newton_direction(model: Model, data: Data, h: float, v: Vector) -> bool:
     _turn_back(data)
     momentum_balance_jacobian(model, data, h, data.A)
     velocity_columns(model, data.S1, v, -h, data.S3nu)
-    armature_blocks(model, -1.0, data.joint_block)
+    armature_blocks(model, -1.0, 0.0, data.joint_block)
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         n = model.body_vadr[i + 1] - d
@@ -148,12 +152,12 @@ def _momentum_scale(model: Model, data: Data, h: float, x: Vector) -> float:
 
 @kernel
 def start_state(model: Model, data: Data, h: float, velocity: Vector, x: Vector) -> int:
-    """Solve p(q, v15) = M(q) velocity for v15.
+    """Solve p(q, v15) = (M(q) + C) velocity for v15.
 
     x: [q; first guess of v15], its velocities are overwritten; velocity: (nv,).
     """
     momentum_error(model, data, h, x, velocity, data.residual)  # for the poses
-    momentum_of_velocity(model, data, velocity, data.nu)
+    momentum_of_velocity(model, data, h, velocity, data.nu)
     return _meet_momentum(model, data, h, _momentum_scale(model, data, h, x), x)
 
 
@@ -190,7 +194,7 @@ def momenta_of_velocities(model_at: Table, data_at: Table, x: Vector, vs: Matrix
     node_poses(model, data, 1.0, x)
     world_inertia(model, data.rot2, data.inertia_world)
     for k in range(vs.shape[0]):
-        momentum_of_velocity(model, data, vs[k], out[k])
+        momentum_of_velocity(model, data, 0.0, vs[k], out[k])
 
 
 @kernel

@@ -26,6 +26,16 @@ def test_hop(substeps, iterations, cost):
     assert plan.x[:, 2].max() > 0.75
 
 
+@pytest.mark.parametrize("name, off", [("hop", 0.02), ("block", 0.08), ("trot", 0.03)])
+def test_plans_hold_to_an_accuracy(name, off):
+    """To the last knot, and converged: a tenth of the accuracy is the same motion."""
+    plan = ilqr(getattr(problems, name)())
+    shots = [plan.replay(accuracy=accuracy) for accuracy in (1e-4, 1e-5)]
+    assert all(shot.status == 0 and len(shot.u) == len(plan.u) for shot in shots)
+    assert np.abs(shots[0].x - shots[1].x)[:, :3].max() < 1e-3
+    assert np.abs(shots[1].x[-1, :3] - plan.x[-1, :3]).max() < off
+
+
 def test_hop_to_random_targets():
     targets = np.random.default_rng(42).uniform(-0.6, 0.6, size=(10, 2))
     plans = [ilqr(problems.hop(target=target)) for target in targets]

@@ -16,7 +16,9 @@ from naive.lagrangian import (
     armatures,
     arriving_momentum,
     constraints,
+    dampers,
     displacements,
+    lag,
     leaving_momentum,
     separation,
     spring_impulse,
@@ -66,7 +68,7 @@ class Step:
         self.G = np.imag(constraints(scene, varied(self.z2))).T / TINY  # (nlambda, 6 nbody)
         self.B = np.imag(displacements(scene, varied(self.z2), self.z2)).T / TINY  # (nv, 6 nbody)
         self.armature, self.v1 = armatures(scene), v
-        self.damper = np.concatenate([np.broadcast_to(joint.damper, joint.nv) for joint in scene.joints])
+        self.damper, self.lag = dampers(scene), lag(scene, h)
         self.inertia = np.array([body.inertia for body in scene.bodies])
         self.mass = np.array([body.mass for body in scene.bodies])
         self.incoming = np.concatenate(
@@ -112,7 +114,8 @@ class Step:
         )
         balance = balance - self.incoming - self.applied
         moved = displacements(scene, z3, self.z2)
-        joint = spring_impulse(scene, self.q1, self.q2, moved, h) - self.damper * moved
+        joint = spring_impulse(scene, self.q1, self.q2, moved, h)
+        joint = joint - self.damper * moved + self.lag * (moved / h - self.v1)
         joint = joint - self.armature * (moved / h - self.v1)
         rows = []
         for contact, unknown in zip(scene.contacts, parts[2:], strict=False):

@@ -179,6 +179,33 @@ def armatures(scene: Scene) -> Array:
     return np.concatenate([np.broadcast_to(joint.armature, joint.nv) for joint in scene.joints])
 
 
+def dampers(scene: Scene) -> Array:
+    """Damper of every coordinate, (nv,)."""
+    return np.concatenate([np.broadcast_to(joint.damper, joint.nv) for joint in scene.joints])
+
+
+def stiffness(scene: Scene, h: float) -> Array:
+    """z = h d (M^-1)_dd with all hinges at half a radian and all other coordinates at zero, (nv,)."""
+    turned = {0: (), 1: (0.5,), 2: (0.0, 0.0), 3: (1.0, 0.0, 0.0, 0.0)}
+    q = np.concatenate([np.r_[np.zeros(len(j.trans_axes)), turned[j.nrot]] for j in scene.joints])
+    d = dampers(scene)
+    return h * d * np.diag(np.linalg.inv(mass_matrix(scene, q))) if d.any() else d
+
+
+def lag(scene: Scene, h: float) -> Array:
+    """Weight of the velocity before the node in the impulse of a damper, (nv,)."""
+    z = stiffness(scene, h)
+    return h * dampers(scene) * (3.0 + z) / (6.0 + 3.0 * z + z * z)
+
+
+def damped_mass(scene: Scene, q: Array, h: float) -> Array:
+    """M + C: what takes the velocity of the node to the momentum that arrives there."""
+    z = stiffness(scene, h)
+    slower = 1.0 + z + z**2 / 2.0 + z**3 / 6.0  # of a body with nothing but the damper, in a step
+    gain = np.where(z > 0.0, (slower - 1.0) / (slower + 1.0) / np.where(z > 0.0, z, 1.0), 0.0)
+    return mass_matrix(scene, q) + np.diag(h * dampers(scene) * gain)
+
+
 def motion_subspace(scene: Scene, q: Array) -> Array:
     """Variations of the bodies per unit of joint displacement, (6 nbody, nv): inverse of the maps by least squares."""
     z = poses(scene, q)
@@ -211,9 +238,10 @@ def potential(scene: Scene, q: Array) -> float:
 
 
 def energy(scene: Scene, q: Array, v: Array, h: float) -> float:
-    """p.M^-1 p / 2 + V with p the joint-space momentum at the node [J]."""
+    """v.M v / 2 + V with the velocity v of the node [J]."""
     p = motion_subspace(scene, q).T @ node_momentum(scene, q, v, h).ravel()
-    return float(0.5 * p @ np.linalg.solve(mass_matrix(scene, q), p)) + potential(scene, q)
+    node = np.linalg.solve(damped_mass(scene, q, h), p)
+    return float(0.5 * node @ mass_matrix(scene, q) @ node) + potential(scene, q)
 
 
 def momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
@@ -224,8 +252,8 @@ def momentum(scene: Scene, q: Array, v: Array, h: float) -> Array:
 
 
 def start(scene: Scene, q: Array, v: Array, h: float) -> Array:
-    """Joint velocities of the interval that ends at q with the momentum M(q) v."""
-    S, target = motion_subspace(scene, q), mass_matrix(scene, q) @ v
+    """Joint velocities of the interval that ends at q with the velocity v of the node."""
+    S, target = motion_subspace(scene, q), damped_mass(scene, q, h) @ v
     nu = np.array(v, dtype=float)
     for _ in range(30):
         error = S.T @ node_momentum(scene, q, nu, h).ravel() - target

@@ -38,10 +38,12 @@ def both_cuts(steps: int, u: float = 0.0, **given: Any) -> tuple[tuple[dojo.Simu
 
 @pytest.mark.parametrize("action", ACTIONS)
 def test_an_action_in_the_closing_joint_is_that_of_a_joint_of_the_tree(action: str) -> None:
+    """A damper sees another inertia in another tree: the same to second order in the time step."""
     (a, t), (b, reference) = both_cuts(150, **ACTIONS[action])
+    atol = {"damper": 1e-4, "limits": 1e-6, "all": 1e-6}.get(action, 1e-8)
     for joint in ("crank", "coupler", "pin"):
         ours, theirs = (s.x[:, m.mechanism.q_slice(joint)] for m, s in ((a, t), (b, reference)))
-        np.testing.assert_allclose(ours, theirs, atol=1e-6 if "limits" in ACTIONS[action] else 1e-8, err_msg=joint)
+        np.testing.assert_allclose(ours, theirs, atol=atol, err_msg=joint)
     assert max(np.abs(gap).max() for gap in a.loop_gaps(t.x[-1]).values()) < 1e-10
     assert np.ptp(t.x[:, 0]) > 0.3
 

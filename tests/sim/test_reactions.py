@@ -80,7 +80,9 @@ def test_springs_dampers_limits_and_armature_are_active() -> None:
     sim = dojo.Simulator(mech, time_step=0.01, tolerance=1e-13)
     x = np.array([0.1, 0.0, 0.4, 0.3])
     v = sim.step(x).x[2]
-    taken = -0.2 * v - 0.7 * (v - 0.4) / 0.01
+    z = 0.01 * 0.2 / sim.model.dof_seen[0]
+    lag = 0.2 * (3.0 + z) / (6.0 + 3.0 * z + z * z)
+    taken = -0.2 * v + lag * (v - 0.4) - 0.7 * (v - 0.4) / 0.01
     np.testing.assert_allclose(sim.reactions(x)["shoulder"].active_torque, [0, taken, 0], atol=1e-8)
 
 
@@ -156,10 +158,14 @@ def test_every_body_is_in_balance(name: str) -> None:
         np.testing.assert_allclose([r["a"].force, r["a"].torque], 0.0, atol=1e-9)
 
 
-def test_a_closing_joint_that_acts_transmits_what_it_would_in_the_tree() -> None:
-    """The wrench of the four-bar's pin, with the loop cut there or at the rocker's bearing."""
+@pytest.mark.parametrize(("damper", "atol"), [(0.0, 1e-7), (0.4, 2e-4)])
+def test_a_closing_joint_that_acts_transmits_what_it_would_in_the_tree(damper: float, atol: float) -> None:
+    """The wrench of the four-bar's pin, with the loop cut there or at the rocker's bearing.
+
+    A damper there sees another inertia, so the weights of its velocities differ, to second order in the time step.
+    """
     a, b = (
-        dojo.Simulator(fourbar(cut, spring=30.0, damper=0.4), time_step=0.01, tolerance=1e-13)
+        dojo.Simulator(fourbar(cut, spring=30.0, damper=damper), time_step=0.01, tolerance=1e-13)
         for cut in ("pin", "rocker")
     )
     x, y = a.neutral(), b.neutral()
@@ -167,7 +173,7 @@ def test_a_closing_joint_that_acts_transmits_what_it_would_in_the_tree() -> None
         y[b.mechanism.q_slice(joint)] = x[a.mechanism.q_slice(joint)]
     ours, theirs = a.reactions(x)["pin"], b.reactions(b.close(y))["pin"]
     for field in ("point", "force", "torque", "constraint_force", "constraint_torque"):
-        np.testing.assert_allclose(getattr(ours, field), getattr(theirs, field), atol=1e-7, err_msg=field)
+        np.testing.assert_allclose(getattr(ours, field), getattr(theirs, field), atol=atol, err_msg=field)
 
 
 def test_frames_and_trajectories() -> None:

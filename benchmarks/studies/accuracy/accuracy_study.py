@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks.engines import PhysicsEngine, installed
 from benchmarks.studies.accuracy import accuracy_scenes as scenes
 from benchmarks.studies.accuracy import robot_settings as robots
+from benchmarks.studies.accuracy.damped import dampers
 from dojo_opt.report.accuracy import RobotAccuracy
 from dojo_opt.report.accuracy import error_curves as curves
 from dojo_opt.report.accuracy import error_figure as drawing
@@ -54,7 +55,7 @@ class AccuracyStudy:
             _tabulate(report, scene, measured[scene.name])
             report.details[scene.name] = {name: [p._asdict() for p in ps] for name, ps in measured[scene.name].items()}
         _ratio_table(report)
-        for part in progress([("short pieces", _pieces), ("long runs", _long_runs)], "accuracy"):
+        for part in progress([("dampers", dampers), ("short pieces", _pieces), ("long runs", _long_runs)], "accuracy"):
             part(report, everyone, self.quick)
         for advice in progress([("robots", robots.recommendations)], "accuracy"):
             advice(report, self.quick)

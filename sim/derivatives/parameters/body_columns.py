@@ -11,6 +11,7 @@ from math import cos, sin
 from sim.contact.pairs.wrench_columns import unit_vector
 from sim.derivatives.parameters.directions import At
 from sim.dynamics.joints.ball_spring import spring_turns
+from sim.dynamics.joints.damper import damper_lag, lag_rates
 from sim.model.columns import Bound
 from sim.model.data import Data
 from sim.model.model import InputKind, Model
@@ -153,6 +154,20 @@ def _left_turn(r: Quat, e: Vec3) -> Quat:
 
 
 @kernel
+def add_damper(model: Model, data: Data, at: At, d: int, w: float, col: int) -> None:
+    """h nu - d(lag)/d(damper) (nu - v)"""
+    by_damper, _ = lag_rates(model, at.h, d)
+    data.columns[d, col] -= w * at.h * (data.nu[d] - by_damper * (data.nu[d] - at.v[d]))
+
+
+@kernel
+def add_seen(model: Model, data: Data, at: At, d: int, w: float, col: int) -> None:
+    """-d(lag)/d(inertia that the damper sees) (nu - v)"""
+    _, by_seen = lag_rates(model, at.h, d)
+    data.columns[d, col] -= w * by_seen * (data.nu[d] - at.v[d])
+
+
+@kernel
 def add_rest(model: Model, data: Data, at: At, d: int, k: int, w: float, col: int) -> None:
     """-h k; of a quaternion joint a left rotation of all turns by -J(rest)^T e_k"""
     X = data.columns
@@ -219,7 +234,7 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
     """dR/dh where h v15 and h v25 stay, without contacts:
 
     body     -(balance + h (m g + f))/h - (m g + f),   f the inputs and external wrenches
-    joint    spring impulse/h - u,   -I (nu - v)/h of an armature
+    joint    spring impulse/h - u,   -I (nu - v)/h of an armature,   (lag/h - d(lag)/dh) (nu - v) of a damper
     """
     h, g = at.h, model.gravity
     X = data.columns
@@ -240,6 +255,8 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
             f, t = _input_wrench(model, data, j, at.u)
             add_wrench(model, data, i, f, moment(data, i, f, t), -2.0 * w, col)
     for d in range(at.v.shape[0]):
+        by_damper, _ = lag_rates(model, h, d)
+        X[d, col] += w * (model.dof_damper[d] * by_damper - damper_lag(model, h, d) / h) * (data.nu[d] - at.v[d])
         if not is_quaternion(model, d):
             X[d, col] -= w * model.dof_spring[d] * _scalar_spring(model, data, at, d)
             X[d, col] += w * model.dof_armature[d] * (data.nu[d] - at.v[d]) / h

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from sim.derivatives.parameters.body_columns import (
     add_bound,
+    add_damper,
     add_gravity,
     add_inertia,
     add_input,
     add_mass,
     add_rest,
+    add_seen,
     add_spring,
     add_time_step,
 )
@@ -52,7 +54,9 @@ def add_term(model: Model, data: Data, at: At, effect: int, i: int, k: int, w: f
     elif effect == Effect.SPRING:
         add_spring(model, data, at, i, w, col)
     elif effect == Effect.DAMPER:
-        data.columns[i, col] -= w * at.h * data.nu[i]
+        add_damper(model, data, at, i, w, col)
+    elif effect == Effect.SEEN:
+        add_seen(model, data, at, i, w, col)
     elif effect == Effect.ARMATURE:
         data.columns[i, col] -= w * (data.nu[i] - at.v[i])
     elif effect == Effect.REST:

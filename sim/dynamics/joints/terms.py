@@ -2,8 +2,9 @@
 
 A spring is integrated at the midpoint of each interval, V_d = (h/2) k |(r(2) + r(3))/2|^2: as implicit as the
 trapezoidal rule, so stable for every k, and as conservative, so that a vibration keeps its amplitude. A damper acts on
-the unknown velocity, implicit and dissipative for every coefficient. An armature adds I (q2 - q1)^2/(2 h) to the
-discrete Lagrangian, the energy of a rotor that turns with the coordinate and carries no momentum elsewhere.
+the mean of both velocities where it is not stiff, on the unknown one where it is, and is dissipative for every
+coefficient (damper.py). An armature adds I (q2 - q1)^2/(2 h) to the discrete Lagrangian, the energy of a rotor that
+turns with the coordinate and carries no momentum elsewhere.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ from solvers.types import Vector
 
 @kernel
 def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: Vector) -> None:
-    """residual += I (nu - v) + h d nu + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints."""
+    """residual += h d nu + I (nu - v) + h k (q + h (nu - v)/4 - rest) - h u, and the analogue of quaternion joints.
+
+    I: armature less lag.
+    """
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
         end = model.body_vadr[i + 1]
@@ -29,9 +33,9 @@ def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: 
                 for k in range(3):
                     data.residual[end + k] += t[k]
             for k in range(end, end + 3):
-                data.residual[k] += h * model.dof_damper[k] * data.nu[k]
+                data.residual[k] += h * model.dof_damper[k] * data.nu[k] + data.rotor[k] * (data.nu[k] - v[k])
         for e in range(d, end):
-            r = h * model.dof_damper[e] * data.nu[e] + model.dof_armature[e] * (data.nu[e] - v[e])
+            r = h * model.dof_damper[e] * data.nu[e] + data.rotor[e] * (data.nu[e] - v[e])
             if model.dof_spring[e] > 0.0:
                 mid = q[model.dof_qadr[e]] + 0.25 * h * (data.nu[e] - v[e]) - model.dof_rest[e]
                 r += h * model.dof_spring[e] * mid
@@ -45,7 +49,7 @@ def joint_impulses(model: Model, data: Data, h: float, q: Vector, v: Vector, u: 
 def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """joint_block[i] = d(joint impulses)/d(nu), n x n row-major.
 
-    I + h d + h^2 k/4 on the diagonal, and the springs of quaternion joints.
+    I + h d + h^2 k/4 on the diagonal, I the armature less the lag, and the springs of quaternion joints.
     """
     for i in range(model.body_parent.shape[0]):
         d = model.body_vadr[i]
@@ -54,7 +58,7 @@ def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> No
         for k in range(n * n):
             B[k] = 0.0
         for k in range(n):
-            B[k * n + k] = h * model.dof_damper[d + k] + model.dof_armature[d + k]
+            B[k * n + k] = h * model.dof_damper[d + k] + data.rotor[d + k]
             if model.joint_nrot[i] < 3 or k < n - 3:
                 B[k * n + k] += 0.25 * h * h * model.dof_spring[d + k]
         if model.joint_nrot[i] == 3 and model.dof_spring[d + n - 3] > 0.0:
@@ -65,7 +69,7 @@ def joint_blocks(model: Model, data: Data, h: float, q: Vector, v: Vector) -> No
 def add_spring_derivatives(model: Model, data: Data, h: float, q: Vector, v: Vector) -> None:
     """dR_dq, dR_dv += springs; dR_dv in unit columns, to be multiplied by -h and -h J(h v)^T like all others.
 
-    scalar        h k and h k/4 + I/h, I the armature
+    scalar        h k and h k/4 + I/h, I the armature less the lag
     quaternion    with M = c2 I - [s2], y = s1 + 2 s2 + s3 and ds = (c I + [s])/2 (right rotation) for each s,
                   d(M y) = M dy - (s2.e) y/2 + y x ds2; the turns R1, R3 carry a rotation e of q2 to configurations 1, 3
     """
@@ -74,7 +78,7 @@ def add_spring_derivatives(model: Model, data: Data, h: float, q: Vector, v: Vec
         n = model.joint_ntrans[i] if model.joint_nrot[i] == 3 else model.body_vadr[i + 1] - d
         for e in range(d, d + n):
             data.dR_dq[e, e] += h * model.dof_spring[e]
-            data.dR_dv[e, e] += 0.25 * h * model.dof_spring[e] + model.dof_armature[e] / h
+            data.dR_dv[e, e] += 0.25 * h * model.dof_spring[e] + data.rotor[e] / h
         if model.joint_nrot[i] == 3 and model.dof_spring[d + n] > 0.0:
             add_ball_spring_derivatives(model, data, h, q, v, i)
 

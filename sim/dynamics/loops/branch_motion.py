@@ -67,7 +67,7 @@ def predict_loops(model: Model, data: Data, h: float, q: Vector, v: Vector, gues
     q: (nq,) configuration 2; v: (nv,) velocity of the interval 1-2. Where loops are open v need not be along them; then
     the start is P v.
     """
-    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, data):
+    if model.loop_ntrans.shape[0] == 0 or not factor_mass_matrix(model, data, 0.0):
         return False
     given = False
     for d in range(v.shape[0]):
