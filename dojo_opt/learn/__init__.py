@@ -12,6 +12,7 @@ from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
+from dojo_opt.learn.seeds import seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
 
@@ -40,6 +41,7 @@ __all__ = [
     "hopper",
     "pendulum",
     "roll_policy_batch",
+    "seeds",
     "shac",
     "walker2d",
 ]

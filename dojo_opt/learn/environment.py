@@ -13,6 +13,7 @@ from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
+from solvers.status import Status
 
 try:
     import gymnasium
@@ -24,6 +25,7 @@ Outcome = tuple[Vector, float, bool, bool, dict[str, Any]]
 
 __all__ = ["Environment"]
 
+_SOLVED = int(Status.SOLVED)
 _PICTURE = 4.8  # inches, of 100 pixels
 
 
@@ -46,17 +48,18 @@ class _TaskEpisode:
         task, before = self.task, self.x
         if self._count >= task.steps:
             raise RuntimeError("Environment.step: the episode is over; call reset()")
-        actions = np.asarray(action, dtype=np.float64).reshape(1, -1)
-        found = task.sim.step_batch(before, task.inputs(np.clip(actions, -1.0, 1.0)), task.substeps)
+        actions = np.array(action, dtype=np.float64).reshape(1, -1)
+        limited = np.minimum(np.maximum(actions, -1.0), 1.0)
+        found = task.sim.step_batch(before, task.inputs(limited), task.substeps)
         self._count += 1
         self.x = found.x
-        reward, over = task.rewards(before, actions, self.x)[0][0], bool(task.ends(self.x)[0])
-        info = {} if found.success else {"message": found.message}
-        if found.success:
-            reward += task.survival * (not over)
+        info, reward, over = {}, 0.0, True
+        if found.status[0] == _SOLVED:
+            over = bool(task.ends(self.x)[0])
+            reward = float(task.rewards(before, actions, self.x)[0][0]) + task.survival * (not over)
         else:
-            reward, over = 0.0, True
-        return task.observe(self.x)[0][0], float(reward), over, self._count >= task.steps, info
+            info["message"] = found.message
+        return task.observe(self.x)[0][0], reward, over, self._count >= task.steps, info
 
     def state(self) -> Vector:
         """The present one."""

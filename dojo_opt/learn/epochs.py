@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import fields
 from typing import Any
 
@@ -15,13 +16,25 @@ from solvers.status import Status
 __all__ = ["learn"]
 
 
-def learn(search: Any, settings: Any, task: Task, seed: int, resume: Learned | None, given: dict[str, Any]) -> Learned:
+def learn(
+    search: Any,
+    settings: Any,
+    task: Task,
+    seed: int,
+    resume: Learned | None,
+    given: dict[str, Any],
+    executor: Executor | None = None,
+) -> Learned:
     """Run an algorithm, a class made of a task, its settings and a seed, with the given fields of these settings."""
     name = search.algorithm
     if not isinstance(task, Task):
         raise TypeError(f"{name}(task): expected a Task, got {task!r}")
     checks.keywords(f"{name}(...)", given, [f.name for f in fields(settings)])
-    return _run_epochs(search(task, settings(**given), checks.whole_number(f"{name}(seed=...)", seed, 0)), resume)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise TypeError(f"{name}(executor=...): expected an Executor, with submit(), got {executor!r}")
+    run = search(task, settings(**given), checks.whole_number(f"{name}(seed=...)", seed, 0))
+    run.executor = executor
+    return _run_epochs(run, resume)
 
 
 def _run_epochs(search: Any, resume: Learned | None) -> Learned:

@@ -29,6 +29,8 @@ class Randomisation:
         kappa: (low, high) of the smoothing [N s m], drawn by row and epoch, logarithmically (default None).
         noise: of observations, in their standard deviations (default 0).
         models: number of models per choice of substeps (default 16).
+        by_row: whether every row of an epoch has a model and a kappa of its own; otherwise all have one, drawn anew for
+            the next epoch (default True).
     """
 
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -37,6 +39,7 @@ class Randomisation:
     kappa: tuple[float, float] | None = None
     noise: float = 0.0
     models: int = 16
+    by_row: bool = True
 
     def __post_init__(self) -> None:
         for name, (low, high) in {**self.values, **self.factors}.items():
@@ -74,12 +77,17 @@ class Models:
     def draw(self, rng: np.random.Generator, rows: int) -> Drawn:
         """The models of an epoch."""
         substeps = int(rng.choice(self._choices))
-        chosen = rng.integers(self._given.models, size=rows)
+        count = rows if self._given.by_row else 1
+        chosen = np.broadcast_to(rng.integers(self._given.models, size=count), rows)
         kappa = None
         if self._given.kappa is not None:
             low, high = np.log(self._given.kappa)
-            kappa = np.exp(rng.uniform(low, high, rows))
+            kappa = np.broadcast_to(np.exp(rng.uniform(low, high, count)), rows)
         parameters = {name: table[chosen] for name, table in self._tables[substeps].items()}
+        return self.drawn(substeps, kappa, parameters)
+
+    def drawn(self, substeps: int, kappa: Floats | None, parameters: Mapping[str, Floats]) -> Drawn:
+        """Models of these values, of rows."""
         return Drawn(self._sims[substeps], substeps, kappa, parameters, self._given.noise)
 
 

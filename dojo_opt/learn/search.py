@@ -10,7 +10,9 @@ the gradient search of Dojo (arXiv 2203.00806), here with the derivatives of the
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,16 +23,19 @@ from dojo_opt.learn.evaluation import evaluate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.network import Network
 from dojo_opt.learn.observation_statistics import ObservationStatistics
+from dojo_opt.learn.pair_returns import PairInputs, PairReturns, pair_returns
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import roll_policy_batch
 from dojo_opt.learn.randomisation import Drawn, Models, Randomisation
+from dojo_opt.learn.shared import Shared
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
-from solvers.status import Status
 
 Floats = NDArray[np.float64]
 
 __all__ = ["GradientSearchOptions", "RandomSearchOptions", "ars", "gradient_search"]
+
+_GROUP = 8  # directions that are rolled out together, with or without workers
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,7 @@ class WeightSearch:
     """A policy that moves, its random numbers, and its record."""
 
     algorithm = ""
+    executor: Executor | None = None
 
     def __init__(self, task: Task, options: Any, seed: int) -> None:
         self.task, self.options, self.seed = task, options, seed
@@ -194,10 +200,13 @@ class RandomSearch(WeightSearch):
         directions = self.rng.standard_normal((o.directions, policy.network.count))
         x = self.task.starts([self.rng] * o.directions)
         drawn = self.models.draw(self.rng, o.directions)
-        pairs = np.concatenate([np.arange(o.directions)] * 2)
-        signs = np.repeat([1.0, -1.0], o.directions)[:, None]
-        found = self._returns(policy.weights + signs * o.noise * directions[pairs], x[pairs], drawn.rows(pairs))
-        ahead, back = found[: o.directions], found[o.directions :]
+        found = np.zeros((2, o.directions))
+        groups = [slice(k, min(k + _GROUP, o.directions)) for k in range(0, o.directions, _GROUP)]
+        for part, pairs in zip(groups, self._all_pairs(groups, directions, x, drawn), strict=True):
+            found[:, part] = pairs.returns
+            self.statistics.join(pairs.seen)
+            self.steps, self.unsolved = self.steps + pairs.steps, self.unsolved + pairs.unsolved
+        ahead, back = found
         best = np.argsort(-np.maximum(ahead, back), kind="stable")[: o.best]
         spread = float(np.concatenate([ahead[best], back[best]]).std())
         step = ((ahead - back)[best] @ directions[best]) / (o.best * max(spread, 1e-9))
@@ -207,25 +216,32 @@ class RandomSearch(WeightSearch):
             self.infinite += 1
         return float(found.mean()), float(np.linalg.norm(step)), 0.0
 
-    def _returns(self, weights: Floats, xs: Floats, drawn: Drawn) -> Floats:
-        """(n,) returns of rows with their own weights; observations are counted."""
-        task, policy, o = self.task, self.policy, self.options
-        out, alive, x = np.zeros(len(xs)), np.arange(len(xs)), np.array(xs)
-        for _ in range(self.horizon):
-            here, rows = x[alive], drawn.rows(alive)
-            seen = task.observe(here)[0]
-            self.statistics.add(seen)
-            actions = policy.actions(seen, weights[alive])
-            found = rows.sim.step_batch(here, task.inputs(actions), rows.substeps, False, rows.kappa, rows.parameters)
-            bad, over = found.status != Status.SOLVED, task.ends(found.x)
-            rewards = task.rewards(here, actions, found.x)[0] + task.survival * ~over - o.shift
-            out[alive] += np.where(bad, 0.0, rewards)
-            x[alive] = found.x
-            self.steps, self.unsolved = self.steps + len(alive), self.unsolved + int(bad.sum())
-            alive = alive[~(bad | over)]
-            if not len(alive):
-                break
-        return out
+    def _all_pairs(self, groups: list[slice], directions: Floats, x: Floats, drawn: Drawn) -> list[PairReturns]:
+        """Returns of all groups of directions, which workers find as the caller does."""
+        o, policy = self.options, self.policy
+        scale = policy.mean.copy(), policy.deviation.copy()
+        calls = []
+        for part in groups:
+            rows = drawn.rows(np.arange(part.start, part.stop))
+            moves = o.noise * directions[part]
+            given = PairInputs(
+                policy.network, policy.weights, scale, moves, x[part], rows.substeps, rows.kappa, rows.parameters
+            )
+            calls.append((given, self.horizon, o.shift))
+        if self.executor is None:
+            return [pair_returns(self.shared, *call) for call in calls]
+        futures = [self.executor.submit(pair_returns, self.shared, *call) for call in calls]
+        try:
+            return [future.result() for future in futures]
+        except KeyboardInterrupt:
+            for future in futures:
+                future.cancel()
+            raise
+
+    @cached_property
+    def shared(self) -> Shared:
+        """What every worker needs."""
+        return Shared((self.task, self.models))
 
 
 class GradientSearch(WeightSearch):
@@ -254,13 +270,17 @@ class GradientSearch(WeightSearch):
         return float((weights * roll.rewards).sum() / o.environments), length, found.clipped / weights.size
 
 
-def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:
+def ars(
+    task: Task, *, seed: int = 0, resume: Learned | None = None, executor: Executor | None = None, **options: Any
+) -> Learned:
     """Augmented random search, without derivatives: see the module, and `RandomSearchOptions` for the options.
 
     Args:
         task: what to learn.
         seed: of all random numbers; the same seed gives the same policy, to the last bit.
         resume: a run to go on with, of the same task, seed and options.
+        executor: anything with the interface of `concurrent.futures.Executor`, as for `dojo.monte_carlo`; its workers
+            roll out the directions, and the policy is the same to the last bit (default None: none).
         **options: fields of `RandomSearchOptions`.
 
     Returns:
@@ -270,7 +290,7 @@ def ars(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: 
         TypeError: for an argument of the wrong kind.
         ValueError: for a value out of range, or a run that does not fit.
     """
-    return learn(RandomSearch, RandomSearchOptions, task, seed, resume, options)
+    return learn(RandomSearch, RandomSearchOptions, task, seed, resume, options, executor)
 
 
 def gradient_search(task: Task, *, seed: int = 0, resume: Learned | None = None, **options: Any) -> Learned:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ from dojo_opt.planning.residual import kernel
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
 from sim.simulator.simulator import Simulator
-from solvers.compiler import users_loop
+from solvers.compiler import reduced, users_loop
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -158,6 +158,15 @@ class Task:
         if not np.all(self.low < self.high):
             raise ValueError(f"Task(low=..., high=...): expected low < high, got {self.low} and {self.high}")
 
+    def __reduce__(self) -> Any:
+        """By its fields; functions by their code, so that other processes need not import them."""
+        return reduced(Task, {f.name: getattr(self, f.name) for f in fields(self)})
+
+    @classmethod
+    def _rebuild(cls, **given: Any) -> Task:
+        """From the data of `__reduce__`."""
+        return cls(**given)
+
     @property
     def knot_time(self) -> float:
         """Time of an action [s]."""
@@ -192,7 +201,13 @@ class Task:
         Returns:
             (..., nu) inputs [N, N m].
         """
-        return 0.5 * (self.high + self.low) + 0.5 * (self.high - self.low) * actions
+        middle, half = self._range
+        return middle + half * actions
+
+    @cached_property
+    def _range(self) -> tuple[Floats, Floats]:
+        """Middle and half of the range of inputs."""
+        return 0.5 * (self.high + self.low), 0.5 * (self.high - self.low)
 
     def observe(self, xs: Floats, slopes: bool = False) -> tuple[Floats, Floats]:
         """(observations (n, no), their derivatives (n, no, ndx), or none).

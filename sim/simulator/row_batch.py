@@ -235,6 +235,8 @@ class RowStepping(StateSpace):
         count = len(inputs)
         states = self._arguments.states(f"{call}(X)", checks.array(f"{call}(X)", X, (count, self.nx)))
         steps = checks.whole_number(f"{call}(substeps=...)", substeps)
+        if count == 1 and kappa is None and not parameters and not derivatives and self.order == 2:
+            return ended(self._step_row(states, inputs, steps), throw)
         kappas = np.full(count, np.nan)
         if kappa is not None:
             if self.order > 2:
@@ -249,6 +251,24 @@ class RowStepping(StateSpace):
             reason = Status(int(found.status[i]))
             found = replace(found, detail=f"{call}: row {i}: {MESSAGES[reason]}")
         return ended(found, throw)
+
+    def _step_row(self, states: Floats, inputs: Floats, steps: int) -> BatchStep:
+        """The knot of a single row: threads would take longer to wake up."""
+        us = np.empty((steps, self.nu))
+        us[:] = inputs[0]
+        rolled = self._engine.roll(states[0], us)
+        report = rolled.reports[min(rolled.knot, steps - 1)]
+        solved = rolled.knot == steps
+        status = np.array([Status.SOLVED if solved else report[0]], dtype=np.int64)
+        detail = "" if solved else f"Simulator.step_batch: row 0: {MESSAGES[Status(int(report[0]))]}"
+        x = rolled.xs[-1:] if solved else states
+        A, B = self._no_derivatives
+        return BatchStep(x, status, report[1:2].astype(np.int64), A, B, detail)
+
+    @cached_property
+    def _no_derivatives(self) -> tuple[Floats, Floats]:
+        """A and B of no rows."""
+        return np.zeros((0, self.ndx, self.ndx)), np.zeros((0, self.ndx, self.nu))
 
     @cached_property
     def _row_models(self) -> RowModels:

@@ -8,6 +8,7 @@ parallel_kernel         a loop over the threads, with `prange`; `threads` sets t
 users_kernel            a function of the user; users_loop is a loop around one
 optional, link          a kernel with a slot in a table of addresses, for features that few scenes have
 record, Field, Table    NamedTuples of arrays that kernels take as one pointer
+reduced                 how an object is pickled that holds functions
 seconds, PAUSE          the clock of kernels
 cache_folder            the folder of the compiled code
 compiled                the kernels that this process compiled
@@ -26,6 +27,7 @@ from solvers.compiler.kernels import (
     inner_kernel,
     kernel,
     local_kernel,
+    reduced,
     users_kernel,
     users_loop,
 )
@@ -52,6 +54,7 @@ __all__ = [
     "parallel_kernel",
     "prange",
     "record",
+    "reduced",
     "seconds",
     "shipped",
     "table",

@@ -28,6 +28,7 @@ __all__ = [
     "inner_kernel",
     "kernel",
     "local_kernel",
+    "reduced",
     "registered",
     "users_kernel",
     "users_loop",
@@ -205,6 +206,11 @@ def users_kernel(func: F, boundscheck: bool = True) -> F:
         own = {name: value for name, value in func.targetoptions.items() if name != "nopython" and value is not None}
         return cast(F, UsersKernel(func.py_func, **flags, **own) if "boundscheck" not in own else func)
     return cast(F, UsersKernel(func, **flags))
+
+
+def reduced(kind: Any, fields: dict[str, Any]) -> Any:
+    """`__reduce__` of an object that holds functions, pickled by their code: it is kind._rebuild(**fields)."""
+    return custom_reduce(kind, fields)
 
 
 def users_loop(func: F) -> F:

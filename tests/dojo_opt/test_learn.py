@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -148,6 +150,19 @@ def test_a_seed_repeats_to_the_bit_and_a_run_can_be_resumed(task, name, tmp_path
 def _stop(record, epoch):
     if record["epoch"] == epoch:
         raise StopIteration
+
+
+def test_workers_find_the_same_policies(task):
+    options = {"epochs": 3, "directions": 20, "randomisation": MODELS, "evaluations": 1, "episodes": 2}
+    alone = dojo.learn.seeds(dojo.learn.ars, task, (3, 4), **options)
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:  # a task is pickled with its functions
+        together = dojo.learn.ars(task, seed=3, executor=pool, **options)
+        runs = dojo.learn.seeds(dojo.learn.ars, task, (3, 4), executor=pool, **options)
+    for run, other in ((together, alone[0]), (runs[0], alone[0]), (runs[1], alone[1])):
+        np.testing.assert_array_equal(run.policy.weights, other.policy.weights)
+        np.testing.assert_array_equal(run.state["sums"], other.state["sums"])
+        assert run.policy.task is task and (run.steps, run.best) == (other.steps, other.best)
+    assert np.abs(runs[0].policy.weights - runs[1].policy.weights).max() > 1e-6
 
 
 def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_path):
