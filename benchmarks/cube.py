@@ -1,6 +1,6 @@
 """The real cube: parameters identified from films of its tosses, and predictions of tosses that were not used.
 
-python benchmarks/cube.py FOLDER [--tosses 8 64 300] [--held-out 100] [--output cube.json]
+python benchmarks/cube.py FOLDER [--tosses 8 64 300] [--held-out 100] [--prior] [--output cube.json]
 
 FOLDER holds tosses_train.npz: `states` (N, 13) of position, quaternion, velocity, angular velocity (body) at 148 Hz, in
 half widths of 52.4 mm, of all tosses stacked, and `lengths`: 400 of the 570 tosses of ContactNets (Pfrommer, Halm,
@@ -29,6 +29,18 @@ H, HALF = 1.0 / 148.0, 0.0524  # [s], [m]
 GRID = (1, 2, 4, 8, 16, 40, 80, 120)
 NOISE = np.repeat((2e-3, 0.03, 0.1, 2.0), 3)  # [m, rad, m/s, rad/s]
 KAPPAS = (1e-5, 1e-6)
+PRIOR = {  # of a block of which a ruler, scales and a table of materials tell something
+    "friction:*": (0.3, 0.3),  # dry plastics: 0.1 to 0.6
+    "restitution:*": (0.2, 0.2),
+    "contact_point": 1e-3,  # [m] its corners, by a ruler
+    "inertia:cube[xx]": (6.8e-4, 1.5e-4),  # [kg m^2] a solid cube has m (2 a)^2/6, a hollow one 5/3 of that
+    "inertia:cube[yy]": (6.8e-4, 1.5e-4),
+    "inertia:cube[zz]": (6.8e-4, 1.5e-4),
+    "inertia:cube[xy]": 3e-5,
+    "inertia:cube[xz]": 3e-5,
+    "inertia:cube[yz]": 3e-5,
+    "com:cube": 1e-3,  # [m] of a side of 105
+}
 
 
 def cube(friction: float, restitution: float, half: float) -> dojo.Simulator:
@@ -73,12 +85,21 @@ def errors(sim: dojo.Simulator, motions: list[Floats]) -> dict[str, Any]:
     return {"errors": table, "tosses": len(motions), "unsolved": unsolved}
 
 
-def fit(motions: list[Floats], window: int, names: tuple[str, ...]) -> dojo.Identified:
-    """Friction, restitution, eight corners, and further parameters, from a guess that is far off."""
+def fit(motions: list[Floats], window: int, names: tuple[str, ...], known: bool) -> dojo.Identified:
+    """Friction, restitution, eight corners, and further parameters, from a guess that is far off.
+
+    known: with a prior, whose corners are those of the block, and not of the guess
+    """
+    start = cube(0.3, 0.05, 0.9 * HALF)
+    prior: dict[str, Any] = {}
+    if known:
+        labels = dojo.ParameterSpace(start, ("friction:*", "restitution:*", "contact_point", *names)).labels
+        prior = {k: v for k, v in PRIOR.items() if any(label.startswith(k) for label in labels)}
+        prior["contact_point"] = (HALF * np.array(list(product((-1.0, 1.0), repeat=3))).ravel(), PRIOR["contact_point"])
     data = [(xs, np.zeros((len(xs) - 1, 0))) for xs in motions]
     return dojo.identify(
-        cube(0.3, 0.05, 0.9 * HALF), data, ("friction:*", "restitution:*", "contact_point", *names),
-        noise=NOISE, window=window, every=8, kappas=KAPPAS, tolerance=5e-3, max_iterations=8, verbose=True,
+        start, data, ("friction:*", "restitution:*", "contact_point", *names),
+        prior=prior, noise=NOISE, window=window, every=8, kappas=KAPPAS, tolerance=5e-3, max_iterations=8, verbose=True,
     )  # fmt: skip
 
 
@@ -90,6 +111,7 @@ def main() -> None:
     parser.add_argument("--held-out", type=int, default=100)
     parser.add_argument("--window", type=int, default=80)
     parser.add_argument("--further", nargs="*", default=["inertia:cube", "com:cube"])
+    parser.add_argument("--prior", action="store_true", help="with what a ruler, scales and tables tell: see PRIOR")
     parser.add_argument("--output", type=Path, default=None)
     given = parser.parse_args()
     motions = tosses(given.folder)
@@ -100,7 +122,7 @@ def main() -> None:
         if count > len(motions) - given.held_out:
             parser.error(f"--tosses {count}: {len(motions) - given.held_out} are left beside those held out")
         began = time.process_time()
-        found = fit([motions[i] for i in order[:count]], given.window, tuple(given.further))
+        found = fit([motions[i] for i in order[:count]], given.window, tuple(given.further), given.prior)
         corners = found.values[2:26].reshape(8, 3)
         print(f"{count} tosses: {found!r}")
         rows[f"{count} tosses"] = errors(found.simulator, unseen) | {

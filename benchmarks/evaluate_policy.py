@@ -1,6 +1,6 @@
 """Returns of saved policies in Gymnasium's MuJoCo tasks. Nothing of dojo-opt is imported: a policy is an .npz file.
 
-python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5]
+python benchmarks/evaluate_policy.py HalfCheetah-v5 policy.npz ...      [--episodes 8] [--finer 5] [--output FILE]
 
 Two columns: the task as it is, and with `--finer` shorter time steps at the same control rate.
 """
@@ -67,11 +67,17 @@ def main() -> None:
     parser.add_argument("policies", nargs="+")
     parser.add_argument("--episodes", type=int, default=8)
     parser.add_argument("--finer", type=int, default=5)
+    parser.add_argument("--output", default="", help="JSON file: {policy: [mean return, mean return at finer steps]}")
     given = parser.parse_args()
+    table: dict[str, list[float]] = {}
     print(f"{'policy':40} {given.task:>20} {'time step / ' + str(given.finer):>20}")
     for path in given.policies:
         columns = [returns(given.task, load(path), given.episodes, finer) for finer in (1, given.finer)]
+        table[path] = [float(c.mean()) for c in columns]
         print(f"{path[-40:]:40} " + " ".join(f"{c.mean():12.1f} +-{c.std():5.0f}" for c in columns), flush=True)
+    if given.output:
+        with open(given.output, "w") as file:
+            json.dump(table, file, indent=1)
 
 
 if __name__ == "__main__":

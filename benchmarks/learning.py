@@ -2,15 +2,19 @@
 
 python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 2 3 4      runs and saves
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
-python benchmarks/evaluate_policy.py HalfCheetah-v5 DIR/*.policy.npz                        in MuJoCo
+python benchmarks/learning.py DIR HalfCheetah --table           and tabulates it, with returns in MuJoCo, in TASK.json
 
 A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
-OPENBLAS_NUM_THREADS=1. Policies are also evaluated at time steps and smoothings that they have not learnt on.
+OPENBLAS_NUM_THREADS=1. Policies are also evaluated at time steps and smoothings that they have not learnt on, and in
+MuJoCo by benchmarks/evaluate_policy.py, which imports nothing of dojo-opt.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,26 +25,30 @@ from dojo_opt.learn.gymnasium_tasks import TRANSFER
 from dojo_opt.learn.registration import TASKS
 
 LOCOMOTION = dojo.learn.Randomisation(substeps=(2, 4), kappa=(10.0**-4, 10.0**-2.5))
+COARSE = dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))
+_RARELY: dict[str, Any] = {"evaluations": 3, "episodes": 4}  # an evaluation takes as long as several epochs
 SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
     "HalfCheetah": {
-        "shac": {"epochs": 900, "randomisation": TRANSFER},
-        "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER},
+        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
+        "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER} | _RARELY,
+        "gradient_search": {"epochs": 60, "horizon": 80, "randomisation": TRANSFER} | _RARELY,
     },
     "Hopper": {
-        "shac": {"epochs": 900, "horizon": 32, "randomisation": LOCOMOTION},
+        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
         "ars": {"epochs": 100, "rate": 0.01, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
     },
     "Walker2d": {
-        "shac": {"epochs": 900, "horizon": 32, "randomisation": LOCOMOTION},
+        "shac": {"epochs": 450, "environments": 32, "horizon": 32, "gamma": 0.995, "randomisation": LOCOMOTION},
         "ars": {"epochs": 100, "rate": 0.03, "noise": 0.025, "shift": 1.0, "randomisation": LOCOMOTION},
     },
     "Ant": {
-        "shac": {"epochs": 900, "randomisation": dojo.learn.Randomisation(substeps=(2, 3), kappa=(10.0**-3.5, 1e-2))},
+        "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": COARSE},
         "ars": {"epochs": 30, "rate": 0.015, "noise": 0.025, "shift": 1.0},
     },
     "Pendulum": {"shac": {"epochs": 100}, "ars": {"epochs": 30}, "gradient_search": {"epochs": 100}},
     "Cartpole": {"shac": {"epochs": 100}, "ars": {"epochs": 30}},
 }
+JUDGED = ("HalfCheetah", "Hopper", "Walker2d", "Ant")
 UNSEEN = ((10, 3e-5), (7, 2e-3))  # time steps per action, smoothing [N s m]
 
 
@@ -72,7 +80,9 @@ def figure(folder: Path, name: str) -> None:
     axes = page.subplots()
     for algorithm in SETTINGS[name]:
         curves = []
-        for path in sorted(folder.glob(f"{name}_{algorithm}_?.npz")):
+        for path in sorted(folder.glob(f"{name}_{algorithm}_*.npz")):
+            if path.name.endswith(".policy.npz"):
+                continue
             history = dojo.learn.Learned.load(path).history
             curves.append(np.array([(r["seconds"], r["evaluated"]) for r in history if r["evaluated"] is not None]))
         if curves:
@@ -87,6 +97,35 @@ def figure(folder: Path, name: str) -> None:
     print(f"wrote {folder / f'{name}.png'}")
 
 
+def table(folder: Path, name: str) -> None:
+    """Returns of all saved runs: here, and in MuJoCo where Gymnasium has the task."""
+    rows: dict[str, Any] = {}
+    print(f"{name}: return here (mean, least over seeds), minutes of a core, in MuJoCo, at a fifth of its time step")
+    for algorithm in SETTINGS[name]:
+        paths = sorted(p for p in folder.glob(f"{name}_{algorithm}_*.npz") if not p.name.endswith(".policy.npz"))
+        if not paths:
+            continue
+        runs = [dojo.learn.Learned.load(path) for path in paths]
+        best, minutes = np.array([r.best for r in runs]), np.array([r.seconds / 60.0 for r in runs])
+        row: dict[str, Any] = {
+            "returns": best.tolist(), "minutes": minutes.tolist(), "steps": [r.steps for r in runs],
+            "unsolved": sum(r.unsolved for r in runs), "infinite": sum(r.infinite for r in runs),
+        }  # fmt: skip
+        text = f"{algorithm:16} {len(runs)} seeds {best.mean():8.1f} {best.min():8.1f} {minutes.mean():6.2f} min"
+        if name in JUDGED:
+            there = folder / f"{name}_{algorithm}.mujoco.json"
+            judge = Path(__file__).with_name("evaluate_policy.py")
+            policies = [str(path.with_suffix(".policy.npz")) for path in paths]
+            command = [sys.executable, str(judge), f"{name}-v5", *policies, "--output", str(there)]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            row["mujoco"] = list(json.loads(there.read_text()).values())
+            means = np.mean(row["mujoco"], axis=0)
+            text += f" {means[0]:8.1f} {means[1]:8.1f}"
+        print(text, flush=True)
+        rows[algorithm] = row
+    (folder / f"{name}.json").write_text(json.dumps(rows, indent=1))
+
+
 def main() -> None:
     """Run, save, draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -96,12 +135,15 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--epochs", type=int, default=None)
     parser.add_argument("--only-figure", action="store_true")
+    parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
-    for algorithm in [] if given.only_figure else given.algorithms:
+    for algorithm in [] if given.only_figure or given.table else given.algorithms:
         for seed in given.seeds:
             run(given.folder, given.task, algorithm, seed, given.epochs)
     figure(given.folder, given.task)
+    if given.table:
+        table(given.folder, given.task)
 
 
 if __name__ == "__main__":

@@ -13,14 +13,16 @@ from matplotlib.figure import Figure
 import dojo_opt as dojo
 from dojo_opt.learn.gymnasium_tasks import TRANSFER
 
-EPOCHS = 60 if QUICK else 400
+EPOCHS = 100 if QUICK else 450
 task = dojo.learn.half_cheetah()
 learned = dojo.learn.shac(
     task,
     seed=0,
     epochs=EPOCHS,
+    environments=32,
+    episode=128,
     randomisation=TRANSFER,
-    evaluations=3 if QUICK else 10,
+    evaluations=3,
     verbose=True,
 )
 print(learned)

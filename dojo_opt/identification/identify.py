@@ -1,6 +1,9 @@
 """identify: parameters of a simulator from measured motions, by Gauss-Newton over multiple shooting.
 
-    min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2),    r of windows.py
+    min over theta and the starts s_k    sum_k sum_t rho(|r_kt|^2) + max(1, rms^2) sum_i ((theta_i - m_i)/s_i)^2
+
+with r of windows.py, and what is known beforehand of some parameters, m_i +- s_i. Models err more than the noise says:
+the mean square of the errors, rms^2, is by how much, and the data count that much less.
 
 Starts are eliminated window by window (Schur complement), so the work grows with the data and not with its square. rho
 is Huber's, by iteratively reweighted least squares: a state whose scaled error has a root mean square above `outlier`
@@ -50,7 +53,7 @@ class Identified:
         covariance: (n, n); infinite on the diagonal where the data tell nothing.
         simulator: with the values.
         rms: root mean square of the errors over their noise: 1 where the noise is as stated.
-        unseen: combinations, by label, that change no prediction.
+        unseen: combinations, by label, that change no prediction, and that no prior tells.
         outliers: share of states that count less than fully.
         unsolved: windows that could not be predicted at the end, and do not count.
         starts: (nx,) of every window.
@@ -120,14 +123,39 @@ class Identified:
         return "\n".join([*lines, self.closing_line()])
 
 
+class Prior:
+    """What is known of parameters before: independent and normal.
+
+    mean (n,); precision (n,) the inverse of the variance, 0 where nothing is known
+    """
+
+    def __init__(self, space: ParameterSpace, given: Mapping[str, Any]) -> None:
+        self.mean, self.precision = space.values.copy(), np.zeros(len(space.values))
+        for name, value in given.items():
+            call = f"identify(prior=...): {name!r}"
+            rows = [
+                k for k, label in enumerate(space.labels) if label == name or label.startswith((f"{name}:", f"{name}["))
+            ]
+            if not rows:
+                checks.one_of("identify(prior=...)", name, space.labels)
+            mean, deviation = value if isinstance(value, tuple) else (self.mean[rows], value)
+            self.mean[rows] = np.broadcast_to(checks.floats(call, mean), (len(rows),))
+            self.precision[rows] = checks.number(call, deviation, above=0.0) ** -2
+
+    def cost(self, theta: Floats) -> float:
+        """Square of the distance from the mean, over the deviations."""
+        return float(np.sum(self.precision * (theta - self.mean) ** 2))
+
+
 class _Fit:
     """Parameters, starts and their normal equations."""
 
     def __init__(
-        self, space: ParameterSpace, windows: list[Window], predictor: Predictor, outlier: float, base: Simulator
+        self, space: ParameterSpace, windows: list[Window], predictor: Predictor, outlier: float, prior: Prior
     ) -> None:
-        self.space, self.windows, self.predictor, self.outlier, self.base = space, windows, predictor, outlier, base
-        self.theta = space.values.copy()
+        self.space, self.windows, self.predictor, self.outlier, self.prior = space, windows, predictor, outlier, prior
+        self.theta, self.base = space.values.copy(), space.simulator(space.values)
+        self.share = 1.0  # of the prior
         self.starts = [w.x[0].copy() for w in windows]
         # coordinates differ in size by orders of magnitude
         self.unit = np.maximum(np.abs(space.values), 1e-3)
@@ -156,6 +184,16 @@ class _Fit:
                 total, far, count = total + float(rho.sum()), far + int((~inside).sum()), count + len(size)
         return total, weights, far / max(count, 1)
 
+    def pull(self, theta: Floats) -> float:
+        """Cost of the distance from the prior."""
+        return self.share * self.prior.cost(theta)
+
+    def rest(self, cost: float, found: list[WindowErrors], usable: list[bool]) -> float:
+        """The cost of the data and the prior, whose share is chosen anew."""
+        values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
+        self.share = max(1.0, cost / max(values, 1))
+        return cost + self.pull(self.theta)
+
     def system(
         self, found: list[WindowErrors], weights: list[Floats], damping: float
     ) -> tuple[Floats, Floats, list[Any]]:
@@ -178,6 +216,8 @@ class _Fit:
     def step(self, found: list[WindowErrors], weights: list[Floats], damping: float) -> tuple[Floats, list[Floats]]:
         """New parameters, within their bounds, and starts."""
         H, g, kept = self.system(found, weights, damping)
+        H = H + np.diag(self.share * self.prior.precision * self.unit**2)
+        g = g + self.share * self.prior.precision * (self.theta - self.prior.mean) * self.unit
         low, high = (self.space.low - self.theta) / self.unit, (self.space.high - self.theta) / self.unit
         H = H + np.diag(damping * np.diag(H) + 1e-14 * max(np.trace(H), 1e-14))
         free = np.ones(len(g), dtype=np.bool_)
@@ -234,6 +274,7 @@ def identify(
     bodies: Sequence[str] = (),
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    prior: Mapping[str, Any] | None = None,
     noise: ArrayLike = 1.0,
     **options: Any,
 ) -> Identified:
@@ -245,6 +286,9 @@ def identify(
         parameters: names, as in `Simulator.parameters`.
         bodies: whose mass, centre and inertia are fitted together, as physical bodies; see `ParameterSpace`.
         bounds: {name: (low, high)}, as in `ParameterSpace`.
+        prior: {name: deviation} or {name: (mean, deviation)} of parameters, of which more is known than bounds: from a
+            ruler, scales, a data sheet. A name covers all its components; the mean is that of `sim` by default, or one
+            number or one for each component. Few motions determine few parameters; the rest stay at their priors.
         noise: standard deviation of the measurement of a state, one or (ndx,); infinite for what is not measured.
         **options: fields of `IdentifyOptions`.
 
@@ -265,7 +309,7 @@ def identify(
     if not np.all(deviations > 0.0) or not np.isfinite(deviations).any():
         raise ValueError(f"{call}(noise=...): expected numbers above 0, not all infinite, got {noise!r}")
     predictor = Predictor(space, deviations, o.every)
-    fit = _Fit(space, cut_windows(sim, trajectories, o.window), predictor, o.outlier, sim)
+    fit = _Fit(space, cut_windows(sim, trajectories, o.window), predictor, o.outlier, Prior(space, prior or {}))
     history: list[dict[str, Any]] = []
     levels, status = o.kappas or (sim.kappa,), Status.SOLVED
     for kappa in levels:
@@ -279,17 +323,17 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
     if found is None:
         return Status.SIMULATION_FAILED
     usable = [w.solved for w in found]
-    cost, weights, far = fit.weigh(found, usable)
-    damping = _DAMPING
+    data, weights, far = fit.weigh(found, usable)
+    damping, cost = _DAMPING, fit.rest(data, found, usable)
     for _ in range(o.max_iterations):
-        if cost <= _EXACT * sum(w.errors.size for w in found):
+        if data <= _EXACT * sum(w.errors.size for w in found):
             return Status.SOLVED
         accepted, gain = False, 0.0
         while damping < _LARGEST and not accepted:
             theta, starts = fit.step(found, weights, damping)
             trial = fit.errors(theta, starts, kappa, slopes=False)
             if trial is not None and all(t.solved or not use for t, use in zip(trial, usable, strict=True)):
-                ahead = fit.weigh(trial, usable)[0]
+                ahead = fit.weigh(trial, usable)[0] + fit.pull(theta)
                 accepted, gain = ahead < cost, (cost - ahead) / cost
             damping = max(damping / 5.0, _LEAST) if accepted else 4.0 * damping
         if not accepted:
@@ -299,12 +343,13 @@ def _descend(fit: _Fit, kappa: float, o: IdentifyOptions, began: float, history:
         again = fit.errors(theta, starts, kappa, slopes=True)
         assert again is not None
         found, usable = again, [w.solved for w in again]
-        cost, weights, far = fit.weigh(found, usable)
+        data, weights, far = fit.weigh(found, usable)
+        cost = fit.rest(data, found, usable)
         values = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
         record = dict(
             zip(
                 COLUMNS,
-                (len(history) + 1, kappa, cost, np.sqrt(cost / max(values, 1)), damping, size, far,
+                (len(history) + 1, kappa, cost, np.sqrt(data / max(values, 1)), damping, size, far,
                  usable.count(False), time.process_time() - began),
                 strict=True,
             )
@@ -328,10 +373,11 @@ def _identified(fit: _Fit, kappa: float, status: Status, history: list[dict[str,
     H, _, _ = fit.system(found, weights, 0.0)
     count = sum(w.errors.size for w, use in zip(found, usable, strict=True) if use)
     free = count - n - sum(usable) * fit.base.ndx
-    variance = cost / max(free, 1)
-    sizes, axes = np.linalg.eigh(0.5 * (H + H.T))
+    variance = max(cost / max(free, 1), 1e-30)
+    H = 0.5 * (H + H.T) / variance + np.diag(fit.prior.precision * fit.unit**2)
+    sizes, axes = np.linalg.eigh(H)
     seen = sizes > _UNSEEN * max(sizes.max(initial=0.0), 1e-300)
-    covariance = variance * (axes[:, seen] / sizes[seen]) @ axes[:, seen].T * np.outer(fit.unit, fit.unit)
+    covariance = (axes[:, seen] / sizes[seen]) @ axes[:, seen].T * np.outer(fit.unit, fit.unit)
     blind = np.max(np.abs(axes[:, ~seen]), axis=1, initial=0.0) > 1e-3
     covariance[blind, :] = covariance[:, blind] = np.nan
     covariance[blind, blind] = np.inf

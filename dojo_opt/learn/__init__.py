@@ -6,7 +6,8 @@ Where Gymnasium is installed, the tasks are registered with it: `gymnasium.make(
 from importlib.util import find_spec
 
 from dojo_opt.learn.evaluation import Evaluation, evaluate
-from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, pendulum, walker2d
+from dojo_opt.learn.gymnasium_tasks import ant, cartpole, half_cheetah, hopper, humanoid, pendulum, walker2d
+from dojo_opt.learn.imitate import ImitationOptions, imitate
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
@@ -24,6 +25,7 @@ if find_spec("gymnasium") is not None:
 __all__ = [
     "Evaluation",
     "GradientSearchOptions",
+    "ImitationOptions",
     "Learned",
     "LearnedPolicy",
     "PolicyGradient",
@@ -39,6 +41,8 @@ __all__ = [
     "gradient_search",
     "half_cheetah",
     "hopper",
+    "humanoid",
+    "imitate",
     "pendulum",
     "roll_policy_batch",
     "seeds",

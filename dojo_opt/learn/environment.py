@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import perf_counter, sleep
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from dojo_opt.learn.task import Task
 from dojo_opt.planning.problem import Problem
 from dojo_opt.plant.monte_carlo import Sampler
 from dojo_opt.plant.plant import Plant
+from dojo_opt.viewer.live import Live, live
 from sim.mechanism import checks
 from sim.simulator.simulator import Simulator
 from solvers.status import Status
@@ -146,11 +148,12 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
           terminated    the robot has fallen, or a step could not be solved: see `info["message"]`
           truncated     the horizon is over; `info["violation"]` is the largest violation of a constraint
 
-    plant    of a problem, by default its own simulator from its start; its time step divides a knot. sampler: generator
-             -> Perturbation, drawn at every reset from the environment's seed. render_mode: None or "rgb_array".
+    plant        of a problem, by default its own simulator from its start; its time step divides a knot
+    sampler      generator -> Perturbation, drawn at every reset from the environment's seed
+    render_mode  None, "rgb_array", or "human": every step is shown in the browser, at `view.url`, in real time
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 20}
 
     def __init__(
         self,
@@ -169,9 +172,12 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
             raise TypeError(f"Environment(sampler=...): expected a function of a generator, got {sampler!r}")
         if isinstance(source, Task) and not (plant is None and sampler is None):
             raise ValueError("Environment(plant=..., sampler=...): a task has its own simulator and first states")
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f'Environment(render_mode=...): expected None or "rgb_array", got {render_mode!r}')
-        self.render_mode = render_mode
+        if render_mode not in (None, "rgb_array", "human"):
+            raise ValueError(
+                f'Environment(render_mode=...): expected None, "rgb_array" or "human", got {render_mode!r}'
+            )
+        self.render_mode, self._shown = render_mode, 0.0
+        self.view: Live | None = None
         self._episode: _TaskEpisode | _ProblemEpisode = (
             _TaskEpisode(source) if isinstance(source, Task) else _ProblemEpisode(source, plant, sampler)
         )
@@ -202,15 +208,35 @@ class Environment(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Vector, dict[str, Any]]:
         """To a first state, drawn from the environment's seed."""
         super().reset(seed=seed)
-        return self._episode.reset(self.np_random), {}
+        observation = self._episode.reset(self.np_random)
+        self._show()
+        return observation, {}
 
     def step(self, action: Vector) -> Outcome:
         """One action: (observation, reward, terminated, truncated, info)."""
-        return self._episode.step(action)
+        outcome = self._episode.step(action)
+        self._show()
+        return outcome
+
+    def _show(self) -> None:
+        """The present state in the browser, no earlier than the time of an action after the one before."""
+        if self.render_mode != "human":
+            return
+        if self.view is None:
+            self.view = live(self.sim, open_browser=True)
+        sleep(max(self._shown + self._episode.knot_time - perf_counter(), 0.0))
+        self._shown = perf_counter()
+        self.view.show(self._episode.state())
+
+    def close(self) -> None:
+        """Close the page of render_mode="human"."""
+        if self.view is not None:
+            self.view.close()
+            self.view = None
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (480, 480, 3) of the robot, with render_mode="rgb_array"."""
-        if self.render_mode is None:
+        if self.render_mode != "rgb_array":
             return None
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 

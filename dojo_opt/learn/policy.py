@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.learn.network import Network, number_of, perceptron
+from dojo_opt.learn.onnx_file import write_onnx
 from dojo_opt.learn.task import Task
 from sim.mechanism import checks
 from sim.mechanism.brief import brief_repr
@@ -123,6 +124,17 @@ class LearnedPolicy:
     def _buffers(self) -> tuple[Any, Floats]:
         sizes = np.array(self.network.sizes, dtype=np.int64)
         return sizes, np.zeros(2 * max(self.network.sizes))
+
+    def export_onnx(self, path: str | Path) -> None:
+        """Write the policy as an ONNX model: "observation" (n, no) to "action" (n, nu) in [-1, 1], both float32.
+
+        Args:
+            path: of the file.
+
+        Raises:
+            ImportError: without onnx (`pip install "dojo-opt[onnx]"`).
+        """
+        write_onnx(self.network, self.weights, (self.mean, self.deviation), path)
 
     def save(self, path: str | Path) -> None:
         """Write the policy to an .npz file, which NumPy reads without this package.

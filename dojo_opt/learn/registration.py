@@ -22,6 +22,7 @@ TASKS = {  # name: function of gymnasium_tasks.py, steps of an episode
     "Hopper": ("hopper", 1000),
     "Walker2d": ("walker2d", 1000),
     "Ant": ("ant", 1000),
+    "Humanoid": ("humanoid", 1000),
     "Cartpole": ("cartpole", 1000),
     "Pendulum": ("pendulum", 200),
 }

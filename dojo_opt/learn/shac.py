@@ -8,7 +8,7 @@ A row of the batch goes on where the last epoch left it; the sums start anew whe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,9 @@ Flags = NDArray[np.bool_]
 __all__ = ["ShacOptions", "shac"]
 
 
+_KNOWN = 1e4  # observations that the scaling of a given policy counts for
+
+
 @dataclass(frozen=True)
 class ShacOptions:
     """Settings of `shac`.
@@ -39,6 +42,8 @@ class ShacOptions:
         epochs: number of epochs; each is one rollout of the batch and one step of the policy (default 900).
         environments: rows of the batch (default 64).
         horizon: control steps of an epoch (default 16).
+        episode: control steps after which a row starts anew while learning (default None: those of the task). Where
+            long episodes hold a row in a posture that the policy has got used to, short ones bring it back.
         hidden: sizes of the hidden layers of policy and critic (default (64, 64)).
         activation: "tanh" or "elu" (default "tanh").
         gamma: discount of a control step (default 0.99).
@@ -54,6 +59,7 @@ class ShacOptions:
         blend: share of the critic in its target network after an epoch (default 0.3).
         randomisation: models that the policy learns on (default: that of the task).
         kappa_grad: smoothing of the derivatives [N s m] (default None: that of the motion).
+        start: policy to begin with, of `imitate` or another run; it brings its network and scaling (default None).
         evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 10).
         episodes: of an evaluation (default 8).
         time_limit: of the processor time [s] (default inf).
@@ -65,6 +71,7 @@ class ShacOptions:
     epochs: int = 900
     environments: int = 64
     horizon: int = 16
+    episode: int | None = None
     hidden: tuple[int, ...] = (64, 64)
     activation: str = "tanh"
     gamma: float = 0.99
@@ -80,6 +87,7 @@ class ShacOptions:
     blend: float = 0.3
     randomisation: Randomisation = Randomisation()
     kappa_grad: float | None = None
+    start: LearnedPolicy | None = None
     evaluations: int = 10
     episodes: int = 8
     time_limit: float = float("inf")
@@ -88,7 +96,8 @@ class ShacOptions:
     stream: Any = None
 
     def __post_init__(self) -> None:
-        for name in ("epochs", "environments", "horizon", "passes", "batches", "episodes"):
+        lengths = () if self.episode is None else ("episode",)
+        for name in ("epochs", "environments", "horizon", "passes", "batches", "episodes", *lengths):
             checks.whole_number(f"shac({name}=...)", getattr(self, name))
         checks.whole_number("shac(evaluations=...)", self.evaluations, 0)
         checks.one_of("shac(activation=...)", self.activation, ACTIVATIONS)
@@ -96,6 +105,8 @@ class ShacOptions:
             checks.share(f"shac({name}=...)", getattr(self, name))
         for name in ("rate", "critic_rate", "norm", "costate"):
             checks.number(f"shac({name}=...)", getattr(self, name), above=0.0)
+        if not (self.start is None or isinstance(self.start, LearnedPolicy)):
+            raise TypeError(f"shac(start=...): expected a LearnedPolicy, got {self.start!r}")
         if not isinstance(self.randomisation, Randomisation):
             raise TypeError(f"shac(randomisation=...): expected a Randomisation, got {self.randomisation!r}")
 
@@ -113,12 +124,20 @@ class _Shac:
         network = Network((task.observations, *o.hidden, task.sim.nu), o.activation)
         self.critic = value_network(task, o.hidden, o.activation)
         self.policy = LearnedPolicy(network, network.start(rng, 0.1), *self._scale(None), task)
+        if o.start is not None:
+            network = o.start.network
+            self.policy = replace(o.start, weights=o.start.weights.copy(), task=task)
         self.value = self.critic.start(rng)
         self.target = self.value.copy()
         self.actor_adam, self.critic_adam = Adam(network.count, o.betas), Adam(self.critic.count, o.betas)
         self.statistics = ObservationStatistics(task.observations)
+        if o.start is not None:
+            self.statistics.sums[0], self.statistics.sums[1] = o.start.mean, o.start.deviation**2
+            self.statistics.sums[2] = _KNOWN
+            self.policy.mean, self.policy.deviation = self._scale(self.statistics)
         self.x = task.starts([self.restarts] * o.environments)
-        self.age = self.restarts.integers(task.steps, size=o.environments)
+        self.limit = task.steps if o.episode is None else min(o.episode, task.steps)
+        self.age = self.restarts.integers(self.limit, size=o.environments)
         self.running, self.known = np.zeros(o.environments), np.zeros(o.environments, dtype=np.bool_)
         self.finished: list[float] = []
         self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
@@ -148,7 +167,7 @@ class _Shac:
     def restart(self, t: int, terminated: Flags, unsolved: Flags, states: Floats) -> Flags:
         """Which rows start anew after step t; their states are replaced."""
         self.age += 1
-        anew = terminated | unsolved | (self.age >= self.task.steps)
+        anew = terminated | unsolved | (self.age >= self.limit)
         rows = np.flatnonzero(anew)
         if len(rows):
             states[rows] = self.task.starts([self.restarts] * len(rows))

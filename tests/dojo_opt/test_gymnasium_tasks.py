@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -11,19 +13,36 @@ gymnasium = pytest.importorskip("gymnasium")
 pytest.importorskip("mujoco")
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
-NAMES = ("Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant")
+NAMES = ("Pendulum", "Cartpole", "HalfCheetah", "Hopper", "Walker2d", "Ant", "Humanoid")
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # that observations have no bounds; faults are assertions
 @pytest.mark.parametrize("name", [*NAMES[:2], *(pytest.param(n, marks=pytest.mark.slow) for n in NAMES[2:])])
-def test_environments_are_as_gymnasium_has_them(name):
+def test_environments_are_as_gymnasium_has_them(name, monkeypatch):
     from gymnasium.utils.env_checker import check_env
 
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
     env = gymnasium.make(f"dojo_opt.learn:dojo/{name}-v0", render_mode="rgb_array")
     check_env(env.unwrapped)
     env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (480, 480, 3) and picture.std() > 1.0
+
+
+def test_people_watch_in_the_browser(monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    env = gymnasium.make("dojo_opt.learn:dojo/Pendulum-v0", render_mode="human")
+    env.reset(seed=0)
+    began = time.perf_counter()
+    for _ in range(3):
+        env.step(np.zeros(1, dtype=np.float32))
+    assert time.perf_counter() - began > 2 * 0.05  # [s] of an action
+    view = env.unwrapped.view
+    assert opened == [view.url]
+    env.close()
+    with pytest.raises(ValueError, match="closed"):
+        view.show(np.zeros(2))
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

@@ -181,9 +181,34 @@ def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_pa
     assert len(learned.plot().lines) == 2
 
 
+def test_imitated_policies_have_the_feedback_of_plans_and_can_learn_on(task, tmp_path):
+    gain, xs, us = np.array([[-2.0, -0.4]]), [np.array([0.7, 0.5])], []
+    for _ in range(40):
+        us.append(gain @ xs[-1])
+        xs.append(task.sim.step_batch(xs[-1][None], us[-1][None], task.substeps).x[0])
+    plan = np.array(xs), np.array(us), np.repeat(gain[None], 40, axis=0)
+    options = {"epochs": 400, "hidden": (16,), "spread": 0.1, "evaluations": 1}
+    learned = dojo.learn.imitate(task, [plan], **options)
+    blind = dojo.learn.imitate(task, [(*plan[:2], np.zeros_like(plan[2]))], **options)
+    errors = {}
+    for name, policy in (("told", learned.policy), ("blind", blind.policy)):
+        slopes = [[(policy(x + e) - policy(x - e)) / 2e-4 for e in 1e-4 * np.eye(2)] for x in plan[0][:-1:8]]
+        errors[name] = np.abs(np.array(slopes)[:, :, 0] - gain).max()
+    assert errors["told"] < 0.3 and errors["blind"] > 0.6, errors
+    np.testing.assert_allclose([learned.policy(x) for x in plan[0][:-1]], plan[1], atol=0.1)
+    further = dojo.learn.shac(task, epochs=1, environments=2, rate=1e-9, start=learned.policy, evaluations=1)
+    assert abs(further.best - learned.best) < 0.02 * abs(learned.best)
+    onnx = pytest.importorskip("onnx.reference")
+    learned.policy.export_onnx(tmp_path / "policy.onnx")
+    seen = task.observe(plan[0])[0]
+    (actions,) = onnx.ReferenceEvaluator(str(tmp_path / "policy.onnx")).run(None, {"observation": np.float32(seen)})
+    np.testing.assert_allclose(actions, learned.policy.actions(seen), atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
+        (lambda t: dojo.learn.imitate(t, [(np.zeros((3, 2)), np.zeros((2, 1)))]), "states, inputs, gains"),
         (lambda t: dojo.learn.shac(t, epoch=3), r"shac\(\.\.\.\).*epoch"),
         (lambda t: dojo.learn.ars(t, best=40), r"ars\(best=\.\.\.\): expected at most 32"),
         (

@@ -1,0 +1,210 @@
+"""imitate: a policy that does what plans do, their feedback included.
+
+    min over weights    mean over knots t, and displacements d ~ N(0, spread^2) of states, of
+                        |a(x_t (+) d) - a_t - G_t d|^2,    G_t = K_t over half the range of inputs
+
+To first order in d this is the error of actions plus spread^2 times that of the derivatives of actions by states, so a
+policy learns the gains of a plan from the same number of plans (Mordatch and Todorov 2014 use the gains, too). Targets
+are limited to [-1, 1], as inputs are. `shac(..., start=policy)` goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dojo_opt.learn.epochs import learn
+from dojo_opt.learn.evaluation import evaluate
+from dojo_opt.learn.learned import Learned
+from dojo_opt.learn.network import ACTIVATIONS, Adam, Network, clipped
+from dojo_opt.learn.observation_statistics import ObservationStatistics
+from dojo_opt.learn.policy import LearnedPolicy
+from dojo_opt.learn.task import Task
+from dojo_opt.planning.plan import Plan
+from sim.mechanism import checks
+
+Floats = NDArray[np.float64]
+
+__all__ = ["ImitationOptions", "imitate"]
+
+
+@dataclass(frozen=True)
+class ImitationOptions:
+    """Settings of `imitate`.
+
+    Attributes:
+        epochs: number of epochs; in each, all knots are displaced anew (default 200).
+        spread: standard deviation of displaced states, one or (ndx,) [m, rad, m/s, rad/s] (default 0.05).
+        copies: displaced states per knot (default 4), beside the knot itself.
+        batches: steps of the policy per epoch (default 8).
+        rate: first learning rate, falling linearly to zero (default 3e-3).
+        norm: largest length of the gradient (default 1).
+        hidden: sizes of the hidden layers (default (64, 64)).
+        activation: "tanh" or "elu" (default "tanh").
+        evaluations: number of evaluations on the way, evenly spaced; the best policy is kept (default 4).
+        episodes: of an evaluation (default 8).
+        time_limit: of the processor time [s] (default inf).
+        callback: function of the record of each epoch; it may raise StopIteration to end (default None).
+        verbose: whether to print one line per evaluation (default False).
+        stream: file for these lines (default None: the standard output).
+    """
+
+    epochs: int = 200
+    spread: ArrayLike = 0.05
+    copies: int = 4
+    batches: int = 8
+    rate: float = 3e-3
+    norm: float = 1.0
+    hidden: tuple[int, ...] = (64, 64)
+    activation: str = "tanh"
+    evaluations: int = 4
+    episodes: int = 8
+    time_limit: float = float("inf")
+    callback: Callable[[dict[str, Any]], None] | None = None
+    verbose: bool = False
+    stream: Any = None
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "batches", "episodes"):
+            checks.whole_number(f"imitate({name}=...)", getattr(self, name))
+        for name in ("copies", "evaluations"):
+            checks.whole_number(f"imitate({name}=...)", getattr(self, name), 0)
+        for name in ("rate", "norm"):
+            checks.number(f"imitate({name}=...)", getattr(self, name), above=0.0)
+        checks.one_of("imitate(activation=...)", self.activation, ACTIVATIONS)
+
+
+class _Knots:
+    """Knots of all plans: states (n, nx), actions (n, nu), their derivatives by states (n, nu, ndx)."""
+
+    def __init__(self, task: Task, plans: Sequence[Any]) -> None:
+        call, sim = "imitate(plans)", task.sim
+        half = 0.5 * (task.high - task.low)
+        parts: list[tuple[Floats, Floats, Floats]] = []
+        for given in plans:
+            raw = (given.x, given.u, given.K) if isinstance(given, Plan) else given
+            if not isinstance(raw, tuple | list) or len(raw) != 3:
+                raise TypeError(f"{call}: expected plans, or (states, inputs, gains), got {given!r}")
+            if isinstance(given, Plan) and abs(given.substeps * given.time_step - task.knot_time) > 1e-9:
+                raise ValueError(
+                    f"{call}: expected knots of {task.knot_time:g} s, as the actions of the task, got "
+                    f"{given.substeps * given.time_step:g} s"
+                )
+            us = checks.array(call, raw[1], ("T", sim.nu))
+            xs = checks.array(call, raw[0], (len(us) + 1, sim.nx))
+            Ks = checks.array(call, raw[2], (len(us), sim.nu, sim.ndx))
+            parts.append((xs[:-1], (us - 0.5 * (task.high + task.low)) / half, Ks / half[:, None]))
+        if not parts:
+            raise ValueError(f"{call}: expected at least one plan, got none")
+        self.x, self.actions, self.gains = (np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+class _Imitation:
+    """Policy and random numbers of a run."""
+
+    algorithm = "imitate"
+    plans: Sequence[Any] = ()
+
+    def __init__(self, task: Task, options: ImitationOptions, seed: int) -> None:
+        self.task, self.options, self.seed = task, options, seed
+        self.rng, self.knots = np.random.default_rng((seed, 1)), _Knots(task, self.plans)
+        network = Network((task.observations, *options.hidden, task.sim.nu), options.activation)
+        statistics = ObservationStatistics.empty(task.observations)
+        statistics.add(task.observe(self.knots.x)[0])
+        scale = statistics.sums[0].copy(), statistics.deviation()
+        self.policy = LearnedPolicy(network, network.start(np.random.default_rng((seed, 0)), 0.1), *scale, task)
+        self.adam = Adam(network.count, (0.9, 0.99))
+        self.spread = np.broadcast_to(checks.floats("imitate(spread=...)", options.spread), (task.sim.ndx,))
+        self.epoch, self.steps, self.unsolved, self.infinite, self.best = 0, 0, 0, 0, -np.inf
+        self.chosen = self.policy
+
+    def targets(self) -> tuple[Floats, Floats]:
+        """Observations (m, no) around the knots, and the actions (m, nu) of the plans there."""
+        knots, o = self.knots, self.options
+        repeated = np.repeat(np.arange(len(knots.x)), 1 + o.copies)
+        d = self.spread * self.rng.standard_normal((len(repeated), self.task.sim.ndx))
+        d[:: 1 + o.copies] = 0.0
+        x = self.task.sim.integrate(knots.x[repeated], d)
+        actions = knots.actions[repeated] + np.matmul(knots.gains[repeated], d[:, :, None])[:, :, 0]
+        return self.task.observe(x)[0], np.clip(actions, -1.0, 1.0)
+
+    def train(self) -> dict[str, Any]:
+        """One epoch: its record, without an evaluation. Its "return" is minus the mean square error of actions."""
+        o, policy = self.options, self.policy
+        seen, actions = self.targets()
+        rate, total, longest = o.rate * (1.0 - self.epoch / o.epochs), 0.0, 0.0
+        for rows in np.array_split(self.rng.permutation(len(seen)), o.batches):
+            y, kept = policy.network.forward(policy.weights, policy.scaled(seen[rows]))
+            a = policy.squashed(y)
+            error = a - actions[rows]
+            slope = (np.abs(y) < 1.0) if policy.linear else 1.0 - a**2
+            gradient = np.zeros(policy.network.count)
+            policy.network.backward(policy.weights, kept, 2.0 * error * slope / max(len(rows), 1), gradient)
+            gradient, length = clipped(gradient, o.norm)
+            total, longest = total + float((error**2).sum()), max(longest, length)
+            if np.isfinite(length):
+                self.adam.step(policy.weights, gradient, rate)
+            else:
+                self.infinite += 1
+        self.epoch += 1
+        return {
+            "epoch": self.epoch, "steps": self.steps, "return": -total / actions.size, "evaluated": None,
+            "gradient": longest, "clipped": 0.0, "unsolved": self.unsolved, "infinite": self.infinite,
+        }  # fmt: skip
+
+    def assess(self) -> float:
+        """Mean return of the present policy, which is kept if it is the best."""
+        p = self.policy
+        policy = LearnedPolicy(p.network, p.weights.copy(), p.mean.copy(), p.deviation.copy(), self.task)
+        found = evaluate(policy, self.options.episodes, self.seed)
+        value = float(found.returns.mean())
+        self.steps, self.unsolved = self.steps + int(found.lengths.sum()), self.unsolved + found.unsolved
+        if value > self.best:
+            self.best, self.chosen = value, policy
+        return value
+
+    _NUMBERS = ("epoch", "steps", "unsolved", "infinite", "best")
+
+    def state(self) -> dict[str, Any]:
+        """All that `resume` needs."""
+        out: dict[str, Any] = {name: getattr(self, name) for name in self._NUMBERS}
+        out |= {"weights": self.policy.weights.copy(), "moments": self.adam.moments.copy()}
+        return out | {"rng": self.rng.bit_generator.state}
+
+    def resume(self, learned: Learned) -> None:
+        """Go on where a run ended."""
+        for name in self._NUMBERS:
+            setattr(self, name, learned.state[name])
+        self.policy.weights[:], self.adam.moments[:] = learned.state["weights"], learned.state["moments"]
+        self.rng.bit_generator.state = learned.state["rng"]
+        p = learned.policy
+        self.chosen = LearnedPolicy(p.network, p.weights, p.mean, p.deviation, self.task)
+
+
+def imitate(
+    task: Task, plans: Sequence[Any], *, seed: int = 0, resume: Learned | None = None, **options: Any
+) -> Learned:
+    """Learn a policy from plans and their gains: see the module, and `ImitationOptions` for the options.
+
+    Args:
+        task: whose states, inputs and control steps the plans have.
+        plans: of `dojo.ilqr`, or (states (T + 1, nx), inputs (T, nu) [N, N m], gains (T, nu, ndx)).
+        seed: of all random numbers; the same seed gives the same policy, to the last bit.
+        resume: a run to go on with, of the same plans, seed and options.
+        **options: fields of `ImitationOptions`.
+
+    Returns:
+        Learned, with the best of the evaluated policies.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a value out of range, or plans that do not fit the task.
+    """
+    if isinstance(plans, Plan) or not isinstance(plans, Sequence):
+        raise TypeError(f"imitate(plans): expected a list of plans, got {plans!r}")
+    search = type("Imitation", (_Imitation,), {"plans": plans})
+    return learn(search, ImitationOptions, task, seed, resume, options)
