@@ -55,6 +55,23 @@ def test_what_the_data_cannot_tell_is_named():
     assert np.isinf(np.diag(found.covariance)).any() and "not told" in found.summary()
 
 
+def test_a_prior_decides_where_the_data_do_not():
+    """Without gravity, the mass of a link and the inertia of the motor on its hinge act as one."""
+    rng, sd, floating = np.random.default_rng(3), np.array([0.01, 0.05]), {"gravity": (0.0, 0.0, 0.0)}
+    truth = _arm().replace(**floating).with_parameters({"armature": [0.03]})
+    start = _arm(0.1, 1.3).replace(**floating).with_parameters({"armature": [0.05]})
+    motions, names = _motions(truth, rng, sd), ("mass", "armature", "damper")
+    prior = {"mass": (1.0, 0.01), "damper": (0.6, 0.5)}
+    found = dojo.identify(start, motions, names, prior=prior, noise=sd)
+    assert not found.unseen and abs(found.values[0] - 1.0) < 3e-3 and 0.008 < found.deviation[0] < 0.012
+    errors = (found.values[1:] - [0.03, 0.3]) / found.deviation[1:]
+    assert np.abs(errors).max() < 3.0, (found.values, found.deviation)
+    assert found.deviation[2] < 0.05  # of a damper that the data tell, whatever its prior
+    assert len(dojo.identify(start, motions, names, noise=sd).unseen) == 1
+    with pytest.raises(ValueError, match=r"identify\(prior=\.\.\.\).*masses"):
+        dojo.identify(start, motions, names, prior={"masses": 1.0})
+
+
 def test_friction_is_found_through_contacts():
     def block(mu):
         return dojo.Simulator(dojo.models.block(friction=mu), time_step=0.02, kappa=1e-5)
