@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import dojo_opt as dojo
 from dojo_opt.learn.network import Network, perceptron
 from dojo_opt.learn.policy_rollout import Noise
+from dojo_opt.learn.randomisation import Models
 
 
 def _task(steps=30, gravity=True):
@@ -115,7 +117,7 @@ def test_one_observation_has_the_action_of_a_batch(task):
 
 
 ALGORITHMS = {
-    "shac": {"epochs": 12, "environments": 8, "horizon": 8, "hidden": (16,)},
+    "shac": {"epochs": 12, "environments": 8, "horizon": 8, "hidden": (16,), "episode": 20},
     "ars": {"epochs": 6, "directions": 6},
     "gradient_search": {"epochs": 6, "environments": 4, "rate": 0.3},
 }
@@ -127,6 +129,16 @@ MODELS = dojo.learn.Randomisation(
     noise=0.02,
     models=3,
 )
+
+
+@pytest.mark.parametrize("by_row", [True, False])
+def test_rows_of_an_epoch_have_models_of_their_own_or_one(task, by_row):
+    models = Models(task, replace(MODELS, by_row=by_row), np.random.default_rng(0))
+    drawn = models.draw(np.random.default_rng(1), 12)
+    for values in (drawn.kappa, drawn.parameters["mass"], drawn.parameters["friction:*"]):
+        assert len(values) == 12 and (len(np.unique(values)) > 1) == by_row
+    again = models.draw(np.random.default_rng(2), 12)
+    assert again.kappa[0] != drawn.kappa[0]
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
