@@ -91,7 +91,7 @@ def figure(folder: Path, name: str) -> None:
             returns = np.array([c[:rows, 1] for c in curves])
             axes.plot(seconds, np.median(returns, axis=0), marker=".", label=f"{algorithm}, {len(curves)} seeds")
             axes.fill_between(seconds, returns.min(axis=0), returns.max(axis=0), alpha=0.2)
-    axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name)
+    axes.set(xlabel="processor time [s]", ylabel="return in the task", title=name, xlim=(0.0, None))
     axes.legend()
     page.savefig(folder / f"{name}.png", dpi=150)
     print(f"wrote {folder / f'{name}.png'}")
