@@ -4,7 +4,7 @@ python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
 python benchmarks/learning.py DIR HalfCheetah --table           and tabulates it, with returns in MuJoCo, in TASK.json
 
-A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
+`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
 OPENBLAS_NUM_THREADS=1. Policies are also evaluated at time steps and smoothings that they have not learnt on, and in
 MuJoCo by benchmarks/evaluate_policy.py, which imports nothing of dojo-opt.
 """
@@ -30,6 +30,7 @@ _RARELY: dict[str, Any] = {"evaluations": 3, "episodes": 4}  # an evaluation tak
 SETTINGS: dict[str, dict[str, dict[str, Any]]] = {
     "HalfCheetah": {
         "shac": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
+        "best_of": {"epochs": 450, "environments": 32, "episode": 128, "randomisation": TRANSFER} | _RARELY,
         "ars": {"epochs": 30, "rate": 0.02, "randomisation": TRANSFER} | _RARELY,
         "gradient_search": {"epochs": 60, "horizon": 80, "randomisation": TRANSFER} | _RARELY,
     },
@@ -59,7 +60,11 @@ def run(folder: Path, name: str, algorithm: str, seed: int, epochs: int | None) 
         return
     task = getattr(dojo.learn, TASKS[name][0])()
     options = SETTINGS[name][algorithm] | ({} if epochs is None else {"epochs": epochs})
-    learned = getattr(dojo.learn, algorithm)(task, seed=seed, verbose=True, **options)
+    if algorithm == "best_of":
+        trio = range(3 * seed, 3 * seed + 3)
+        learned = dojo.learn.best_of(dojo.learn.shac, task, trio, verbose=True, **options)
+    else:
+        learned = getattr(dojo.learn, algorithm)(task, seed=seed, verbose=True, **options)
     learned.save(path)
     learned.policy.save(path.with_suffix(".policy.npz"))
     print(f"{name} seed {seed}: {learned!r}")

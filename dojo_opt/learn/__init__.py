@@ -13,7 +13,7 @@ from dojo_opt.learn.policy import LearnedPolicy
 from dojo_opt.learn.policy_rollout import PolicyGradient, PolicyRollout, roll_policy_batch
 from dojo_opt.learn.randomisation import Randomisation
 from dojo_opt.learn.search import GradientSearchOptions, RandomSearchOptions, ars, gradient_search
-from dojo_opt.learn.seeds import seeds
+from dojo_opt.learn.seeds import best_of, seeds
 from dojo_opt.learn.shac import ShacOptions, shac
 from dojo_opt.learn.task import Task
 
@@ -36,6 +36,7 @@ __all__ = [
     "Task",
     "ant",
     "ars",
+    "best_of",
     "cartpole",
     "evaluate",
     "gradient_search",

@@ -1,4 +1,4 @@
-"""Seeds: an algorithm run with several of them, one after the other or in workers."""
+"""Seeds: an algorithm run with several of them, one after the other or in workers, to the end or until one leads."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 from dojo_opt.learn.learned import Learned
 from dojo_opt.learn.task import Task
-from sim.mechanism.checks import whole_number
+from sim.mechanism import checks
 from solvers.status import Status
 
-__all__ = ["seeds"]
+__all__ = ["best_of", "seeds"]
 
 
 def seeds(
@@ -46,7 +46,7 @@ def seeds(
         raise TypeError(f"seeds(algorithm): expected a function such as dojo.learn.shac, got {algorithm!r}")
     if executor is not None and not hasattr(executor, "submit"):
         raise TypeError(f"seeds(executor=...): expected an Executor, with submit(), got {executor!r}")
-    chosen = [whole_number("seeds(numbers)", number, 0) for number in numbers]
+    chosen = [checks.whole_number("seeds(numbers)", number, 0) for number in numbers]
     futures = [] if executor is None else [executor.submit(_run, algorithm, task, k, options) for k in chosen]
     out: list[Learned] = []
     try:
@@ -65,3 +65,70 @@ def _run(algorithm: Callable[..., Learned], task: Task, number: int, options: di
     """One run, without its task, which the caller has; at module level, so that other processes can import it."""
     found = algorithm(task, seed=number, **options)
     return replace(found, policy=replace(found.policy, task=None))
+
+
+class _StopAt:
+    """A callback that ends a run after an epoch."""
+
+    def __init__(self, epoch: int) -> None:
+        self.epoch = epoch
+
+    def __call__(self, record: dict[str, Any]) -> None:
+        if record["epoch"] >= self.epoch:
+            raise StopIteration
+
+
+def best_of(
+    algorithm: Callable[..., Learned],
+    task: Task,
+    numbers: Iterable[int] = range(3),
+    *,
+    epochs: int,
+    share: float = 0.2,
+    executor: Executor | None = None,
+    **options: Any,
+) -> Learned:
+    """Begin with several seeds, and go on with the one that earns most while it learns.
+
+    Some runs settle early in a motion that leads nowhere, and show it early.
+
+    Args:
+        algorithm: `shac`, `ars` or `gradient_search`.
+        task: what to learn.
+        numbers: seeds (default 0 to 2).
+        epochs: of the run that goes on.
+        share: of these epochs after which it is chosen (default 0.2).
+        executor: whose workers begin, as in `seeds` (default None: one run after the other).
+        **options: of the algorithm.
+
+    Returns:
+        The run to its end, the same to the last bit as that of its seed alone; its steps, unsolved steps and processor
+        time include those of the others.
+
+    Raises:
+        TypeError: for an argument of the wrong kind.
+        ValueError: for a number out of range, or no seed.
+    """
+    if "callback" in options or "resume" in options:
+        raise TypeError("best_of(...): callback and resume are its own; give them to the algorithm")
+    first = max(1, round(checks.share("best_of(share=...)", share) * checks.whole_number("best_of(epochs)", epochs)))
+    begun = seeds(algorithm, task, numbers, executor=executor, epochs=epochs, callback=_StopAt(first), **options)
+    if not begun:
+        raise ValueError("best_of(numbers): expected at least one seed")
+    chosen = max(begun, key=_earned)
+    if begun[-1].status == Status.INTERRUPTED or chosen.success:
+        return chosen
+    found = algorithm(task, seed=chosen.seed, resume=chosen, epochs=epochs, **options)
+    others = [run for run in begun if run is not chosen]
+    return replace(
+        found,
+        steps=found.steps + sum(run.steps for run in others),
+        unsolved=found.unsolved + sum(run.unsolved for run in others),
+        seconds=found.seconds + sum(run.seconds for run in others),
+    )
+
+
+def _earned(run: Learned) -> float:
+    """The last mean return while learning; that of the evaluated policy before any episode has ended."""
+    last = run.history[-1]["return"] if run.history else None
+    return run.best if last is None else float(last)

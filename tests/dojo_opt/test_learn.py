@@ -164,6 +164,7 @@ def _stop(record, epoch):
         raise StopIteration
 
 
+@pytest.mark.slow
 def test_workers_find_the_same_policies(task):
     options = {"epochs": 3, "directions": 20, "randomisation": MODELS, "evaluations": 1, "episodes": 2}
     alone = dojo.learn.seeds(dojo.learn.ars, task, (3, 4), **options)
@@ -191,6 +192,18 @@ def test_policies_learn_and_hold_the_pendulum_down_in_a_closed_loop(task, tmp_pa
     loop = dojo.closed_loop(again.controller, dojo.Plant(task.sim, [0.6, 0.0]), 2.0, control_step=task.knot_time)
     assert loop.survived and abs(loop.x[-1, 0]) < 0.3
     assert len(learned.plot().lines) == 2
+
+
+def test_the_best_of_several_beginnings_goes_on(task):
+    options = {"environments": 8, "horizon": 8, "hidden": (16,), "episode": 8, "episodes": 2, "evaluations": 2}
+    whole = {k: dojo.learn.shac(task, seed=k, epochs=20, **options) for k in (1, 2, 3)}
+    after = {k: run.history[4]["return"] for k, run in whole.items()}
+    found = dojo.learn.best_of(dojo.learn.shac, task, (1, 2, 3), epochs=20, share=0.25, **options)
+    assert found.success and found.seed == max(after, key=after.get), after
+    np.testing.assert_array_equal(found.policy.weights, whole[found.seed].policy.weights)
+    assert found.best == whole[found.seed].best and found.steps == (20 + 2 * 5) * 64
+    with pytest.raises(ValueError, match=r"best_of\(share=\.\.\.\)"):
+        dojo.learn.best_of(dojo.learn.shac, task, epochs=20, share=2.0)
 
 
 def test_imitated_policies_have_the_feedback_of_plans_and_can_learn_on(task, tmp_path):
