@@ -4,9 +4,10 @@ python benchmarks/learning.py DIR HalfCheetah --algorithms shac ars --seeds 0 1 
 python benchmarks/learning.py DIR HalfCheetah --only-figure                                 draws what is saved
 python benchmarks/learning.py DIR HalfCheetah --table           and tabulates it, with returns in MuJoCo, in TASK.json
 
-`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and
-OPENBLAS_NUM_THREADS=1. Policies are also evaluated at time steps and smoothings that they have not learnt on, and in
-MuJoCo by benchmarks/evaluate_policy.py, which imports nothing of dojo-opt.
+`best_of` with seed k begins with the seeds 3k, 3k + 1, 3k + 2 of SHAC. A run is DIR/TASK_ALGORITHM_SEED.npz, and its
+policy DIR/....policy.npz. For one core, set NUMBA_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1. Policies are also evaluated
+at time steps and smoothings that they have not learnt on, and in MuJoCo by benchmarks/evaluate_policy.py, which imports
+nothing of dojo-opt.
 """
 
 from __future__ import annotations
