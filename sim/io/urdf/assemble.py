@@ -13,7 +13,7 @@ from sim.io.urdf.contacts import find_contacts
 from sim.io.urdf.inertia import RigidInertia, combined, fault, repaired
 from sim.io.urdf.loops import UrdfLoop, closing_joint, zero_poses
 from sim.io.urdf.mimic import follower_value, leader_of, mimic_gears
-from sim.io.urdf.report import LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
+from sim.io.urdf.report import OVERLAPPING, LinkFrame, Notes, UrdfMechanism, UrdfReport, UrdfWarning
 from sim.io.urdf.robot import Robot, UrdfJoint
 from sim.io.urdf.solids import body_shapes, body_visuals, collision_shapes
 from sim.io.urdf.tree import MergedLinks, Place, group, ordered
@@ -55,6 +55,7 @@ class Choices:
     law: str
     rim_points: int
     gravity: tuple[float, ...]
+    collisions: str | None
 
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
@@ -98,6 +99,11 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
+    if choices.collisions is not None:
+        pairs, overlapping = mech.self_collisions()
+        mech = replace(mech, collisions=pairs)
+        if overlapping:
+            notes.add(OVERLAPPING, overlapping)
     report = _report(
         {**robot.joints, **{n: loop.joint for n, loop in loops.items()}}, mech, places, coms, choices.file, notes
     )

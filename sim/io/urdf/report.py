@@ -14,6 +14,9 @@ from sim.mechanism.mechanism import Mechanism
 Floats = NDArray[np.float64]
 
 
+OVERLAPPING = "shapes that overlap in the neutral state, and do not collide"
+
+
 class UrdfWarning(UserWarning):
     """The mechanism differs from the robot of the file in a way that its motion shows."""
 
