@@ -11,6 +11,7 @@ from dojo_opt.gaits.equilibrium import input_map, least_pushes
 from dojo_opt.gaits.feet import Feet
 from sim.mechanism.brief import brief_repr
 from sim.mechanism.parts import Input, Joint
+from sim.mechanism.servos import passive
 from sim.simulator.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -97,7 +98,7 @@ class Gait:
 
     def _generalised_forces(self, iterations: int) -> Array:
         """(T, nv) forces that lead from each state to the velocity of the next, without the ground."""
-        mech = self.simulator.mechanism
+        mech = passive(self.simulator.mechanism)
         joints = [_with_far_stops(j) for j in mech.joints]
         driven = replace(mech, joints=joints, inputs=[Input(j.name, dof=d) for j in mech.joints for d in range(j.nv)])
         sim = self.simulator.replace(mechanism=driven)

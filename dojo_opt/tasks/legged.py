@@ -92,11 +92,12 @@ def legged_mpc(
     times = knot * np.arange(_HORIZON + 1)
     limits = sim.mechanism.input_limits
     states, torques = reference(times), reference.torques(times[:-1])
+    gains = np.array([part.gain for part in sim.mechanism.inputs or ()])
     problem = Problem(
         sim,
         states[0],
         _HORIZON,
-        cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT / unit**2)],
+        cost=[Tracking(states, _weights(legs, sim)), Effort(_EFFORT * gains**2 / unit**2)],
         control_limits=limits if np.isfinite(limits).any() else None,
         substeps=substeps,
         controls0=np.clip(torques, *limits),

@@ -14,6 +14,7 @@ from sim.mechanism.pack_clusters import pack_clusters
 from sim.mechanism.pack_collisions import pack_collisions
 from sim.mechanism.parts import WORLD, Contact, Joint
 from sim.mechanism.seen_inertia import seen_inertias
+from sim.mechanism.servos import with_servos
 from sim.mechanism.shapes import rotation_matrix
 from sim.mechanism.terrain import Terrain
 from sim.model.layout import Sizes, allocate_model
@@ -52,7 +53,7 @@ def pack(mech: Mechanism) -> Model:
     """The numbers of a mechanism."""
     model = allocate_model(mechanism_sizes(mech))
     _pack_tree(mech, model)
-    _pack_joints(mech.joints, model)
+    _pack_joints(with_servos(mech.joints, mech.inputs or ()), model)
     model.dof_seen[:] = seen_inertias(model)
     _pack_branches(model)
     _pack_terrain(mech, model)
@@ -222,6 +223,7 @@ def _pack_inputs(mech: Mechanism, model: Model) -> None:
         if part.joint is not None:
             model.input_kind[k] = InputKind.JOINT
             model.input_index[k] = model.body_vadr[joints[part.joint]] + part.dof
+            model.input_wrench[k, 0] = part.gain
         else:
             model.input_kind[k] = InputKind.WORLD if part.frame == "world" else InputKind.BODY
             model.input_index[k] = bodies[part.body or ""]

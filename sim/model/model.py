@@ -112,5 +112,5 @@ class Model(NamedTuple):
     gear_offset: Vector  # (ngear,) [m, rad]
     limit_sign: Vector  # (nlimit,) +1 for a lower, -1 for an upper bound
     limit_bound: Vector  # (nlimit,) [m, rad]; of a cone, its half angle
-    input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input
+    input_wrench: Matrix  # (nu, 6) force and torque per unit of a WORLD or BODY input; gain of a JOINT input, first
     gravity: Vector  # (3,) [m/s^2]

@@ -250,7 +250,7 @@ def add_time_step(model: Model, data: Data, at: At, w: float, col: int) -> None:
     for j in range(model.input_kind.shape[0]):
         i = model.input_index[j]
         if model.input_kind[j] == InputKind.JOINT:
-            X[i, col] += w * at.u[j]
+            X[i, col] += w * model.input_wrench[j, 0] * at.u[j]
         else:
             f, t = _input_wrench(model, data, j, at.u)
             add_wrench(model, data, i, f, moment(data, i, f, t), -2.0 * w, col)
