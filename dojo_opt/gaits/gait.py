@@ -116,9 +116,9 @@ class Gait:
 
 
 def _with_far_stops(joint: Joint) -> Joint:
-    """The joint with its stops out of reach: they push when met, and a first guess of the forces meets them."""
+    """The joint with its stops out of reach and without dry friction: a first guess of the forces meets both."""
     far = [(-_FAR if np.isfinite(lo) else lo, _FAR if np.isfinite(hi) else hi) for lo, hi in joint.limits or ()]
-    return replace(joint, limits=far)
+    return replace(joint, limits=far, friction=0.0)
 
 
 def _pyramid(feet: Feet) -> Array:

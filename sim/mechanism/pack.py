@@ -46,6 +46,7 @@ def mechanism_sizes(mech: Mechanism) -> Sizes:
         ngear=len(mech.gears),
         nterrain=len(fields),
         nheight=sum(f.coefficients.size for f in fields),
+        ndry=sum(int(np.count_nonzero(j.friction)) for j in mech.joints),
     )
 
 
@@ -55,6 +56,7 @@ def pack(mech: Mechanism) -> Model:
     _pack_tree(mech, model)
     _pack_joints(with_servos(mech.joints, mech.inputs or ()), model)
     model.dof_seen[:] = seen_inertias(model)
+    _pack_dry(mech.joints, model)
     _pack_branches(model)
     _pack_terrain(mech, model)
     _pack_contacts(mech, model)
@@ -134,6 +136,13 @@ def _pack_joints(joints: Sequence[Joint], model: Model) -> None:
             model.limit_dof[limit], model.limit_sign[limit], model.limit_bound[limit] = d + dof, sign, bound
             model.limit_cone[limit] = sign == _CONE
             limit += 1
+
+
+def _pack_dry(joints: Sequence[Joint], model: Model) -> None:
+    """Degrees of freedom with dry friction."""
+    forces = np.concatenate([np.asarray(joint.friction, dtype=np.float64) for joint in joints])
+    model.dry_dof[:] = np.flatnonzero(forces)
+    model.dry_force[:] = forces[forces > 0.0]
 
 
 def _bounds(joint: Joint) -> list[tuple[int, float, float]]:

@@ -127,6 +127,9 @@ class Joint:
             no limit).
         armature: inertia that moves with a coordinate and with nothing else, as a geared rotor's [kg, kg m^2] (default
             0).
+        friction: dry friction: the largest force or torque that holds a coordinate, and the one that brakes it when it
+            moves; one number, or one per degree of freedom, none for quaternions [N, N m] (default 0). A joint at rest
+            creeps with kappa, as contacts do: by kappa/(h f) (1/(1 - s) - 1/(1 + s)) in a step h under a share s of f.
         close: whether the child hangs on another joint already, and this one closes a loop (default False). With a
             spring, a damper, limits, armature, an input, a pitch or two rotations, it has coordinates of its own, and
             the child is cut there: a second part of it, the body "child.name", hangs on this joint and is welded to the
@@ -152,6 +155,7 @@ class Joint:
     limits: Sequence[Any] | None = None
     cone: float | None = None
     armature: ArrayLike = 0.0
+    friction: ArrayLike = 0.0
     close: bool = False
     pitch: float = 0.0  # [m/rev]
 
@@ -165,7 +169,7 @@ class Joint:
             object.__setattr__(self, field, checks.vector(f"{call}, {field}=...)", getattr(self, field), 3))
         object.__setattr__(self, "axis", checks.direction(f"{call}, axis=...)", self.axis))
         object.__setattr__(self, "orientation", checks.quaternion(f"{call}, orientation=...)", self.orientation))
-        for field in ("spring", "damper", "rest", "armature"):
+        for field in ("spring", "damper", "rest", "armature", "friction"):
             object.__setattr__(self, field, per_dof(call, self, field))
         object.__setattr__(self, "limits", limits_of(f"{call}, limits=...)", self))
         object.__setattr__(self, "cone", cone_of(f"{call}, cone=...)", self))
@@ -448,7 +452,7 @@ def per_dof(call: str, joint: Joint, field: str) -> tuple[float, ...]:
         values = checks.vector(call, value, joint.nv)
     if field != "rest" and any(x < 0.0 for x in values):
         raise ValueError(f"{call}: expected numbers >= 0, got {value!r}")
-    if field == "armature" and joint.nrot == 3 and any(values[-3:]):
+    if field in ("armature", "friction") and joint.nrot == 3 and any(values[-3:]):
         raise ValueError(f"{call}: the rotations of a quaternion joint have none, got {value!r}")
     if field == "spring" and joint.nrot == 3 and len(set(values[-3:])) > 1:
         raise ValueError(f"{call}: a quaternion joint has one spring constant for its three rotations, got {value!r}")

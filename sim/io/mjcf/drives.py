@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.io.mjcf.groups import Where, name_of, pose_of
 from sim.io.mjcf.joints import BALL, FREE
 from sim.io.urdf.report import Notes
-from sim.mechanism.parts import Input
+from sim.mechanism.parts import Input, Joint
 
 Floats = NDArray[np.float64]
 
@@ -109,6 +109,25 @@ def _ctrl_bounds(model: Any, a: int, gear: float) -> tuple[float, float]:
     return low, high
 
 
+def with_friction(
+    model: Any, joints: list[Joint], homes: dict[int, tuple[str, int]], wanted: bool, notes: Notes
+) -> list[Joint]:
+    """The joints with the dry friction of the file, where it is wanted and they can have it."""
+    forces = {joint.name: np.zeros(joint.nv) for joint in joints}
+    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
+    missing = []
+    for j in rough:
+        if not wanted or model.jnt_type[j] in (FREE, BALL):
+            missing.append(name_of(model, "joint", j))
+            continue
+        name, dof = homes[j]
+        forces[name][dof] = model.dof_frictionloss[model.jnt_dofadr[j]]
+    if missing:
+        text = "dry friction of joints is left out, which joint_friction=True adds to hinges and slides"
+        notes.add(text, missing, warn=True)
+    return [replace(joint, friction=forces[joint.name]) if forces[joint.name].any() else joint for joint in joints]
+
+
 def left_out(model: Any, collisions: bool, notes: Notes) -> None:
     """Notes on the elements of the file that the mechanism lacks."""
     if model.ntendon:
@@ -117,9 +136,6 @@ def left_out(model: Any, collisions: bool, notes: Notes) -> None:
         notes.add("tendons are left out", [name_of(model, "tendon", k) for k in range(model.ntendon)], warn=felt)
     if model.npair and not collisions:
         notes.add("explicit contact pairs are left out", [name_of(model, "pair", k) for k in range(model.npair)])
-    rough = sorted({int(model.dof_jntid[d]) for d in np.flatnonzero(model.dof_frictionloss)})
-    if rough:
-        notes.add("dry friction of joints is left out", [name_of(model, "joint", j) for j in rough], warn=True)
     for field, what in (("dof_dampingpoly", "nonlinear damping"), ("jnt_stiffnesspoly", "nonlinear stiffness")):
         if np.any(getattr(model, field, 0.0)):
             notes.add(f"{what} is left out", warn=True)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from sim.io.mjcf.collisions import find_collisions, find_on_planes
 from sim.io.mjcf.contacts import find_contacts
-from sim.io.mjcf.drives import find_inputs, left_out
+from sim.io.mjcf.drives import find_inputs, left_out, with_friction
 from sim.io.mjcf.equalities import find_gears, find_loops
 from sim.io.mjcf.groups import GeomGroup, body_shapes, find_groups
 from sim.io.mjcf.joints import BALL, FREE, carry
@@ -36,6 +36,7 @@ def load_mjcf(
     rim_points: int = 4,
     collisions: bool | str = False,
     gravity: ArrayLike | None = None,
+    joint_friction: bool = False,
 ) -> MjcfMechanism:
     """Load the model of an MJCF file, with MuJoCo's own parser (`pip install "dojo-opt[mjcf]"`).
 
@@ -54,6 +55,8 @@ def load_mjcf(
             corners at most (sim/io/mjcf/collisions.py). "self" lets all bodies collide with one another but those that
             a joint connects; `report` lists pairs of shapes that overlap in the neutral state, which do not.
         gravity: (3,) acceleration of gravity [m/s^2]; None: that of the file.
+        joint_friction: whether hinges and slides have the dry friction (frictionloss) of the file, see
+            `Joint.friction`. Steps of a higher order or of a given accuracy are for joints without it.
 
     Returns:
         MjcfMechanism, whose `report` lists unsupported elements. An unexpected change of the motion
@@ -74,6 +77,7 @@ def load_mjcf(
     if not joints:
         raise ValueError(f"load_mjcf: {file}: no joint is free to move")
     inputs, gear, low, high = find_inputs(model, homes, where, notes)
+    joints = with_friction(model, joints, homes, joint_friction, notes)
     left_out(model, bool(collisions), notes)
     mech = MjcfMechanism(
         bodies,

@@ -57,8 +57,8 @@ class MjcfMechanism(Mechanism):
     `collisions=True` against one another and fixed geoms; actuators on hinges and slides as inputs in N and N m, or as
     servos with targets in units of the joint, u = report.gear * ctrl, and on sites as wrenches that move with the body;
     connect and weld as joints that close loops, and linear couplings of two joints as gears, all of them rigid
-    (equalities.py). Not represented, and listed in `report.notes`: other equality constraints, tendons, dry friction of
-    joints, fluids, meshes, height fields.
+    (equalities.py). Not represented, and listed in `report.notes`: other equality constraints, tendons, fluids, meshes,
+    height fields.
 
     Attributes:
         report: poses of the bodies, coordinates of the joints, gears and bounds of the inputs, unsupported elements.

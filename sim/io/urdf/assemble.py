@@ -20,7 +20,7 @@ from sim.io.urdf.tree import MergedLinks, Place, group, ordered
 from sim.io.urdf.xml import UrdfError
 from sim.mechanism import checks
 from sim.mechanism.composite import composite
-from sim.mechanism.parts import WORLD, Body, Contact, Input, Joint
+from sim.mechanism.parts import KINDS, WORLD, Body, Contact, Input, Joint
 from sim.mechanism.pose import HERE, Pose
 from sim.mechanism.stance import gaps, lifted, resting
 from sim.mechanism.visual import Visual
@@ -56,6 +56,7 @@ class Choices:
     rim_points: int
     gravity: tuple[float, ...]
     collisions: str | None
+    joint_friction: bool
 
 
 def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, notes: Notes) -> UrdfMechanism:
@@ -99,6 +100,13 @@ def assemble(robot: Robot, loops: Mapping[str, UrdfLoop], choices: Choices, note
     if len(bases) == 1 and bases[0] not in choices.neutral:
         mech = replace(mech, neutral=lifted(mech, bases[0]))
     _ground_notes(mech, choices, bool(bases), notes)
+    rough = [
+        body.joint.name
+        for body in groups
+        if body.joint and body.joint.friction and not (choices.joint_friction and _may_rub(body, body.joint))
+    ]
+    if rough:
+        notes.add("joints move without the dry friction of the file, which joint_friction=True adds to hinges", rough)
     if choices.collisions is not None:
         pairs, overlapping = mech.self_collisions()
         mech = replace(mech, collisions=pairs)
@@ -195,8 +203,14 @@ def _joint(
         axis=joint.axis,
         orientation=frame.quaternion,
         damper=0.0 if body.fixed else joint.damping,
+        friction=max(joint.friction, 0.0) if choices.joint_friction and _may_rub(body, joint) else 0.0,
         limits=None if body.fixed else joint.limits,
     )
+
+
+def _may_rub(body: MergedLinks, joint: UrdfJoint) -> bool:
+    """Whether a joint has coordinates that dry friction can hold."""
+    return not body.fixed and KINDS[joint.kind][1] < 3
 
 
 def _body(body: MergedLinks, part: RigidInertia) -> Body:

@@ -94,7 +94,7 @@ class UrdfMechanism(Mechanism):
 
     Attributes:
         report: `links` has the pose of every link in its body, `effort` and `velocity` the bounds of the inputs and
-            their joints, `notes` unsupported elements (dry friction, meshes, mimics).
+            their joints, `notes` unsupported elements (meshes, mimics).
     """
 
     report: UrdfReport | None = field(default=None, compare=False, repr=False)
