@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dojo_opt.constraint import Goal
 from dojo_opt.cost import Effort, Tracking
-from dojo_opt.gaits.equilibrium import input_map
+from dojo_opt.gaits.equilibrium import input_map, potential_gradient
 from dojo_opt.planning.options import PLANNED
 from dojo_opt.planning.problem import Problem
 from sim.mechanism import checks
@@ -106,7 +106,8 @@ def push(
     hands = _follow(kin, q, touch + moved[:, None] * forward)
     sim = _scene(kin, object, pose, radius, float(below[2]))
     states = _states(sim, hands, place + np.maximum(moved, 0.0)[:, None] * forward)
-    held = np.linalg.lstsq(input_map(alone), kin.gravity_torques(hands[1:-1]).T, rcond=None)[0].T
+    resting = np.concatenate([hands[1:-1], np.zeros((horizon, alone.nv))], axis=1)
+    held = np.linalg.lstsq(input_map(alone), potential_gradient(alone, resting).T, rcond=None)[0].T
     limits = tuple(np.asarray(bound, dtype=float) for bound in sim.mechanism.input_limits)
     held = np.clip(held, *limits)
     unit = max(float(np.abs(held).max(initial=0.0)), 1e-3)

@@ -131,9 +131,9 @@ class Joint:
             moves; one number, or one per degree of freedom, none for quaternions [N, N m] (default 0). A joint at rest
             creeps with kappa, as contacts do: by kappa/(h f) (1/(1 - s) - 1/(1 + s)) in a step h under a share s of f.
         close: whether the child hangs on another joint already, and this one closes a loop (default False). With a
-            spring, a damper, limits, armature, an input, a pitch or two rotations, it has coordinates of its own, and
-            the child is cut there: a second part of it, the body "child.name", hangs on this joint and is welded to the
-            first (sim/mechanism/closing.py).
+            spring, a damper, friction, limits, armature, an input, a pitch or two rotations, it has coordinates of its
+            own, and the child is cut there: a second part of it, the body "child.name", hangs on this joint and is
+            welded to the first (sim/mechanism/closing.py).
         pitch: displacement of a screw along its axis per turn, positive for a right-handed thread, negative for a
             left-handed one [m/rev] (default 0). Its coordinate is the angle.
 
